@@ -1,0 +1,3 @@
+//! The command `boresight`.
+
+fn main() {}

@@ -1,0 +1,30 @@
+//! The few values that cross a filter's border: beliefs, measurements, weighted measurements.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+/// A Gaussian belief: mean N x 1 and covariance N x N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian<const N: usize, T = f64> {
+    /// Mean, N x 1.
+    pub mean: SVector<T, N>,
+    /// Covariance, N x N, symmetric.
+    pub cov: SMatrix<T, N, N>,
+}
+
+/// A position measurement with its own covariance (px and px², or m and m²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurement<T = f64> {
+    /// Position (x, y).
+    pub position: Vector2<T>,
+    /// Covariance of the position, 2 x 2, symmetric positive definite.
+    pub cov: Matrix2<T>,
+}
+
+/// One hypothesis of an update: a measurement and the probability that it is the target's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighted<T = f64> {
+    /// The measurement.
+    pub measurement: Measurement<T>,
+    /// Its probability, 0..=1; the weights of one update sum to at most 1.
+    pub weight: T,
+}

@@ -1,0 +1,1 @@
+//! Which detection belongs to which track: sparse gates in, assignments out; sees only numbers.

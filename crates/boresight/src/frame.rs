@@ -1,0 +1,111 @@
+//! A frame is pixels in their native type, a number and a time; a source hands frames out one by one.
+
+use crate::{FrameIndex, Image, Result, Timestamp};
+
+/// The pixels of one frame in the type the file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pixels {
+    /// 8-bit grey.
+    Gray8(Image<u8>),
+    /// 16-bit grey (10, 12 and 14 bit data lie in the low bits, unscaled).
+    Gray16(Image<u16>),
+    /// 32-bit float grey, any range.
+    GrayF32(Image<f32>),
+    /// 8-bit red, green, blue.
+    Rgb8(Image<[u8; 3]>),
+}
+
+/// The type of a frame's pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelKind {
+    /// [`Pixels::Gray8`].
+    Gray8,
+    /// [`Pixels::Gray16`].
+    Gray16,
+    /// [`Pixels::GrayF32`].
+    GrayF32,
+    /// [`Pixels::Rgb8`].
+    Rgb8,
+}
+
+impl Pixels {
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        match self {
+            Self::Gray8(i) => i.width(),
+            Self::Gray16(i) => i.width(),
+            Self::GrayF32(i) => i.width(),
+            Self::Rgb8(i) => i.width(),
+        }
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        match self {
+            Self::Gray8(i) => i.height(),
+            Self::Gray16(i) => i.height(),
+            Self::GrayF32(i) => i.height(),
+            Self::Rgb8(i) => i.height(),
+        }
+    }
+
+    /// The type of the pixels.
+    pub fn kind(&self) -> PixelKind {
+        match self {
+            Self::Gray8(_) => PixelKind::Gray8,
+            Self::Gray16(_) => PixelKind::Gray16,
+            Self::GrayF32(_) => PixelKind::GrayF32,
+            Self::Rgb8(_) => PixelKind::Rgb8,
+        }
+    }
+}
+
+/// One frame of a sequence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Number in the sequence, from 0.
+    pub index: FrameIndex,
+    /// Presentation time.
+    pub time: Timestamp,
+    /// The pixels.
+    pub pixels: Pixels,
+}
+
+/// What a source knows of its frames before the first is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceInfo {
+    /// Where the frames come from, for messages (a path, an address).
+    pub label: String,
+    /// How they are read, for the summary: `H.264 in process`, `PNG folder`, `ffmpeg pipe`.
+    pub reader: String,
+    /// Width, px.
+    pub width: usize,
+    /// Height, px.
+    pub height: usize,
+    /// Type of the pixels handed out.
+    pub kind: PixelKind,
+    /// Number of frames, if known beforehand.
+    pub n_frames: Option<u64>,
+    /// Nominal rate, frames/s, if known; true times are on the frames.
+    pub rate_hz: Option<f64>,
+    /// Whether the frames' times come from the file (else they are made from a nominal rate).
+    pub true_times: bool,
+}
+
+/// A sequence of frames.
+pub trait FrameSource: Send {
+    /// What is known of the sequence.
+    fn info(&self) -> &SourceInfo;
+    /// Returns the next frame, or `None` at the end.
+    /// # Errors
+    /// A frame that cannot be read; a damaged tail is a warning and an early end instead.
+    fn next_frame(&mut self) -> Result<Option<Frame>>;
+    /// Takes a frame back so that its memory can be used again; optional.
+    fn recycle(&mut self, frame: Frame) {
+        drop(frame);
+    }
+    /// Warnings so far (frames lost in a damaged tail, times made up), each a whole sentence.
+    fn warnings(&self) -> &[String] {
+        &[]
+    }
+}

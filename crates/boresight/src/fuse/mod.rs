@@ -1,0 +1,1 @@
+//! Fusion of tracks and of measurements from several sensors.

@@ -1,0 +1,58 @@
+//! Frames and tables in and out: images, video, CSV, MOTChallenge.
+
+/// Which pixels are wanted from a source that could give several kinds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Colour {
+    /// What the file holds: grey stays grey; colour stills give RGB; video gives its luma plane.
+    #[default]
+    Native,
+    /// Grey always: luma of video, BT.601 of RGB.
+    Gray,
+    /// RGB always, if the file has colour.
+    Rgb,
+}
+
+/// Pixel type of headerless (raw) frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RawType {
+    /// 8-bit grey.
+    U8,
+    /// 16-bit grey, least significant byte first.
+    U16Le,
+    /// 16-bit grey, most significant byte first.
+    U16Be,
+    /// 32-bit float grey, least significant byte first.
+    F32Le,
+    /// 8-bit RGB, interleaved.
+    Rgb8,
+}
+
+/// Layout of headerless (raw) frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawFormat {
+    /// Width, px.
+    pub width: usize,
+    /// Height, px.
+    pub height: usize,
+    /// Type of a pixel.
+    pub pixel: RawType,
+}
+
+/// How a source is to be opened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenOptions {
+    /// Which pixels are wanted.
+    pub colour: Colour,
+    /// Layout of raw frames; needed for raw input only.
+    pub raw: Option<RawFormat>,
+    /// Rate for sequences without times of their own, frames/s.
+    pub rate_hz: f64,
+    /// Largest accepted frame, pixels; a header that claims more is refused before memory is taken.
+    pub max_pixels: u64,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28 }
+    }
+}

@@ -1,0 +1,1 @@
+//! Simulated scenes: targets, noise, background, radar; never sees the tracker.

@@ -1,0 +1,62 @@
+//! Time as it is: integer nanoseconds and frame numbers, never mixed up.
+
+use serde::{Deserialize, Serialize};
+
+/// A frame's number in its sequence, from 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct FrameIndex(pub u64);
+
+/// A point in time, integer nanoseconds from the sequence's own zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Timestamp {
+    /// Nanoseconds.
+    pub ns: i64,
+}
+
+impl Timestamp {
+    /// Builds a time from whole nanoseconds.
+    pub const fn from_ns(ns: i64) -> Self {
+        Self { ns }
+    }
+
+    /// Builds a time from seconds, rounded to the nearest nanosecond (saturating at about 292 years).
+    pub fn from_secs_f64(s: f64) -> Self {
+        Self { ns: (s * 1e9).round() as i64 }
+    }
+
+    /// Builds the exact time `ticks * num / den` seconds, rounded to the nearest nanosecond.
+    pub fn from_ticks(ticks: i64, num: i64, den: i64) -> Self {
+        let scaled = i128::from(ticks) * i128::from(num) * 1_000_000_000;
+        let den = i128::from(den.max(1));
+        let ns = (scaled + den / 2).div_euclid(den);
+        Self { ns: ns.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64 }
+    }
+
+    /// Returns the time in seconds.
+    pub fn as_secs_f64(self) -> f64 {
+        self.ns as f64 * 1e-9
+    }
+
+    /// Returns `self - earlier` in seconds (negative if `self` is the earlier one).
+    pub fn seconds_since(self, earlier: Self) -> f64 {
+        (self.ns.saturating_sub(earlier.ns)) as f64 * 1e-9
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_of_a_90_khz_clock_round_to_the_nearest_nanosecond() {
+        assert_eq!(Timestamp::from_ticks(3003, 1, 90_000).ns, 33_366_667);
+        assert_eq!(Timestamp::from_ticks(-3003, 1, 90_000).ns, -33_366_667);
+        assert_eq!(Timestamp::from_ticks(1, 1001, 30_000).ns, 33_366_667);
+    }
+
+    #[test]
+    fn differences_of_extreme_times_do_not_overflow() {
+        let late = Timestamp::from_ns(i64::MAX);
+        assert!(late.seconds_since(Timestamp::from_ns(i64::MIN)) > 9e9);
+    }
+}

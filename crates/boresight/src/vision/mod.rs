@@ -1,0 +1,14 @@
+//! From a frame to detections: spatial filters, thresholds, clusters, centroids; never sees tracks.
+//!
+//! A threshold turns one row of pixels into one row of bits (`&[u64]`, bit `x % 64` of word `x / 64` is pixel `x`, bits past
+//! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
+
+use crate::{Frame, Result, Scan};
+
+/// Turns frames into detections.
+pub trait Detector: Send {
+    /// Replaces `scan` by the detections of `frame`, keeping its memory.
+    /// # Errors
+    /// A frame whose size or pixel type is not the one the detector was built for.
+    fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()>;
+}

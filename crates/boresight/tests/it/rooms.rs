@@ -1,0 +1,101 @@
+//! The arrows between rooms: a file uses only what this table allows. A new arrow is a new line here and a sentence in
+//! ARCHITECTURE.md.
+
+use std::path::{Path, PathBuf};
+
+/// Leaf types, open to all.
+const LEAVES: [&str; 7] = ["image", "frame", "detection", "record", "view", "error", "time"];
+
+/// room -> rooms it may use besides the leaves and itself.
+const ARROWS: [(&str, &[&str]); 9] = [
+    ("vision", &[]),
+    ("associate", &[]),
+    ("track", &["associate"]),
+    ("fuse", &[]),
+    ("metrics", &["associate"]),
+    ("sim", &[]),
+    ("io", &[]),
+    ("draw", &["io"]),
+    ("report", &["draw", "metrics"]),
+];
+
+fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(&path, out);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+}
+
+/// The rooms named in `crate::room` paths and in `use crate::{a, b}` groups.
+fn rooms_used(text: &str, rooms: &[&str]) -> Vec<String> {
+    // Tests inside a file may use anything.
+    let code = text.split("#[cfg(test)]").next().unwrap_or(text);
+    let mut used = Vec::new();
+    for (at, _) in code.match_indices("crate::") {
+        let rest = &code[at + "crate::".len()..];
+        let names: String = if let Some(group) = rest.strip_prefix('{') {
+            group.split(';').next().unwrap_or("").to_string()
+        } else {
+            rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+        };
+        for room in rooms {
+            if names.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == *room) {
+                used.push((*room).to_string());
+            }
+        }
+    }
+    used
+}
+
+#[test]
+fn every_room_uses_only_the_rooms_it_may() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let rooms: Vec<&str> = ARROWS.iter().map(|(r, _)| *r).collect();
+    let mut wrong = Vec::new();
+    for (room, allowed) in ARROWS {
+        let mut files = Vec::new();
+        rust_files(&src.join(room), &mut files);
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            for used in rooms_used(&text, &rooms) {
+                if used != room && !allowed.contains(&used.as_str()) {
+                    wrong.push(format!("{} uses {used}", file.display()));
+                }
+            }
+        }
+    }
+    for leaf in LEAVES {
+        let text = std::fs::read_to_string(src.join(format!("{leaf}.rs"))).unwrap();
+        for used in rooms_used(&text, &rooms) {
+            wrong.push(format!("{leaf}.rs, a leaf, uses {used}"));
+        }
+    }
+    assert!(wrong.is_empty(), "new arrows between rooms:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_file_starts_by_saying_what_it_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = Vec::new();
+    for dir in ["crates/boresight/src", "crates/boresight-filters/src", "crates/boresight-cli/src", "xtask/src"] {
+        rust_files(&root.join(dir), &mut files);
+    }
+    let bare: Vec<_> = files
+        .iter()
+        .filter(|f| !std::fs::read_to_string(f).unwrap().starts_with("//!"))
+        .map(|f| f.display().to_string())
+        .collect();
+    assert!(bare.is_empty(), "files without a //! header:\n{}", bare.join("\n"));
+}
+
+#[test]
+fn the_arrow_test_sees_a_forbidden_arrow() {
+    let rooms = ["vision", "track"];
+    assert_eq!(rooms_used("use crate::track::Tracker;", &rooms), ["track"]);
+    assert_eq!(rooms_used("use crate::{Image, track::{A, B}};", &rooms), ["track"]);
+    assert!(rooms_used("use crate::Image;\n#[cfg(test)]\nmod tests { use crate::track::X; }", &rooms).is_empty());
+}

@@ -1,0 +1,3 @@
+//! Repository chores: `cargo xtask <NAME>`.
+
+fn main() {}
