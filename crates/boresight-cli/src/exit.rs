@@ -1,0 +1,34 @@
+//! Exit codes that scripts can trust, and how an error is shown.
+
+use boresight::ErrorKind;
+use std::process::ExitCode;
+
+/// The table of exit codes, shown under every help text.
+pub const HELP: &str = "Exit codes:
+  0  done
+  1  a demand was not met (evaluate --require), or an unforeseen error
+  2  wrong usage or configuration
+  3  an input is missing, damaged or of a kind that is not read
+  4  a program that is needed is not installed (ffmpeg)
+  5  an output could not be written
+  6  a numerical step could not be done
+  130  interrupted; what was finished is on disk";
+
+/// Prints an error to standard error and returns its exit code.
+pub fn report(error: &anyhow::Error) -> ExitCode {
+    let mut text = format!("{error:#}");
+    let kind = error.downcast_ref::<boresight::Error>().map(boresight::Error::kind);
+    if kind.is_some() {
+        text = error.to_string();
+    }
+    eprintln!("error: {text}");
+    ExitCode::from(match kind {
+        Some(ErrorKind::Config) => 2,
+        Some(ErrorKind::NotFound | ErrorKind::Damaged | ErrorKind::Unsupported) => 3,
+        Some(ErrorKind::MissingTool) => 4,
+        Some(ErrorKind::Output) => 5,
+        Some(ErrorKind::Numeric) => 6,
+        Some(ErrorKind::Interrupted) => 130,
+        _ => 1,
+    })
+}
