@@ -1,5 +1,23 @@
 //! Frames and tables in and out: images, video, CSV, MOTChallenge.
 
+mod folder;
+mod natural;
+mod open;
+mod pixels;
+mod sniff;
+mod still;
+pub mod tables;
+mod tiff_count;
+mod tiff_pages;
+
+pub use folder::ImageFiles;
+pub use natural::natural_order;
+pub use open::open;
+pub use pixels::gray_of_rgb8;
+pub use tables::{AtomicFile, DetectionsCsv, JsonLines, MotWriter, Output, TracksCsv};
+
+use crate::{Error, ErrorKind, Result};
+
 /// Which pixels are wanted from a source that could give several kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colour {
@@ -54,5 +72,26 @@ pub struct OpenOptions {
 impl Default for OpenOptions {
     fn default() -> Self {
         Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28 }
+    }
+}
+
+impl OpenOptions {
+    /// Checks the rate and the limits.
+    /// # Errors
+    /// [`ErrorKind::Config`] for a rate that is not positive, raw frames of no size, or a limit of no pixels.
+    pub fn validate(&self) -> Result<()> {
+        if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
+            return Err(Error::new(ErrorKind::Config, "expected a positive number of frames/s")
+                .at(format!("rate-hz = {}", self.rate_hz)));
+        }
+        if self.max_pixels == 0 {
+            return Err(Error::new(ErrorKind::Config, "expected at least 1 pixel").at("max-pixels = 0"));
+        }
+        if let Some(raw) = self.raw {
+            pixels::check_size(raw.width as u64, raw.height as u64, self.max_pixels)
+                .map_err(|_| Error::new(ErrorKind::Config, "expected a size of at least 1 x 1 and at most max-pixels"))
+                .map_err(|e| e.at(format!("raw frames of {} x {} pixels", raw.width, raw.height)))?;
+        }
+        Ok(())
     }
 }

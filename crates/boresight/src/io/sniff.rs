@@ -1,0 +1,103 @@
+//! What a file holds, told by its first bytes and never by its name.
+
+use std::io::Read;
+
+/// Number of first bytes that [`sniff`] wants to see.
+pub(crate) const SNIFF_BYTES: usize = 64;
+
+/// A kind of content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    Png,
+    /// An animated PNG: several frames in one file.
+    Apng,
+    Jpeg,
+    Tiff,
+    Bmp,
+    Pnm,
+    Gif,
+    Y4m,
+    Mp4,
+    /// Text: a table, a list, a configuration.
+    Text,
+    Empty,
+    /// Anything else: left to ffmpeg.
+    Other,
+}
+
+impl Format {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Png => "PNG",
+            Self::Apng => "animated PNG",
+            Self::Jpeg => "JPEG",
+            Self::Tiff => "TIFF",
+            Self::Bmp => "BMP",
+            Self::Pnm => "PNM",
+            Self::Gif => "GIF",
+            Self::Y4m => "YUV4MPEG2",
+            Self::Mp4 => "MP4",
+            Self::Text => "text",
+            Self::Empty => "an empty file",
+            Self::Other => "unknown content",
+        }
+    }
+
+    /// Whether a folder or a glob takes such files as its frames.
+    pub fn is_image(self) -> bool {
+        matches!(self, Self::Png | Self::Apng | Self::Jpeg | Self::Tiff | Self::Bmp | Self::Pnm)
+    }
+}
+
+/// Reads up to `n` bytes, fewer at the end of the input.
+pub(crate) fn read_up_to(reader: &mut impl Read, n: usize) -> std::io::Result<Vec<u8>> {
+    let mut head = Vec::with_capacity(n);
+    reader.by_ref().take(n as u64).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+/// Tells the content from the first bytes of a file.
+pub(crate) fn sniff(head: &[u8]) -> Format {
+    match head {
+        [] => Format::Empty,
+        [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => {
+            // The animation chunk stands right behind the header in every writer's files.
+            if head.get(37..41) == Some(b"acTL") { Format::Apng } else { Format::Png }
+        }
+        [0xff, 0xd8, 0xff, ..] => Format::Jpeg,
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Format::Tiff,
+        [b'G', b'I', b'F', b'8', b'7' | b'9', b'a', ..] => Format::Gif,
+        [b'P', b'1'..=b'6' | b'f' | b'F', c, ..] if c.is_ascii_whitespace() || *c == b'#' => Format::Pnm,
+        _ if head.starts_with(b"YUV4MPEG2") => Format::Y4m,
+        // A bitmap's header has one of a few lengths, so that text which starts with "BM" is not taken for one.
+        [b'B', b'M', ..] if matches!(head.get(14..18), Some([12 | 16 | 40 | 52 | 56 | 64 | 108 | 124, 0, 0, 0])) => {
+            Format::Bmp
+        }
+        _ if matches!(head.get(4..8), Some(b"ftyp" | b"moov" | b"mdat" | b"wide" | b"free" | b"skip" | b"styp")) => {
+            Format::Mp4
+        }
+        _ if is_text(head) => Format::Text,
+        _ => Format::Other,
+    }
+}
+
+fn is_text(head: &[u8]) -> bool {
+    head.iter().all(|&b| b >= 0x20 && b != 0x7f || matches!(b, b'\n' | b'\r' | b'\t')) && !head.starts_with(b"#EXTM3U")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_is_told_by_its_first_bytes() {
+        assert_eq!(sniff(b""), Format::Empty);
+        assert_eq!(sniff(b"\x89PNG\r\n\x1a\n"), Format::Png);
+        assert_eq!(sniff(b"II\x2b\0\x08\0\0\0"), Format::Tiff);
+        assert_eq!(sniff(b"P5\n3 3"), Format::Pnm);
+        assert_eq!(sniff(b"P5,a,b"), Format::Text);
+        assert_eq!(sniff(b"BMW,x,y\n1,2,3\n4,5,6"), Format::Text);
+        assert_eq!(sniff(b"\0\0\0\x20ftypisom"), Format::Mp4);
+        assert_eq!(sniff(b"RIFF\0\0\0\0AVI "), Format::Other);
+    }
+}

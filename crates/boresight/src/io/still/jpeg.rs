@@ -1,0 +1,29 @@
+//! JPEG, baseline and progressive, grey, YCbCr, RGB and CMYK, 8 bits.
+//!
+//! The decoder runs in its strict mode: a picture that breaks off is an error instead of a half-grey frame.
+
+use super::damaged;
+use crate::io::pixels::{Samples, check_size};
+use crate::{Pixels, Result, io::Colour};
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+/// A JPEG's sides have 16 bits.
+const MAX_SIDE: usize = 65_535;
+
+pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pixels> {
+    let options = DecoderOptions::new_fast().set_max_width(MAX_SIDE).set_max_height(MAX_SIDE).set_strict_mode(true);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(|e| damaged("not a whole JPEG", e))?;
+    let (w, h) = decoder.dimensions().ok_or_else(|| damaged("not a whole JPEG", "it has no size"))?;
+    let (width, height) = check_size(w as u64, h as u64, max_pixels)?;
+    let (channels, space) = match decoder.input_colorspace() {
+        Some(ColorSpace::Luma) => (1, ColorSpace::Luma),
+        _ => (3, ColorSpace::RGB),
+    };
+    decoder.set_options(options.jpeg_set_out_colorspace(space));
+    let data = decoder.decode().map_err(|e| damaged("not a whole JPEG", e))?;
+    Samples { width, height, channels, data }.into_pixels(colour)
+}

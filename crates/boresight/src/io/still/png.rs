@@ -1,0 +1,34 @@
+//! PNG, 1 to 16 bits, grey, palette and colour, interlaced too. 16-bit samples stay exact; 1, 2 and 4 bit grey is
+//! scaled to 0..=255 as the standard says; palettes are expanded to RGB; alpha is dropped. Checksums are checked.
+
+use super::damaged;
+use crate::io::pixels::{Samples, check_size};
+use crate::{Pixels, Result, io::Colour};
+use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
+use std::io::Cursor;
+
+pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pixels> {
+    let limits = Limits { bytes: usize::try_from(max_pixels.saturating_mul(8)).unwrap_or(usize::MAX) };
+    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), limits);
+    decoder.set_transformations(Transformations::EXPAND);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let mut reader = decoder.read_info().map_err(|e| damaged("not a whole PNG", e))?;
+    let (width, height) = check_size(reader.info().width.into(), reader.info().height.into(), max_pixels)?;
+    let (kind, depth) = reader.output_color_type();
+    let channels = match kind {
+        ColorType::Grayscale => 1,
+        ColorType::GrayscaleAlpha => 2,
+        ColorType::Rgb | ColorType::Indexed => 3,
+        ColorType::Rgba => 4,
+    };
+    let n = reader.output_buffer_size().ok_or_else(|| damaged("not a whole PNG", "its size overflows"))?;
+    let mut data = vec![0u8; n];
+    reader.next_frame(&mut data).map_err(|e| damaged("not a whole PNG", e))?;
+    if depth == BitDepth::Sixteen {
+        let data = data.as_chunks::<2>().0.iter().map(|&b| u16::from_be_bytes(b)).collect();
+        Samples { width, height, channels, data }.into_pixels(colour)
+    } else {
+        Samples { width, height, channels, data }.into_pixels(colour)
+    }
+}

@@ -1,0 +1,100 @@
+//! Numbers as text: shortest digits that read back to the same bits, and exact seconds.
+
+use crate::Timestamp;
+use std::fmt::Write;
+
+/// Appends the shortest text that reads back as exactly this number; an infinite or missing value as `inf`, `NaN`.
+pub(crate) fn push_f64(out: &mut String, v: f64) {
+    let size = v.abs();
+    // Writing to a String cannot fail.
+    let _ = if size == 0.0 || (1e-5..1e16).contains(&size) || !size.is_finite() {
+        write!(out, "{v}")
+    } else {
+        write!(out, "{v:e}")
+    };
+}
+
+/// As [`push_f64`], with the shortest digits of a 32-bit number.
+pub(crate) fn push_f32(out: &mut String, v: f32) {
+    let size = v.abs();
+    let _ = if size == 0.0 || (1e-5..1e16).contains(&size) || !size.is_finite() {
+        write!(out, "{v}")
+    } else {
+        write!(out, "{v:e}")
+    };
+}
+
+/// Appends the seconds of a time with all its nanoseconds and no zeros behind: `-0.04`, `12`, `3.003`.
+pub(crate) fn push_seconds(out: &mut String, time: Timestamp) {
+    let ns = time.ns.unsigned_abs();
+    if time.ns < 0 {
+        out.push('-');
+    }
+    let _ = write!(out, "{}", ns / 1_000_000_000);
+    let part = ns % 1_000_000_000;
+    if part != 0 {
+        let start = out.len();
+        let _ = write!(out, ".{part:09}");
+        let kept = out[start..].trim_end_matches('0').len();
+        out.truncate(start + kept);
+    }
+}
+
+/// Reads seconds exactly to the nanosecond where they are written as plain decimals, else through f64.
+#[cfg_attr(not(test), expect(dead_code, reason = "the table readers use it"))]
+pub(crate) fn parse_seconds(text: &str) -> Option<Timestamp> {
+    let text = text.trim();
+    let (negative, digits) = match text.strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text),
+    };
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
+    let plain = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+    if !whole.is_empty() && whole.len() <= 9 && part.len() <= 9 && plain(whole) && plain(part) {
+        let seconds: i64 = whole.parse().ok()?;
+        let ns: i64 = if part.is_empty() { 0 } else { format!("{part:0<9}").parse().ok()? };
+        let ns = seconds * 1_000_000_000 + ns;
+        return Some(Timestamp::from_ns(if negative { -ns } else { ns }));
+    }
+    let s: f64 = text.parse().ok()?;
+    // About 292 years fit into the nanoseconds of an i64.
+    (s.is_finite() && s.abs() < 9.2e9).then(|| Timestamp::from_secs_f64(s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn extreme_numbers_stay_short() {
+        let text = |v| {
+            let mut s = String::new();
+            push_f64(&mut s, v);
+            s
+        };
+        assert_eq!(text(1e-300), "1e-300");
+        assert_eq!(text(0.1), "0.1");
+        assert_eq!(text(-0.0), "-0");
+        assert_eq!(text(2.0), "2");
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_read_back_to_the_same_bits(bits: u64) {
+            let v = f64::from_bits(bits);
+            prop_assume!(!v.is_nan());
+            let mut s = String::new();
+            push_f64(&mut s, v);
+            prop_assert_eq!(s.parse::<f64>().unwrap().to_bits(), v.to_bits());
+            prop_assert!(s.len() <= 25);
+        }
+
+        #[test]
+        fn times_read_back_to_the_same_nanosecond(ns in -999_999_999_999_999_999i64..999_999_999_999_999_999) {
+            let mut s = String::new();
+            push_seconds(&mut s, Timestamp::from_ns(ns));
+            prop_assert_eq!(parse_seconds(&s), Some(Timestamp::from_ns(ns)));
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! `tracks.csv`: one row for each track and frame, with the whole covariance.
+//!
+//! Columns: frame (from 0), time_s, track_id, status (tentative, confirmed, coasting), the state `[x, vx, y, vy]` (px,
+//! px/s), the ten distinct entries of its covariance (upper triangle, row by row), the box's size (px), and the row of
+//! the detection that was taken among this frame's detections (empty: none). Numbers are the shortest that read back
+//! to the same bits.
+
+use super::Output;
+use super::number::{push_f64, push_seconds};
+use crate::{Result, Sink, TrackStatus, View};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// The header of `tracks.csv`.
+pub const TRACKS_HEADER: &str = "frame,time_s,track_id,status,x_px,y_px,vx_px_per_s,vy_px_per_s,\
+var_x_px2,cov_x_vx_px2_per_s,cov_x_y_px2,cov_x_vy_px2_per_s,\
+var_vx_px2_per_s2,cov_vx_y_px2_per_s,cov_vx_vy_px2_per_s2,\
+var_y_px2,cov_y_vy_px2_per_s,var_vy_px2_per_s2,\
+width_px,height_px,detection";
+
+/// The word of a status in tables.
+pub fn status_word(status: TrackStatus) -> &'static str {
+    match status {
+        TrackStatus::Tentative => "tentative",
+        TrackStatus::Confirmed => "confirmed",
+        TrackStatus::Coasting => "coasting",
+    }
+}
+
+/// Writes `tracks.csv`.
+pub struct TracksCsv {
+    output: Output,
+    lines: String,
+}
+
+impl TracksCsv {
+    /// Creates the file and writes the header.
+    /// # Errors
+    /// [`crate::ErrorKind::Output`] if it cannot be written.
+    pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
+        Self::to(Output::file(path)?)
+    }
+
+    /// Writes to any output.
+    /// # Errors
+    /// [`crate::ErrorKind::Output`] if it cannot be written.
+    pub fn to(mut output: Output) -> Result<Self> {
+        output.put(format!("{TRACKS_HEADER}\n").as_bytes())?;
+        Ok(Self { output, lines: String::new() })
+    }
+}
+
+impl Sink for TracksCsv {
+    fn put(&mut self, view: &View<'_>) -> Result<()> {
+        let out = &mut self.lines;
+        out.clear();
+        for track in view.tracks {
+            let _ = write!(out, "{},", view.scan.index.0);
+            push_seconds(out, view.scan.time);
+            let _ = write!(out, ",{},{}", track.id.0, status_word(track.status));
+            let (mean, cov) = (&track.kinematics.mean, &track.kinematics.cov);
+            for k in [0, 2, 1, 3] {
+                out.push(',');
+                push_f64(out, mean[k]);
+            }
+            for i in 0..4 {
+                for j in i..4 {
+                    out.push(',');
+                    push_f64(out, cov[(i, j)]);
+                }
+            }
+            for v in [track.extent.width_px, track.extent.height_px] {
+                out.push(',');
+                push_f64(out, v);
+            }
+            out.push(',');
+            if let Some(detection) = track.detection {
+                let _ = write!(out, "{detection}");
+            }
+            out.push('\n');
+        }
+        self.output.put(out.as_bytes())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.output.finish()
+    }
+}

@@ -1,0 +1,226 @@
+//! The pages of a TIFF or BigTIFF file, one after the other: strips or tiles, uncompressed, LZW, deflate, PackBits, JPEG.
+//!
+//! 8 and 16 bit grey and 32-bit float stay what they are. Signed and 32-bit integers, half and double floats become
+//! 32-bit float (exact for 16 bits and half; a warning says so for the others). Separate colour planes are joined.
+//! Reduced-size pages (previews, NewSubfileType bit 0) are passed over. Not read: 12-bit packed samples, zstd.
+
+use super::Colour;
+use super::pixels::{Samples, check_size};
+use super::still::{damaged, guarded};
+use crate::{Error, ErrorKind, Pixels, Result};
+use std::io::{Read, Seek};
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
+use tiff::{ColorType, TiffError};
+
+/// Reads pages in file order.
+pub(crate) struct TiffPages<R: Read + Seek> {
+    decoder: Decoder<R>,
+    max_pixels: u64,
+    colour: Colour,
+    started: bool,
+    n_read: u64,
+    notes: Vec<String>,
+}
+
+fn failed(e: TiffError) -> Error {
+    match e {
+        TiffError::UnsupportedError(what) => {
+            Error::new(ErrorKind::Unsupported, format!("a kind of TIFF that is not read: {what}"))
+                .hint("rewrite it uncompressed with 8, 16 or 32 bits a sample, for example with tiffcp -c none")
+        }
+        TiffError::LimitsExceeded => Error::new(ErrorKind::Damaged, "its header asks for more memory than is allowed"),
+        other => damaged("not a whole TIFF", other),
+    }
+}
+
+impl<R: Read + Seek> TiffPages<R> {
+    /// Opens the file at its first page.
+    pub fn new(reader: R, colour: Colour, max_pixels: u64) -> Result<Self> {
+        let mut limits = Limits::default();
+        limits.decoding_buffer_size = usize::try_from(max_pixels.saturating_mul(12)).unwrap_or(usize::MAX);
+        limits.intermediate_buffer_size = limits.decoding_buffer_size;
+        limits.ifd_value_size = 16 << 20; // offsets of a million strips
+        let decoder = guarded(|| Decoder::new(reader).map_err(failed))?.with_limits(limits);
+        Ok(Self { decoder, max_pixels, colour, started: false, n_read: 0, notes: Vec::new() })
+    }
+
+    /// Number of pages read so far.
+    pub fn n_read(&self) -> u64 {
+        self.n_read
+    }
+
+    /// What was changed on the way from the file to the pixels, said once.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Returns the next full-size page, or `None` behind the last.
+    pub fn next_page(&mut self) -> Result<Option<Pixels>> {
+        loop {
+            if self.started {
+                if !self.decoder.more_images() {
+                    return Ok(None);
+                }
+                guarded(|| self.decoder.next_image().map_err(failed))?;
+            }
+            self.started = true;
+            let subfile: Option<u32> = self.decoder.find_tag_unsigned(Tag::NewSubfileType).map_err(failed)?;
+            if self.n_read > 0 && subfile.is_some_and(|t| t & 1 == 1) {
+                continue;
+            }
+            let page = guarded(|| self.read_page())?;
+            self.n_read += 1;
+            return Ok(Some(page));
+        }
+    }
+
+    fn read_page(&mut self) -> Result<Pixels> {
+        let (w, h) = self.decoder.dimensions().map_err(failed)?;
+        let (width, height) = check_size(w.into(), h.into(), self.max_pixels)?;
+        let colour_type = self.decoder.colortype().map_err(failed)?;
+        let mut buffer = DecodingResult::U8(Vec::new());
+        let layout = self.decoder.read_image_to_buffer(&mut buffer).map_err(failed)?;
+        let (channels, palette) = match colour_type {
+            ColorType::Gray(_) => (1, false),
+            ColorType::GrayA(_) => (2, false),
+            ColorType::RGB(_) | ColorType::YCbCr(_) => (3, false),
+            ColorType::RGBA(_) => (4, false),
+            ColorType::Palette(_) => (1, true),
+            ColorType::Multiband { num_samples, .. } => (usize::from(num_samples), false),
+            other => {
+                return Err(Error::new(ErrorKind::Unsupported, format!("TIFF colours {other:?} are not read"))
+                    .hint("convert the images to grey or RGB"));
+            }
+        };
+        let planes = layout.planes;
+        if channels > 4 {
+            return Err(Error::new(ErrorKind::Unsupported, format!("{channels} samples in a pixel: expected 1 to 4"))
+                .hint("write the channel to be tracked as grey pages"));
+        }
+        // Two-sample "multiband" data are two channels, not grey and alpha: which one is meant is not ours to guess.
+        if matches!(colour_type, ColorType::Multiband { .. }) && channels > 1 {
+            return Err(Error::new(ErrorKind::Unsupported, format!("{channels} unnamed channels in a pixel"))
+                .hint("write the channel to be tracked as grey pages"));
+        }
+        if palette {
+            return self.expand_palette(width, height, buffer);
+        }
+        let expect = width * height * channels;
+        let depth = colour_type.bit_depth();
+        let pixels = match buffer {
+            DecodingResult::U8(data) if depth < 8 => {
+                // One sample to a byte is promised only for 8 bits: smaller depths come packed.
+                let data = unpack(&data, width, height, channels, depth)?;
+                Samples { width, height, channels, data }.into_pixels(self.colour)?
+            }
+            DecodingResult::U8(data) => {
+                let data = interleaved(data, planes, expect)?;
+                Samples { width, height, channels, data }.into_pixels(self.colour)?
+            }
+            DecodingResult::U16(data) => {
+                if channels > 2 && self.colour != Colour::Gray {
+                    self.note("16-bit colour was rounded to 8 bits; in grey it keeps its 16 bits");
+                }
+                let data = interleaved(data, planes, expect)?;
+                Samples { width, height, channels, data }.into_pixels(self.colour)?
+            }
+            other => {
+                let data = interleaved(self.floats(other)?, planes, expect)?;
+                Samples { width, height, channels, data }.into_pixels(self.colour)?
+            }
+        };
+        Ok(pixels)
+    }
+
+    fn floats(&mut self, buffer: DecodingResult) -> Result<Vec<f32>> {
+        const ROUNDED: &str = "samples wider than 24 bits were rounded to 32-bit float";
+        Ok(match buffer {
+            DecodingResult::F32(data) => data,
+            DecodingResult::F16(data) => data.into_iter().map(|v| v.to_f32()).collect(),
+            DecodingResult::F64(data) => {
+                self.note(ROUNDED);
+                data.into_iter().map(|v| v as f32).collect()
+            }
+            DecodingResult::I8(data) => data.into_iter().map(f32::from).collect(),
+            DecodingResult::I16(data) => data.into_iter().map(f32::from).collect(),
+            DecodingResult::U32(data) => {
+                self.note(ROUNDED);
+                data.into_iter().map(|v| v as f32).collect()
+            }
+            DecodingResult::I32(data) => {
+                self.note(ROUNDED);
+                data.into_iter().map(|v| v as f32).collect()
+            }
+            _ => {
+                return Err(Error::new(ErrorKind::Unsupported, "64-bit integer samples are not read")
+                    .hint("convert the images to 16 bits or to float"));
+            }
+        })
+    }
+
+    /// Palettes have 16 bits a channel and three tables one behind the other.
+    fn expand_palette(&mut self, width: usize, height: usize, buffer: DecodingResult) -> Result<Pixels> {
+        let depth = self.decoder.colortype().map_err(failed)?.bit_depth();
+        let DecodingResult::U8(packed) = buffer else {
+            return Err(Error::new(ErrorKind::Unsupported, "palettes of more than 8 bits are not read"));
+        };
+        let table = self.decoder.get_tag_u16_vec(Tag::ColorMap).map_err(failed)?;
+        let n = table.len() / 3;
+        let indices = if depth < 8 { unpack_raw(&packed, width, height, 1, depth)? } else { packed };
+        let mut data = Vec::with_capacity(width * height * 3);
+        for index in indices {
+            let i = usize::from(index);
+            let entry = |k: usize| table.get(k * n + i).map(|v| (v >> 8) as u8);
+            match (entry(0), entry(1), entry(2)) {
+                (Some(r), Some(g), Some(b)) if i < n => data.extend([r, g, b]),
+                _ => return Err(damaged("not a whole TIFF", format!("a pixel names colour {i} of a palette of {n}"))),
+            }
+        }
+        Samples { width, height, channels: 3, data }.into_pixels(self.colour)
+    }
+
+    fn note(&mut self, text: &str) {
+        if !self.notes.iter().any(|n| n == text) {
+            self.notes.push(text.to_string());
+        }
+    }
+}
+
+/// Joins separate colour planes; data of one plane pass through.
+fn interleaved<T: Copy>(data: Vec<T>, planes: usize, expect: usize) -> Result<Vec<T>> {
+    if data.len() != expect {
+        return Err(damaged("not a whole TIFF", format!("{} samples, expected {expect}", data.len())));
+    }
+    if planes <= 1 {
+        return Ok(data);
+    }
+    let n = expect / planes;
+    Ok((0..n).flat_map(|i| (0..planes).map(move |p| (p, i))).map(|(p, i)| data[p * n + i]).collect())
+}
+
+/// Unpacks samples of 1, 2 or 4 bits and scales them to 0..=255.
+fn unpack(packed: &[u8], width: usize, height: usize, channels: usize, depth: u8) -> Result<Vec<u8>> {
+    let mut data = unpack_raw(packed, width, height, channels, depth)?;
+    let scale = 255 / ((1u16 << depth) - 1) as u8;
+    data.iter_mut().for_each(|v| *v *= scale);
+    Ok(data)
+}
+
+fn unpack_raw(packed: &[u8], width: usize, height: usize, channels: usize, depth: u8) -> Result<Vec<u8>> {
+    if !matches!(depth, 1 | 2 | 4) {
+        return Err(Error::new(ErrorKind::Unsupported, format!("{depth}-bit samples are not read")));
+    }
+    let depth = usize::from(depth);
+    let stride = (width * channels * depth).div_ceil(8);
+    if packed.len() < stride * height {
+        return Err(damaged("not a whole TIFF", format!("{} bytes, expected {}", packed.len(), stride * height)));
+    }
+    let mask = ((1u16 << depth) - 1) as u8;
+    let sample = |row: &[u8], i: usize| row[i * depth / 8] >> (8 - depth - i * depth % 8) & mask;
+    Ok(packed
+        .chunks_exact(stride)
+        .take(height)
+        .flat_map(|row| (0..width * channels).map(move |i| sample(row, i)))
+        .collect())
+}
