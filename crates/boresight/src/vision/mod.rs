@@ -3,6 +3,18 @@
 //! A threshold turns one row of pixels into one row of bits (`&[u64]`, bit `x % 64` of word `x / 64` is pixel `x`, bits past
 //! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
 
+pub mod centroid;
+pub mod cluster;
+pub mod config;
+pub mod detector;
+pub mod noise_level;
+pub mod pixel;
+pub mod region;
+pub mod threshold;
+
+pub use config::DetectorConfig;
+pub use detector::build;
+
 use crate::{Frame, Result, Scan};
 
 /// Turns frames into detections.

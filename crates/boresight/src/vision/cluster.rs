@@ -1,0 +1,232 @@
+//! Clusters of set pixels by proximity distance d_p, from rows of bits, without a label or mask image.
+//!
+//! Source: SPEC C.3 (single linkage: two set pixels are linked iff their Euclidean distance is < d_p, or <= d_p).
+//! A row becomes runs. Row offset dy is reached by horizontal distances up to `reach[dy]`, so two runs are linked iff the
+//! gap between them is at most that reach; runs are joined by union-find, their moments added as they come.
+//! Distances are compared as correctly rounded square roots, so d_p = √2 given as the nearest f64 means √2.
+//! Symbols: d_p proximity distance (px); reach[dy] whole px. Cost: one pass over the runs per reached row offset.
+//! Regions come out in raster order of their first pixel: the smaller number wins a union, and numbers are given in raster order.
+
+use super::config::ClusterConfig;
+use super::pixel::Pixel;
+use super::region::Region;
+
+/// A horizontal run of set pixels.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    start: u32,
+    /// Last pixel, included.
+    end: u32,
+    region: u32,
+}
+
+/// Joins rows of bits to regions.
+#[derive(Clone, Debug)]
+pub struct Clusterer {
+    /// Furthest linked column distance per row offset; `None` in the same row if not even neighbours are linked.
+    reach: Vec<u32>,
+    single: bool,
+    width: usize,
+    /// Runs of the last rows; row y lies in slot y % len.
+    rows: Vec<Vec<Run>>,
+    regions: Vec<Region>,
+}
+
+/// The furthest linked column distance of each row offset 0.. that has one.
+fn reaches(distance_px: f64, inclusive: bool) -> Vec<u32> {
+    let linked = |dx: u64, dy: u64| {
+        let d = ((dx * dx + dy * dy) as f64).sqrt();
+        if inclusive { d <= distance_px } else { d < distance_px }
+    };
+    let mut reach = Vec::new();
+    let mut dy = 0u64;
+    while linked(0, dy) {
+        let mut dx = distance_px as u64 + 1;
+        while !linked(dx, dy) && dx > 0 {
+            dx -= 1;
+        }
+        reach.push(dx as u32);
+        dy += 1;
+    }
+    reach
+}
+
+impl Clusterer {
+    /// Builds a clusterer for a checked configuration.
+    pub fn new(config: &ClusterConfig) -> Self {
+        let reach = reaches(config.distance_px, config.inclusive);
+        let single = reach.first().is_none_or(|&r| r == 0);
+        let n = reach.len().max(1);
+        Self { reach, single, width: 0, rows: vec![Vec::new(); n], regions: Vec::new() }
+    }
+
+    /// Starts a frame of `width` columns; what was kept of the last frame is dropped, its memory stays.
+    pub fn begin(&mut self, width: usize) {
+        self.width = width;
+        self.regions.clear();
+        for row in &mut self.rows {
+            row.clear();
+        }
+    }
+
+    /// Takes row `y` (rows come in order, from 0, every row): its bits and its pixels.
+    pub fn row<T: Pixel>(&mut self, y: usize, bits: &[u64], pixels: &[T]) {
+        let n = self.rows.len();
+        // Out of the ring while it is filled, so that the other rows can be read.
+        let mut current = std::mem::take(&mut self.rows[y % n]);
+        current.clear();
+        if self.single {
+            for (w, &word) in bits.iter().enumerate() {
+                let mut rest = word;
+                while rest != 0 {
+                    let x = w as u32 * 64 + rest.trailing_zeros();
+                    rest &= rest - 1;
+                    self.new_region(y, x, x, pixels);
+                }
+            }
+        } else {
+            runs(bits, |start, end| current.push(Run { start, end, region: 0 }));
+            self.link(y, &mut current, pixels);
+        }
+        self.rows[y % n] = current;
+    }
+
+    fn new_region<T: Pixel>(&mut self, y: usize, start: u32, end: u32, pixels: &[T]) -> u32 {
+        let label = self.regions.len() as u32;
+        self.regions.push(Region::of_run(label, y as u32, start, end, pixels));
+        label
+    }
+
+    /// Gives every run of the current row its region.
+    fn link<T: Pixel>(&mut self, y: usize, current: &mut [Run], pixels: &[T]) {
+        let n = self.rows.len();
+        let depth = (n - 1).min(y);
+        // Same row first, then the rows above; a run is made a region before others join it.
+        let reach0 = self.reach[0];
+        for i in 0..current.len() {
+            let run = current[i];
+            current[i].region = match i.checked_sub(1).map(|j| current[j]) {
+                Some(before) if run.start - before.end <= reach0 => {
+                    let root = self.root(before.region);
+                    let part = Region::of_run(root, y as u32, run.start, run.end, pixels);
+                    self.regions[root as usize].absorb(&part);
+                    root
+                }
+                _ => self.new_region(y, run.start, run.end, pixels),
+            };
+        }
+        for dy in 1..=depth {
+            let reach = self.reach[dy];
+            let above = std::mem::take(&mut self.rows[(y - dy) % n]);
+            let mut from = 0;
+            for run in current.iter() {
+                while above.get(from).is_some_and(|a| a.end + reach < run.start) {
+                    from += 1;
+                }
+                for a in above[from..].iter().take_while(|a| a.start <= run.end + reach) {
+                    self.union(a.region, run.region);
+                }
+            }
+            self.rows[(y - dy) % n] = above;
+        }
+    }
+
+    fn root(&mut self, mut label: u32) -> u32 {
+        loop {
+            let parent = self.regions[label as usize].parent;
+            if parent == label {
+                return label;
+            }
+            let above = self.regions[parent as usize].parent;
+            self.regions[label as usize].parent = above;
+            label = above;
+        }
+    }
+
+    fn union(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a == b {
+            return;
+        }
+        let (first, second) = (a.min(b) as usize, a.max(b) as usize);
+        let (head, tail) = self.regions.split_at_mut(second);
+        head[first].absorb(&tail[0]);
+        tail[0].parent = first as u32;
+    }
+
+    /// The regions of the frame whose rows were all given, in raster order of their first pixel.
+    pub fn regions(&self) -> impl Iterator<Item = &Region> {
+        self.regions.iter().enumerate().filter(|(i, r)| r.parent as usize == *i).map(|(_, r)| r)
+    }
+}
+
+/// Calls `run(start, last)` for every run of set bits, from the left.
+fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
+    let mut open: Option<u32> = None;
+    for (w, &word) in bits.iter().enumerate() {
+        let base = w as u32 * 64;
+        let mut rest = word;
+        if let Some(start) = open {
+            let ones = rest.trailing_ones();
+            if ones == 64 {
+                continue;
+            }
+            if ones == 0 {
+                run(start, base - 1);
+            } else {
+                run(start, base + ones - 1);
+                rest &= !0 << ones;
+            }
+            open = None;
+        }
+        while rest != 0 {
+            let start = rest.trailing_zeros();
+            let ones = (rest >> start).trailing_ones();
+            if start + ones == 64 {
+                open = Some(base + start);
+                break;
+            }
+            run(base + start, base + start + ones - 1);
+            rest &= !0 << (start + ones);
+        }
+    }
+    if let Some(start) = open {
+        run(start, bits.len() as u32 * 64 - 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reach_gives_the_neighbour_sets_of_the_specification() {
+        // SPEC C.3: neighbours of one pixel for each range of d_p.
+        let count = |d: f64, inclusive: bool| {
+            let r = reaches(d, inclusive);
+            let all: u32 = r.iter().enumerate().map(|(dy, &h)| (2 * h + 1) * if dy == 0 { 1 } else { 2 }).sum();
+            all.saturating_sub(1)
+        };
+        let strict =
+            [(0.5, 0), (1.0, 0), (1.2, 4), (2f64.sqrt(), 4), (1.5, 8), (2.0, 8), (2.1, 12), (2.5, 20), (3.0, 24)];
+        for (d, n) in strict {
+            assert_eq!(count(d, false), n, "d < {d}");
+        }
+        for (d, n) in [(0.5, 0), (1.0, 4), (1.5, 8), (2.0, 12), (3.0, 28)] {
+            assert_eq!(count(d, true), n, "d <= {d}");
+        }
+    }
+
+    #[test]
+    fn runs_cross_words_and_end_at_the_edge() {
+        let mut found = Vec::new();
+        runs(&[1 | 1 << 63, !0, 0b101], |a, b| found.push((a, b)));
+        assert_eq!(found, [(0, 0), (63, 128), (130, 130)]);
+        found.clear();
+        runs(&[!0, !0], |a, b| found.push((a, b)));
+        assert_eq!(found, [(0, 127)]);
+        found.clear();
+        runs(&[1 << 63, 0, 1 << 63], |a, b| found.push((a, b)));
+        assert_eq!(found, [(63, 63), (191, 191)]);
+    }
+}

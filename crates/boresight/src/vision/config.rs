@@ -1,0 +1,254 @@
+//! What a detector is made from: filter, threshold, clusters, centroid, noise; every choice is an enum, matched once a frame.
+//!
+//! Every struct checks itself with `validate(at)`, where `at` is the path of the key (`detector`), so that errors name the
+//! line a user wrote.
+
+use super::threshold::ThresholdConfig;
+use crate::{Error, ErrorKind, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How frames become detections.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct DetectorConfig {
+    /// Which pixels belong to targets.
+    pub threshold: ThresholdConfig,
+    /// How pixels are joined to clusters, and which clusters are kept.
+    pub cluster: ClusterConfig,
+    /// How a cluster's position is computed.
+    pub centroid: CentroidConfig,
+    /// How the noise of one pixel is known; it sets the covariance of the centroids.
+    pub noise: NoiseConfig,
+    /// Most detections kept in a frame, those with the largest score; no limit if absent. Range 1...
+    /// Protects what follows from a threshold that floods it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_detections: Option<u32>,
+}
+
+/// How set pixels are joined and which clusters are kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ClusterConfig {
+    /// Proximity distance d_p, px, above 0 and at most 1000: pixels nearer than this are of one cluster. 2 joins the 8
+    /// neighbours; larger values bridge gaps and join neighbouring targets.
+    pub distance_px: f64,
+    /// Whether pixels exactly `distance-px` apart are joined too (`<=` instead of `<`).
+    pub inclusive: bool,
+    /// Smallest cluster kept, px. If absent: 0.35 of `target-size-px`'s area, or 1 without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_area_px: Option<u32>,
+    /// Largest cluster kept, px. If absent: 1.6 of `target-size-px`'s area, or no limit without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_area_px: Option<u32>,
+    /// Width and height of the target, px, from which absent area limits follow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_size_px: Option<[f64; 2]>,
+}
+
+impl Default for ClusterConfig {
+    fn default() -> Self {
+        Self { distance_px: 2.0, inclusive: false, min_area_px: None, max_area_px: None, target_size_px: None }
+    }
+}
+
+impl ClusterConfig {
+    /// Returns the smallest and largest area kept, px.
+    pub fn area_limits(&self) -> (u32, u32) {
+        let area = self.target_size_px.map(|[w, h]| w * h);
+        // A cast of a float saturates, so absurd sizes end as u32::MAX.
+        let min = self.min_area_px.unwrap_or_else(|| area.map_or(1, |a| (0.35 * a).ceil() as u32));
+        let max = self.max_area_px.unwrap_or_else(|| area.map_or(u32::MAX, |a| (1.6 * a).floor() as u32));
+        (min, max)
+    }
+}
+
+/// How a cluster's position is computed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct CentroidConfig {
+    /// Over which pixels.
+    pub method: CentroidMethod,
+    /// With which weight a pixel counts.
+    pub weight: Weight,
+    /// Standard deviation added to each axis, px, 0...: what the pixel noise does not explain (a target whose shape
+    /// changes, a codec). 0 gives the covariance from the pixels' noise alone.
+    pub extra_sd_px: f64,
+}
+
+/// Over which pixels a centroid is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CentroidMethod {
+    /// The cluster's own pixels, weighted.
+    #[default]
+    Mask,
+    /// The cluster's own pixels, each with weight 1.
+    Binary,
+    /// All pixels of the cluster's bounding rectangle, weighted.
+    Bbox,
+    /// The middle of the bounding rectangle.
+    BoxCentre,
+}
+
+/// The weight of a pixel in a centroid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weight {
+    /// What suits the threshold: `intensity` for a band, a bright level and Otsu, `above-background` for the others.
+    #[default]
+    Auto,
+    /// The pixel's value I.
+    Intensity,
+    /// The distance from the local background: I - b for bright targets, b - I for dark ones.
+    AboveBackground,
+}
+
+/// How the noise of one pixel is known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseConfig {
+    /// Estimated in every frame from the differences of neighbouring pixels (robust, so edges and targets count little).
+    #[default]
+    Estimated,
+    /// Given: variance = `read-counts`² + `gain` x intensity.
+    Given(GivenNoise),
+}
+
+/// The known noise of one pixel: variance = read-counts² + gain x intensity.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct GivenNoise {
+    /// Standard deviation that does not depend on the light, counts, 0... .
+    pub read_counts: f64,
+    /// Variance per count of intensity (shot noise), counts, 0... .
+    pub gain: f64,
+}
+
+impl Default for GivenNoise {
+    fn default() -> Self {
+        Self { read_counts: 1.0, gain: 0.0 }
+    }
+}
+
+/// Builds the error of a parameter: `place.key = value: expected what`.
+pub(crate) fn wrong(at: &str, key: &str, value: impl std::fmt::Display, expected: &str, hint: &str) -> Error {
+    Error::new(ErrorKind::Config, format!("expected {expected}")).at(format!("{at}.{key} = {value}")).hint(hint)
+}
+
+impl DetectorConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        self.threshold.validate(&format!("{at}.threshold"))?;
+        self.cluster.validate(&format!("{at}.cluster"))?;
+        self.centroid.validate(&format!("{at}.centroid"))?;
+        self.noise.validate(&format!("{at}.noise"))?;
+        if self.max_detections == Some(0) {
+            return Err(wrong(at, "max-detections", 0, "at least 1", "leave it out for no limit"));
+        }
+        Ok(())
+    }
+}
+
+impl ClusterConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        if !(self.distance_px > 0.0 && self.distance_px <= 1000.0) {
+            return Err(wrong(
+                at,
+                "distance-px",
+                self.distance_px,
+                "a distance above 0 and at most 1000 px",
+                "2 joins the 8 neighbours of a pixel",
+            ));
+        }
+        if let Some(size) = self.target_size_px
+            && !size.iter().all(|s| *s >= 1.0 && s.is_finite())
+        {
+            return Err(wrong(
+                at,
+                "target-size-px",
+                format!("{size:?}"),
+                "a width and a height of at least 1 px",
+                "[9, 9] for a target of 9 x 9 pixels",
+            ));
+        }
+        let (min, max) = self.area_limits();
+        if min > max || max == 0 {
+            return Err(wrong(
+                at,
+                "min-area-px",
+                min,
+                &format!("at most the largest area, {max} px, and that above 0"),
+                "lower min-area-px or raise max-area-px",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl CentroidConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        if !(self.extra_sd_px >= 0.0 && self.extra_sd_px.is_finite()) {
+            return Err(wrong(
+                at,
+                "extra-sd-px",
+                self.extra_sd_px,
+                "a standard deviation of 0 px or more",
+                "0 leaves the covariance from the pixels' noise alone",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl NoiseConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        let Self::Given(g) = self else { return Ok(()) };
+        for (key, value) in [("given.read-counts", g.read_counts), ("given.gain", g.gain)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(wrong(at, key, value, "0 or more", "noise = \"estimated\" measures it in every frame"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distance_of_zero_is_refused_with_its_place_and_a_hint() {
+        let mut config = DetectorConfig::default();
+        config.cluster.distance_px = 0.0;
+        let e = config.validate("detector").unwrap_err().to_string();
+        assert!(e.starts_with("detector.cluster.distance-px = 0: expected a distance above 0"), "{e}");
+        assert!(e.contains("hint: 2 joins"), "{e}");
+    }
+
+    #[test]
+    fn absent_area_limits_follow_from_the_targets_size() {
+        // SPEC C.5: a 9 x 9 target keeps 29..=129 pixels.
+        let config = ClusterConfig { target_size_px: Some([9.0, 9.0]), ..Default::default() };
+        assert_eq!(config.area_limits(), (29, 129));
+        assert_eq!(ClusterConfig::default().area_limits(), (1, u32::MAX));
+    }
+
+    #[test]
+    fn the_default_configuration_survives_a_round_trip_through_toml() {
+        let text = toml::to_string(&DetectorConfig::default()).unwrap();
+        assert_eq!(toml::from_str::<DetectorConfig>(&text).unwrap(), DetectorConfig::default(), "{text}");
+        assert!(toml::from_str::<DetectorConfig>("[cluster]\ndistance = 2.0").is_err());
+    }
+}

@@ -1,0 +1,239 @@
+//! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
+
+use super::centroid::{Surroundings, centroid};
+use super::cluster::Clusterer;
+use super::config::{DetectorConfig, NoiseConfig, Weight};
+use super::noise_level::noise_level;
+use super::pixel::Pixel;
+use super::threshold::band::{band_bits, words};
+use super::threshold::grid::BackgroundGrid;
+use super::threshold::local::LocalThreshold;
+use super::threshold::otsu::otsu_level;
+use super::threshold::{LevelConfig, Side, ThresholdConfig};
+use super::{Detector, region::Region};
+use crate::{Detection, Error, ErrorKind, Extent, Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo};
+
+/// Cells of the background when the threshold itself does not name a size, px.
+const DEFAULT_CELL_PX: u32 = 32;
+
+/// Builds the detector that a configuration describes, for frames as the source announces them.
+/// # Errors
+/// A parameter out of its range.
+pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Detector>> {
+    config.validate("detector")?;
+    Ok(Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)))
+}
+
+struct ThresholdDetector {
+    config: DetectorConfig,
+    size: (usize, usize),
+    kind: PixelKind,
+    /// Colour frames as grey.
+    grey: Image<u8>,
+    grid: BackgroundGrid,
+    local: LocalThreshold,
+    bits: Vec<u64>,
+    /// Clusters brighter and darker than their surroundings.
+    bright: Clusterer,
+    dark: Clusterer,
+    samples: Vec<f32>,
+}
+
+impl ThresholdDetector {
+    fn new(config: DetectorConfig, size: (usize, usize), kind: PixelKind) -> Self {
+        let cell = match &config.threshold {
+            ThresholdConfig::Local(c) => c.cell_px,
+            _ => DEFAULT_CELL_PX,
+        };
+        Self {
+            size,
+            kind,
+            grey: Image::default(),
+            grid: BackgroundGrid::new(cell as usize),
+            local: LocalThreshold::default(),
+            bits: vec![0; words(size.0)],
+            bright: Clusterer::new(&config.cluster),
+            dark: Clusterer::new(&config.cluster),
+            samples: Vec::new(),
+            config,
+        }
+    }
+
+    /// Whether positions are weighed by the distance from the background.
+    fn above_background(&self) -> bool {
+        match self.config.centroid.weight {
+            Weight::Intensity => false,
+            Weight::AboveBackground => true,
+            Weight::Auto => match &self.config.threshold {
+                ThresholdConfig::Band(_) => false,
+                ThresholdConfig::Level(LevelConfig { side, .. }) => *side == Side::Dark,
+                ThresholdConfig::Otsu(c) => c.side == Side::Dark,
+                ThresholdConfig::Local(_) => true,
+            },
+        }
+    }
+
+    fn run<T: Pixel>(&mut self, image: &Image<T>, scan: &mut Scan) {
+        let above_background = self.above_background();
+        if above_background || matches!(self.config.threshold, ThresholdConfig::Local(_)) {
+            self.grid.refresh(image);
+        }
+        self.bright.begin(image.width());
+        self.dark.begin(image.width());
+        match &self.config.threshold {
+            ThresholdConfig::Band(c) => {
+                let band = T::band(c.low, c.high);
+                one_band(image, band, &mut self.bits, &mut self.bright);
+            }
+            ThresholdConfig::Level(c) => one_side(image, c, &mut self.bits, &mut self.bright, &mut self.dark),
+            ThresholdConfig::Otsu(c) => {
+                if let Some(level) = otsu_level(image) {
+                    let c = LevelConfig { level, side: c.side, exclusive: false };
+                    one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
+                }
+            }
+            ThresholdConfig::Local(c) => {
+                for y in 0..image.height() {
+                    let row = image.row(y);
+                    if c.polarity.has(Side::Bright) {
+                        self.local.bits::<T, true>(c, &self.grid, y, row, &mut self.bits);
+                        self.bright.row(y, &self.bits, row);
+                    }
+                    if c.polarity.has(Side::Dark) {
+                        self.local.bits::<T, false>(c, &self.grid, y, row, &mut self.bits);
+                        self.dark.row(y, &self.bits, row);
+                    }
+                }
+            }
+        }
+        let (variance, gain) = match &self.config.noise {
+            NoiseConfig::Given(g) => (g.read_counts * g.read_counts, g.gain),
+            NoiseConfig::Estimated => (noise_level(image, &mut self.samples).powi(2), 0.0),
+        };
+        for (clusters, dark) in [(&self.bright, false), (&self.dark, true)] {
+            let (min, max) = self.config.cluster.area_limits();
+            for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
+                let background = if above_background { background_of(region, &self.grid) } else { 0.0 };
+                let sign = if above_background && dark { -1.0 } else { 1.0 };
+                let around = Surroundings { background, sign, variance, gain };
+                scan.detections.push(detection(region, image, &self.config, &around, dark));
+            }
+        }
+        keep_strongest(&mut scan.detections, self.config.max_detections);
+    }
+}
+
+fn background_of(region: &Region, grid: &BackgroundGrid) -> f64 {
+    let n = f64::from(region.area);
+    grid.at(region.x / n, region.y / n).0
+}
+
+fn one_band<T: Pixel>(image: &Image<T>, band: Option<(T, T)>, bits: &mut [u64], clusters: &mut Clusterer) {
+    let Some((low, high)) = band else { return };
+    for y in 0..image.height() {
+        let row = image.row(y);
+        band_bits(row, low, high, bits);
+        clusters.row(y, bits, row);
+    }
+}
+
+/// A level is a band with one open end.
+fn one_side<T: Pixel>(
+    image: &Image<T>,
+    c: &LevelConfig,
+    bits: &mut [u64],
+    bright: &mut Clusterer,
+    dark: &mut Clusterer,
+) {
+    match c.side {
+        Side::Bright => {
+            let low = if c.exclusive { c.level.next_up() } else { c.level };
+            one_band(image, T::band(low, f64::INFINITY), bits, bright);
+        }
+        Side::Dark => {
+            let high = if c.exclusive { c.level.next_down() } else { c.level };
+            one_band(image, T::band(f64::NEG_INFINITY, high), bits, dark);
+        }
+    }
+}
+
+fn detection<T: Pixel>(
+    r: &Region,
+    image: &Image<T>,
+    config: &DetectorConfig,
+    around: &Surroundings,
+    dark: bool,
+) -> Detection {
+    let c = centroid(r, image, config.centroid.method, around);
+    let extra = config.centroid.extra_sd_px * config.centroid.extra_sd_px;
+    let noise = (around.variance.max(1e-12) * f64::from(r.area)).sqrt();
+    let contrast = around.sign * (r.sum - around.background * f64::from(r.area));
+    Detection {
+        position: c.position,
+        cov: c.cov + nalgebra::Matrix2::identity() * extra,
+        extent: Extent {
+            left_px: f64::from(r.left) - 0.5,
+            top_px: f64::from(r.top) - 0.5,
+            width_px: f64::from(r.right - r.left + 1),
+            height_px: f64::from(r.bottom - r.top + 1),
+        },
+        area_px: r.area,
+        peak: if dark { r.min } else { r.max },
+        sum: c.sum,
+        score: (contrast / noise) as f32,
+        class: None,
+    }
+}
+
+/// Keeps the `limit` detections with the largest score, in their order.
+fn keep_strongest(detections: &mut Vec<Detection>, limit: Option<u32>) {
+    let Some(limit) = limit.map(|l| l as usize) else { return };
+    if detections.len() <= limit {
+        return;
+    }
+    let mut order: Vec<usize> = (0..detections.len()).collect();
+    order.sort_by(|&a, &b| detections[b].score.total_cmp(&detections[a].score).then(a.cmp(&b)));
+    let mut keep = vec![false; detections.len()];
+    for &i in order.iter().take(limit) {
+        keep[i] = true;
+    }
+    let mut i = 0;
+    detections.retain(|_| {
+        i += 1;
+        keep[i - 1]
+    });
+}
+
+impl Detector for ThresholdDetector {
+    fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+        scan.index = frame.index;
+        scan.time = frame.time;
+        scan.detections.clear();
+        let (width, height) = (frame.pixels.width(), frame.pixels.height());
+        if (width, height) != self.size || frame.pixels.kind() != self.kind {
+            let (w, h) = self.size;
+            return Err(Error::new(
+                ErrorKind::Damaged,
+                format!("expected {w} x {h} {:?}, found {width} x {height} {:?}", self.kind, frame.pixels.kind()),
+            )
+            .at(format!("frame {:?}", frame.index))
+            .hint("all frames of a sequence must have one size and one pixel type"));
+        }
+        match &frame.pixels {
+            Pixels::Gray8(image) => self.run(image, scan),
+            Pixels::Gray16(image) => self.run(image, scan),
+            Pixels::GrayF32(image) => self.run(image, scan),
+            Pixels::Rgb8(image) => {
+                let mut grey = std::mem::take(&mut self.grey);
+                grey.reset(width, height, 0);
+                for (g, &[r, green, b]) in grey.as_mut_slice().iter_mut().zip(image.as_slice()) {
+                    // SPEC I.1.
+                    *g = ((9798 * u32::from(r) + 19235 * u32::from(green) + 3735 * u32::from(b) + 16384) >> 15) as u8;
+                }
+                self.run(&grey, scan);
+                self.grey = grey;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,76 @@
+//! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
+
+/// A grey pixel.
+pub trait Pixel: Copy + Default + PartialOrd + Send + Sync + 'static {
+    /// Distance between neighbouring values, counts; 0 for a float.
+    const STEP: f32;
+    /// The value, counts.
+    fn value(self) -> f64;
+    /// The value as f32; exact for every type here.
+    fn value_f32(self) -> f32;
+    /// The smallest and largest pixel inside the real band [`low`, `high`], or `None` if no pixel value lies in it.
+    fn band(low: f64, high: f64) -> Option<(Self, Self)>;
+    /// Writes bit `x` of `bits` for every `low <= row[x] <= high`, and 0 past the end; NaN is never set.
+    fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
+        super::threshold::band::band_bits(row, low, high, bits);
+    }
+}
+
+macro_rules! integer_pixel {
+    ($t:ty) => {
+        impl Pixel for $t {
+            const STEP: f32 = 1.0;
+            fn value(self) -> f64 {
+                f64::from(self)
+            }
+            fn value_f32(self) -> f32 {
+                f32::from(self)
+            }
+            fn band(low: f64, high: f64) -> Option<(Self, Self)> {
+                let (l, h) = (low.ceil().max(0.0), high.floor().min(f64::from(Self::MAX)));
+                // Both are whole and inside the type's range here, so the casts are exact; NaN fails the comparison.
+                (low <= high && l <= h).then_some((l as Self, h as Self))
+            }
+        }
+    };
+}
+integer_pixel!(u8);
+integer_pixel!(u16);
+
+impl Pixel for f32 {
+    const STEP: f32 = 0.0;
+    fn value(self) -> f64 {
+        f64::from(self)
+    }
+    fn value_f32(self) -> f32 {
+        self
+    }
+    fn band(low: f64, high: f64) -> Option<(Self, Self)> {
+        let (mut l, mut h) = (low as Self, high as Self);
+        if f64::from(l) < low {
+            l = l.next_up();
+        }
+        if f64::from(h) > high {
+            h = h.next_down();
+        }
+        (l <= h).then_some((l, h))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_real_band_becomes_the_pixels_inside_it() {
+        assert_eq!(u8::band(89.5, 110.2), Some((90, 110)));
+        assert_eq!(u8::band(-5.0, 1e9), Some((0, 255)));
+        assert_eq!(u8::band(90.2, 90.8), None);
+        assert_eq!(u8::band(256.0, 300.0), None);
+        assert_eq!(u16::band(0.0, f64::INFINITY), Some((0, 65535)));
+        assert_eq!(u8::band(f64::NAN, 3.0), None);
+        let (l, h) = f32::band(0.1, 0.3).unwrap();
+        assert!(f64::from(l) >= 0.1 && f64::from(l.next_down()) < 0.1);
+        assert!(f64::from(h) <= 0.3 && f64::from(h.next_up()) > 0.3);
+    }
+}

@@ -1,0 +1,187 @@
+//! Thresholds: which pixels belong to targets. Each turns one row of native pixels into one row of bits.
+
+pub mod band;
+pub mod grid;
+pub mod local;
+pub mod otsu;
+
+use super::config::wrong;
+use crate::Result;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which pixels belong to targets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThresholdConfig {
+    /// Values inside a band, both ends included.
+    Band(BandConfig),
+    /// Values on one side of a fixed level.
+    Level(LevelConfig),
+    /// Values on one side of the level that separates the frame's histogram best (Otsu), anew in every frame.
+    Otsu(OtsuConfig),
+    /// Values that stand out from their local background by k robust standard deviations.
+    Local(LocalConfig),
+}
+
+impl Default for ThresholdConfig {
+    fn default() -> Self {
+        Self::Local(LocalConfig::default())
+    }
+}
+
+/// Whether targets are brighter or darker than their surroundings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Side {
+    /// Targets are brighter.
+    #[default]
+    Bright,
+    /// Targets are darker.
+    Dark,
+}
+
+/// Which contrast is looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Polarity {
+    /// Targets brighter than the background.
+    #[default]
+    Bright,
+    /// Targets darker than the background.
+    Dark,
+    /// Either; a cluster is wholly bright or wholly dark.
+    Both,
+}
+
+impl Polarity {
+    /// Whether `side` is looked for.
+    pub fn has(self, side: Side) -> bool {
+        matches!((self, side), (Self::Both, _) | (Self::Bright, Side::Bright) | (Self::Dark, Side::Dark))
+    }
+}
+
+/// Pixels with `low` <= value <= `high`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct BandConfig {
+    /// Lowest kept value, counts, at most `high`. Raising it drops dim targets and clutter alike.
+    pub low: f64,
+    /// Highest kept value, counts. Lowering it drops what is brighter than the target.
+    pub high: f64,
+}
+
+impl Default for BandConfig {
+    fn default() -> Self {
+        Self { low: 90.0, high: 110.0 }
+    }
+}
+
+/// Pixels on one side of a fixed level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct LevelConfig {
+    /// The level, counts; a pixel exactly on it counts as target unless `exclusive`.
+    pub level: f64,
+    /// On which side of the level targets lie.
+    pub side: Side,
+    /// Whether a pixel exactly on the level is left out.
+    pub exclusive: bool,
+}
+
+impl Default for LevelConfig {
+    fn default() -> Self {
+        Self { level: 150.0, side: Side::Bright, exclusive: false }
+    }
+}
+
+/// Pixels on one side of the level found by Otsu's method.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct OtsuConfig {
+    /// On which side of the level targets lie.
+    pub side: Side,
+}
+
+/// Pixels that stand out from the local background.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct LocalConfig {
+    /// Distance from the local median in robust standard deviations, above 0. Lower finds dimmer targets and more clutter.
+    pub k: f64,
+    /// Which contrast is looked for.
+    pub polarity: Polarity,
+    /// Side of a background cell, px, 4..=4096: a few times the largest target, so that a target fills less than half a cell.
+    pub cell_px: u32,
+    /// Least distance from the local median, counts, 0...: keeps a quiet background from calling every step a target.
+    pub min_contrast: f64,
+}
+
+impl Default for LocalConfig {
+    fn default() -> Self {
+        Self { k: 5.0, polarity: Polarity::Bright, cell_px: 32, min_contrast: 3.0 }
+    }
+}
+
+impl ThresholdConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        match self {
+            Self::Band(c) => {
+                if c.low.is_nan() || c.high.is_nan() || c.low > c.high {
+                    return Err(wrong(
+                        at,
+                        "band.low",
+                        c.low,
+                        &format!("at most band.high = {}", c.high),
+                        "a band of one level has low = high",
+                    ));
+                }
+            }
+            Self::Level(c) => {
+                if !c.level.is_finite() {
+                    return Err(wrong(
+                        at,
+                        "level.level",
+                        c.level,
+                        "a finite level, counts",
+                        "`otsu` finds a level by itself",
+                    ));
+                }
+            }
+            Self::Otsu(_) => {}
+            Self::Local(c) => {
+                if !(c.k > 0.0 && c.k.is_finite()) {
+                    return Err(wrong(
+                        at,
+                        "local.k",
+                        c.k,
+                        "a number of deviations above 0",
+                        "5 is a common start; lower finds dimmer targets",
+                    ));
+                }
+                if !(4..=4096).contains(&c.cell_px) {
+                    return Err(wrong(
+                        at,
+                        "local.cell-px",
+                        c.cell_px,
+                        "4 to 4096 px",
+                        "a few times the largest target",
+                    ));
+                }
+                if !(c.min_contrast >= 0.0 && c.min_contrast.is_finite()) {
+                    return Err(wrong(
+                        at,
+                        "local.min-contrast",
+                        c.min_contrast,
+                        "0 counts or more",
+                        "0 leaves the deviation alone to decide",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
