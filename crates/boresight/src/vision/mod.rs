@@ -10,6 +10,7 @@ pub mod detector;
 pub mod noise_level;
 pub mod pixel;
 pub mod region;
+pub mod spatial;
 pub mod threshold;
 
 pub use config::DetectorConfig;

@@ -3,6 +3,8 @@
 
 #![allow(dead_code)] // until every room reads its vectors
 
+mod spatial;
+
 use serde_json::Value;
 use std::path::PathBuf;
 

@@ -1,0 +1,56 @@
+//! Golden vectors of the spatial filters, noise generators, image metrics and colours.
+
+use super::{load, number, rows};
+use boresight::Image;
+use boresight::vision::spatial::{
+    Border, Kernel, SpatialConfig, SpatialFilter, WindowConfig, convolve_exact, mean_exact, median_exact,
+};
+use serde_json::Value;
+
+fn image<T: Copy>(v: &Value, f: impl Fn(f64) -> T) -> Image<T> {
+    let rows = rows(v);
+    let (h, w) = (rows.len(), rows.first().map_or(0, Vec::len));
+    Image::from_vec(w, h, rows.concat().into_iter().map(f).collect()).unwrap()
+}
+
+#[test]
+fn the_spatial_filters_give_the_golden_images() {
+    let Some(golden) = load("spatial_filters") else { return };
+    let mut n_images = 0;
+    for case in &golden.cases {
+        let src = image(&case["inputs"]["image"], |v| v as f32);
+        let bytes = image(&case["inputs"]["image"], |v| v as u8);
+        let size = number(&case["inputs"]["n"]) as usize;
+        let kernel_rows = rows(&case["inputs"]["kernel"]);
+        let kernel = Kernel::new(kernel_rows.len(), kernel_rows.concat()).unwrap();
+        for (name, border) in [("zero", Border::Zero), ("replicate", Border::Replicate), ("reflect", Border::Reflect)] {
+            let want = |what: &str| case["outputs"].get(format!("{what}_{name}")).map(|v| rows(v).concat());
+            if let Some(want) = want("mean") {
+                let ours = mean_exact(&src, size, border).unwrap();
+                golden.all_close(ours.as_slice(), &want, &format!("mean_{name}"));
+                let mut fast = Image::default();
+                let config = SpatialConfig::Mean(WindowConfig { size, border });
+                SpatialFilter::new(config).unwrap().apply(&bytes, &mut fast);
+                let rounded: Vec<u8> = want.iter().map(|v| v.round() as u8).collect();
+                assert_eq!(fast.as_slice(), rounded, "mean_{name} of u8");
+                n_images += 1;
+            }
+            if let Some(want) = want("median") {
+                let ours = median_exact(&src, size, border).unwrap();
+                golden.all_close(ours.as_slice(), &want, &format!("median_{name}"));
+                let mut fast = Image::default();
+                let config = SpatialConfig::Median(WindowConfig { size, border });
+                SpatialFilter::new(config).unwrap().apply(&bytes, &mut fast);
+                let bytes: Vec<u8> = want.iter().map(|v| *v as u8).collect();
+                assert_eq!(fast.as_slice(), bytes, "median_{name} of u8");
+                n_images += 1;
+            }
+            if let Some(want) = want("conv") {
+                let ours = convolve_exact(&src, &kernel, border);
+                golden.all_close(ours.as_slice(), &want, &format!("conv_{name}"));
+                n_images += 1;
+            }
+        }
+    }
+    assert!(n_images >= 9 * golden.cases.len(), "only {n_images} images compared");
+}
