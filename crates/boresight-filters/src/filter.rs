@@ -1,6 +1,13 @@
-//! The object-safe face of every filter: what a tracker needs, in measurement space and kinematics only.
+//! The faces of a filter: [`Filter`], object-safe, for trackers; [`GaussianFilter`], sized and typed, for mathematics.
+//!
+//! [`Tracked`] makes a [`Filter`] of every [`GaussianFilter`]; f32 filters are converted at this border.
 
-use crate::{FilterError, Gaussian, Weighted};
+use crate::linalg::{invert_pair, is_symmetric};
+use crate::mixture::correct_by_mixture;
+use crate::model::{Model, kinematics_from_point};
+use crate::real::all_finite;
+use crate::{FilterError, Gaussian, Measurement, Real, Weighted};
+use nalgebra::{Matrix2, Vector2};
 
 /// A filter of one target as a tracker sees it.
 pub trait Filter {
@@ -8,12 +15,209 @@ pub trait Filter {
     /// # Errors
     /// [`FilterError`] if `dt_s` is negative or not finite; the state is then unchanged.
     fn predict(&mut self, dt_s: f64) -> Result<(), FilterError>;
+
     /// Returns the predicted position H x and its covariance H P Hᵀ (px, px²), without measurement noise.
     fn predicted(&self) -> Gaussian<2>;
+
     /// Corrects the belief by the hypotheses of one scan; `[]` is a missed scan, weights sum to at most 1.
+    ///
+    /// The rest of the weights, p0 = 1 - Σ weights, is the probability that none is the target's own: the PDA update
+    /// (SPEC E). One hypothesis of weight 1 is the plain update.
     /// # Errors
     /// [`FilterError`] for NaN, infinity or a covariance that cannot be factored; the state is then unchanged.
     fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError>;
+
     /// Returns mean and covariance of `[x, vx, y, vy]` (px, px/s).
     fn kinematics(&self) -> Gaussian<4>;
+
+    /// Returns the log-likelihood of a measurement (density per px²) before the update.
+    /// # Errors
+    /// [`FilterError`] if the measurement is not finite or the innovation covariance cannot be factored.
+    fn log_likelihood(&self, measurement: &Measurement) -> Result<f64, FilterError> {
+        check_measurement(measurement)?;
+        log_likelihood(&self.predicted(), measurement)
+    }
+}
+
+/// A filter whose belief is a Gaussian of N states: what wrappers (mixtures, IMM, robust forms, smoothers) build on.
+pub trait GaussianFilter<const N: usize>: Clone {
+    /// The number type it computes in.
+    type Real: Real;
+
+    /// Moves the belief `dt_s` seconds ahead; 0 is the identity.
+    /// # Errors
+    /// [`FilterError`] if `dt_s` is negative or not finite, or the result is not; the state is then unchanged.
+    fn predict(&mut self, dt_s: Self::Real) -> Result<(), FilterError>;
+
+    /// Corrects the belief by one measurement of position.
+    /// # Errors
+    /// [`FilterError`] for NaN, infinity or a covariance that cannot be factored; the state is then unchanged.
+    fn correct(&mut self, measurement: &Measurement<Self::Real>) -> Result<(), FilterError>;
+
+    /// Returns the belief.
+    fn belief(&self) -> Gaussian<N, Self::Real>;
+
+    /// Replaces the belief.
+    /// # Errors
+    /// [`FilterError`] if it is not finite, not symmetric, or cannot be factored; the state is then unchanged.
+    fn set_belief(&mut self, belief: &Gaussian<N, Self::Real>) -> Result<(), FilterError>;
+
+    /// Returns where x and y stand in the state.
+    fn position_at(&self) -> [usize; 2];
+
+    /// Returns mean and covariance of `[x, vx, y, vy]`.
+    fn kinematics(&self) -> Gaussian<4, Self::Real>;
+
+    /// Returns the position H x and its covariance H P Hᵀ, without measurement noise.
+    #[inline]
+    fn predicted(&self) -> Gaussian<2, Self::Real> {
+        position_of(&self.belief(), self.position_at())
+    }
+
+    /// Corrects the belief by weighted hypotheses (PDA update); none, or all weights 0, changes nothing.
+    /// # Errors
+    /// As [`GaussianFilter::correct`], and [`FilterError::OutOfRange`] for weights outside 0..=1 or summing above 1.
+    fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
+    where
+        I: Iterator<Item = Weighted<Self::Real>> + Clone,
+    {
+        correct_by_mixture(self, hypotheses)
+    }
+
+    /// Returns the log-likelihood of a measurement (density per px²) before the update.
+    /// # Errors
+    /// [`FilterError`] if the measurement is not finite or the innovation covariance cannot be factored.
+    fn log_likelihood(&self, measurement: &Measurement<Self::Real>) -> Result<Self::Real, FilterError> {
+        check_measurement(measurement)?;
+        log_likelihood(&self.predicted(), measurement)
+    }
+}
+
+/// A filter that can be started from a model and a first belief.
+pub trait Start<M, const N: usize>: GaussianFilter<N> + Sized
+where
+    M: Model<N, Self::Real>,
+{
+    /// Starts from a belief in the whole state.
+    /// # Errors
+    /// [`FilterError`] if the belief is not finite, not symmetric, or its covariance cannot be factored.
+    fn start(model: M, belief: Gaussian<N, Self::Real>) -> Result<Self, FilterError>;
+
+    /// Starts from a belief in position and velocity `[x, vx, y, vy]`; further states take the model's prior.
+    /// # Errors
+    /// As [`Start::start`].
+    fn from_kinematics(model: M, kinematics: &Gaussian<4, Self::Real>) -> Result<Self, FilterError> {
+        let belief = model.lift(kinematics);
+        Self::start(model, belief)
+    }
+
+    /// Starts from one measured position and a velocity known only by its standard deviation (px/s per axis).
+    /// # Errors
+    /// As [`Start::start`], and if `velocity_std` is not positive.
+    fn from_point(model: M, point: &Measurement<Self::Real>, velocity_std: Self::Real) -> Result<Self, FilterError> {
+        Self::from_kinematics(model, &kinematics_from_point(point, velocity_std)?)
+    }
+}
+
+/// Makes a [`Filter`] of a [`GaussianFilter`] with N states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracked<F, const N: usize>(pub F);
+
+impl<F: GaussianFilter<N>, const N: usize> Filter for Tracked<F, N> {
+    #[inline]
+    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
+        self.0.predict(F::Real::of(dt_s))
+    }
+
+    #[inline]
+    fn predicted(&self) -> Gaussian<2> {
+        self.0.predicted().cast()
+    }
+
+    #[inline]
+    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
+        match hypotheses {
+            [] => Ok(()),
+            // Exactly one sure hypothesis is the common case of the fast path.
+            [only] if only.weight == 1.0 => self.0.correct(&only.measurement.cast()),
+            several => self.0.correct_weighted(several.iter().map(|w| w.cast())),
+        }
+    }
+
+    #[inline]
+    fn kinematics(&self) -> Gaussian<4> {
+        self.0.kinematics().cast()
+    }
+
+    fn log_likelihood(&self, measurement: &Measurement) -> Result<f64, FilterError> {
+        self.0.log_likelihood(&measurement.cast()).map(Real::as_f64)
+    }
+}
+
+/// Returns the marginal of a belief at the two position states.
+#[inline(always)]
+pub(crate) fn position_of<T: Real, const N: usize>(b: &Gaussian<N, T>, at: [usize; 2]) -> Gaussian<2, T> {
+    let [i, j] = at;
+    Gaussian {
+        mean: Vector2::new(b.mean[i], b.mean[j]),
+        cov: Matrix2::new(b.cov[(i, i)], b.cov[(i, j)], b.cov[(j, i)], b.cov[(j, j)]),
+    }
+}
+
+/// Refuses a time step that is negative or not finite.
+#[inline(always)]
+pub(crate) fn check_dt<T: Real>(dt_s: T) -> Result<(), FilterError> {
+    if dt_s >= T::zero() && dt_s <= T::MAX {
+        Ok(())
+    } else if dt_s < T::zero() {
+        Err(FilterError::OutOfRange("a time step of at least 0 s"))
+    } else {
+        Err(FilterError::NotFinite("the time step"))
+    }
+}
+
+/// Refuses a measurement that is not finite or whose covariance is not symmetric positive semi-definite.
+#[inline(always)]
+pub(crate) fn check_measurement<T: Real>(m: &Measurement<T>) -> Result<(), FilterError> {
+    if !all_finite(&m.position) {
+        return Err(FilterError::NotFinite("the measured position"));
+    }
+    let (a, b, c) = (m.cov[(0, 0)], m.cov[(1, 0)], m.cov[(1, 1)]);
+    if a >= T::zero() && c >= T::zero() && a + c <= T::MAX && b == T::zero() && m.cov[(0, 1)] == T::zero() {
+        return Ok(());
+    }
+    check_full_covariance(m)
+}
+
+#[cold]
+fn check_full_covariance<T: Real>(m: &Measurement<T>) -> Result<(), FilterError> {
+    if !all_finite(&m.cov) {
+        return Err(FilterError::NotFinite("the measurement covariance"));
+    }
+    let (a, b, c) = (m.cov[(0, 0)], m.cov[(1, 0)], m.cov[(1, 1)]);
+    // One rounding error of slack: a covariance made of products may be singular by its own rounding.
+    let slack = T::one() + T::EPSILON * T::of(8.0);
+    if !is_symmetric(&m.cov) || a < T::zero() || c < T::zero() || b.abs() > (a.sqrt() * c.sqrt()) * slack {
+        return Err(FilterError::NotPositiveDefinite("the measurement covariance"));
+    }
+    Ok(())
+}
+
+/// Refuses a belief that is not finite, not symmetric or has a negative variance.
+pub(crate) fn check_belief<T: Real, const N: usize>(b: &Gaussian<N, T>) -> Result<(), FilterError> {
+    if !all_finite(&b.mean) {
+        return Err(FilterError::NotFinite("the state"));
+    }
+    if !all_finite(&b.cov) {
+        return Err(FilterError::NotFinite("the state covariance"));
+    }
+    if !is_symmetric(&b.cov) || (0..N).any(|i| b.cov[(i, i)] < T::zero()) {
+        return Err(FilterError::NotPositiveDefinite("the state covariance"));
+    }
+    Ok(())
+}
+
+pub(crate) fn log_likelihood<T: Real>(p: &Gaussian<2, T>, m: &Measurement<T>) -> Result<T, FilterError> {
+    let s = invert_pair(&(p.cov + m.cov), "the innovation covariance")?;
+    Ok(s.log_likelihood(&(m.position - p.mean)))
 }

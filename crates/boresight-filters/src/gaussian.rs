@@ -28,3 +28,37 @@ pub struct Weighted<T = f64> {
     /// Its probability, 0..=1; the weights of one update sum to at most 1.
     pub weight: T,
 }
+
+impl<const N: usize, T: crate::Real> Gaussian<N, T> {
+    /// Returns the belief in another number type.
+    #[inline(always)]
+    pub fn cast<U: crate::Real>(&self) -> Gaussian<N, U> {
+        Gaussian { mean: self.mean.map(|v| U::of(v.as_f64())), cov: self.cov.map(|v| U::of(v.as_f64())) }
+    }
+}
+
+impl<T: crate::Real> Measurement<T> {
+    /// Returns a measurement with the same standard deviation (px) in both axes, uncorrelated.
+    pub fn isotropic(x: T, y: T, std: T) -> Self {
+        Self { position: Vector2::new(x, y), cov: Matrix2::identity() * (std * std) }
+    }
+
+    /// Returns the measurement in another number type.
+    #[inline(always)]
+    pub fn cast<U: crate::Real>(&self) -> Measurement<U> {
+        Measurement { position: self.position.map(|v| U::of(v.as_f64())), cov: self.cov.map(|v| U::of(v.as_f64())) }
+    }
+}
+
+impl<T: crate::Real> Weighted<T> {
+    /// Returns a measurement that is surely the target's own.
+    pub fn sure(measurement: Measurement<T>) -> Self {
+        Self { measurement, weight: T::one() }
+    }
+
+    /// Returns the hypothesis in another number type.
+    #[inline(always)]
+    pub fn cast<U: crate::Real>(&self) -> Weighted<U> {
+        Weighted { measurement: self.measurement.cast(), weight: U::of(self.weight.as_f64()) }
+    }
+}

@@ -4,11 +4,24 @@
 //! ([`Gaussian`]`<4>`, order `[x, vx, y, vy]`). The size of a filter's own state never leaks.
 #![no_std]
 #![forbid(unsafe_code)]
+// `!(x > 0)` is meant: NaN must take the refusing branch.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 mod error;
 mod filter;
 mod gaussian;
+pub mod kf;
+pub mod linalg;
+pub mod linear;
+pub mod mixture;
+pub mod model;
+pub mod pda;
+mod real;
+pub mod ud;
 
 pub use error::FilterError;
-pub use filter::Filter;
+pub use filter::{Filter, GaussianFilter, Start, Tracked};
 pub use gaussian::{Gaussian, Measurement, Weighted};
+pub use kf::{CovarianceForm, Kf};
+pub use real::Real;
+pub use ud::Ud;

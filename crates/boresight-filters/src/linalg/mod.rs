@@ -1,0 +1,68 @@
+//! The small dense mathematics of the filters: fixed sizes, no heap, written so that the compiler can unroll it.
+
+mod cholesky;
+mod pair;
+mod ud;
+
+pub use cholesky::Cholesky;
+pub use pair::{Pair, invert_pair};
+pub use ud::{UdFactors, mwgs, ud_factorize};
+
+use crate::Real;
+use nalgebra::SMatrix;
+
+/// Returns A B.
+#[inline(always)]
+pub(crate) fn mul<T: Real, const R: usize, const K: usize, const C: usize>(
+    a: &SMatrix<T, R, K>,
+    b: &SMatrix<T, K, C>,
+) -> SMatrix<T, R, C> {
+    let mut out = SMatrix::<T, R, C>::zeros();
+    for c in 0..C {
+        for k in 0..K {
+            let f = b[(k, c)];
+            for r in 0..R {
+                out[(r, c)] += a[(r, k)] * f;
+            }
+        }
+    }
+    out
+}
+
+/// Returns A Bᵀ.
+#[inline(always)]
+pub(crate) fn mul_transposed<T: Real, const R: usize, const K: usize, const C: usize>(
+    a: &SMatrix<T, R, K>,
+    b: &SMatrix<T, C, K>,
+) -> SMatrix<T, R, C> {
+    let mut out = SMatrix::<T, R, C>::zeros();
+    for c in 0..C {
+        for k in 0..K {
+            let f = b[(c, k)];
+            for r in 0..R {
+                out[(r, c)] += a[(r, k)] * f;
+            }
+        }
+    }
+    out
+}
+
+/// Makes a matrix exactly symmetric by the mean of each pair.
+#[inline(always)]
+pub(crate) fn symmetrize<T: Real, const N: usize>(m: &mut SMatrix<T, N, N>) {
+    let half = T::of(0.5);
+    for c in 1..N {
+        for r in 0..c {
+            let mean = (m[(r, c)] + m[(c, r)]) * half;
+            m[(r, c)] = mean;
+            m[(c, r)] = mean;
+        }
+    }
+}
+
+/// Returns whether a matrix is symmetric up to rounding, relative to its diagonal.
+pub(crate) fn is_symmetric<T: Real, const N: usize>(m: &SMatrix<T, N, N>) -> bool {
+    // The root of the rounding error: what a caller's own products may have lost, far above one operation.
+    let tolerance = T::EPSILON.sqrt();
+    (0..N).all(|c| (0..c).all(|r| (m[(r, c)] - m[(c, r)]).abs() <= tolerance * (m[(r, r)].abs() + m[(c, c)].abs())))
+}

@@ -1,0 +1,108 @@
+//! Motion models: how a target's state moves in a real time step, and where in the state position and velocity stand.
+//!
+//! A model is data, not a matrix: it makes Phi(dt) and its process noise for the dt of each step. Filters ask for the
+//! matrices ([`Model::transition`], [`Model::process_noise`]), for the factored noise ([`Model::with_noise_factor`]),
+//! or let the model move the covariance itself ([`Model::propagate`]), where its structure saves work.
+//! Symbols: x state N x 1; Phi N x N; Q N x N process covariance of one step; G N x W and q (W): Q = G diag(q) Gᵀ.
+
+mod constant_velocity;
+mod dense;
+
+pub use constant_velocity::ConstantVelocity;
+pub use dense::Dense;
+
+use crate::linalg::{mul, mul_transposed, symmetrize, ud_factorize};
+use crate::{FilterError, Gaussian, Measurement, Real};
+use nalgebra::{SMatrix, SVector};
+
+/// A motion model with N states.
+pub trait Model<const N: usize, T: Real = f64>: Clone {
+    /// Where x and y stand in the state.
+    const POSITION: [usize; 2];
+    /// Where the velocities of x and y stand in the state; `None` for a model without velocity.
+    const VELOCITY: Option<[usize; 2]>;
+
+    /// Returns Phi for a step of `dt_s` seconds; a nonlinear model linearises at the state `at`.
+    fn transition(&self, dt_s: T, at: &SVector<T, N>) -> SMatrix<T, N, N>;
+
+    /// Returns the process covariance Q of a step of `dt_s` seconds.
+    fn process_noise(&self, dt_s: T) -> SMatrix<T, N, N>;
+
+    /// Returns the state after `dt_s` seconds without noise.
+    #[inline]
+    fn moved(&self, dt_s: T, x: &SVector<T, N>) -> SVector<T, N> {
+        mul(&self.transition(dt_s, x), x)
+    }
+
+    /// Replaces x by f(x) and P by Phi P Phiᵀ + Q.
+    #[inline]
+    fn propagate(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        let phi = self.transition(dt_s, x);
+        *x = self.moved(dt_s, x);
+        *p = mul_transposed(&mul(&phi, p), &phi) + self.process_noise(dt_s);
+        symmetrize(p);
+    }
+
+    /// Hands the factored process noise Q = G diag(q) Gᵀ to the visitor; the default factors Q with W = N.
+    /// # Errors
+    /// [`FilterError::NotPositiveDefinite`] if Q has a negative direction.
+    #[inline]
+    fn with_noise_factor<V: NoiseVisitor<N, T>>(&self, dt_s: T, visitor: V) -> Result<V::Out, FilterError> {
+        let f =
+            ud_factorize(&self.process_noise(dt_s)).map_err(|_| FilterError::NotPositiveDefinite("process noise"))?;
+        Ok(visitor.visit(&f.u, &f.d))
+    }
+
+    /// Returns a full state for a first belief in position and velocity; further states take the model's own prior.
+    fn lift(&self, kinematics: &Gaussian<4, T>) -> Gaussian<N, T>;
+
+    /// Returns position and velocity `[x, vx, y, vy]` of a belief.
+    fn kinematics(&self, belief: &Gaussian<N, T>) -> Gaussian<4, T> {
+        let v = Self::VELOCITY;
+        let at = [Some(Self::POSITION[0]), v.map(|v| v[0]), Some(Self::POSITION[1]), v.map(|v| v[1])];
+        let mut k = Gaussian { mean: SVector::zeros(), cov: SMatrix::zeros() };
+        for (r, from_r) in at.iter().enumerate() {
+            let Some(i) = *from_r else { continue };
+            k.mean[r] = belief.mean[i];
+            for (c, from_c) in at.iter().enumerate() {
+                let Some(j) = *from_c else { continue };
+                k.cov[(r, c)] = belief.cov[(i, j)];
+            }
+        }
+        k
+    }
+}
+
+/// Receives a factored process noise of any width W (see [`Model::with_noise_factor`]).
+pub trait NoiseVisitor<const N: usize, T> {
+    /// What the visit returns.
+    type Out;
+    /// Uses G (N x W) and q (W variances).
+    fn visit<const W: usize>(self, g: &SMatrix<T, N, W>, q: &SVector<T, W>) -> Self::Out;
+}
+
+/// Returns the kinematic belief of one position measurement and a velocity of unknown direction.
+/// # Errors
+/// [`FilterError`] if the measurement is not finite or `velocity_std` is not positive and finite.
+pub fn kinematics_from_point<T: Real>(m: &Measurement<T>, velocity_std: T) -> Result<Gaussian<4, T>, FilterError> {
+    crate::filter::check_measurement(m)?;
+    if !(velocity_std > T::zero() && velocity_std <= T::MAX.sqrt()) {
+        return Err(FilterError::OutOfRange("a velocity standard deviation above 0"));
+    }
+    let mut k = Gaussian { mean: SVector::zeros(), cov: SMatrix::zeros() };
+    k.mean[0] = m.position[0];
+    k.mean[2] = m.position[1];
+    for (r, i) in [(0, 0), (1, 2)] {
+        for (c, j) in [(0, 0), (1, 2)] {
+            k.cov[(i, j)] = m.cov[(r, c)];
+        }
+    }
+    k.cov[(1, 1)] = velocity_std * velocity_std;
+    k.cov[(3, 3)] = velocity_std * velocity_std;
+    Ok(k)
+}
+
+/// Returns whether a noise strength is usable: finite and at least 0.
+pub(crate) fn check_strength<T: Real>(value: T, what: &'static str) -> Result<T, FilterError> {
+    if value >= T::zero() && value <= T::MAX { Ok(value) } else { Err(FilterError::OutOfRange(what)) }
+}

@@ -1,0 +1,232 @@
+//! Bierman-Thornton U-D filter: keeps P = U D Uᵀ, so P stays symmetric and positive by construction.
+//!
+//! Source: SPEC D.2 (Bierman's measurement update), D.3 (Thornton's time update by weighted Gram-Schmidt); G. J. Bierman,
+//! *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Errata of the paper: SPEC E-D5, E-D6.
+//! Differs from it: a measurement with a full covariance is whitened first (R = L Lᵀ); the PDA update is made in factors
+//! too: P^ = Σ of weighted factors, joined by Gram-Schmidt, so it cannot lose definiteness.
+//! Symbols: x N x 1; u N x N unit upper; d N (variances); a N x 1 row of H; r measurement variance; α innovation variance.
+//! Limits: none of rank: a zero variance is allowed. Cost: about N²(N + W) + 3 N² flops per predict + update.
+
+use crate::filter::{check_belief, check_dt, check_measurement, position_of};
+use crate::linalg::{UdFactors, mul, mwgs, ud_factorize};
+use crate::model::{Model, NoiseVisitor};
+use crate::real::all_finite;
+use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start};
+use nalgebra::{SMatrix, SVector};
+
+/// Innovation variance and gain of a scalar update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScalarUpdate<const N: usize, T = f64> {
+    /// Innovation variance aᵀ P a + r.
+    pub alpha: T,
+    /// Gain, N x 1.
+    pub gain: SVector<T, N>,
+}
+
+/// Bierman's update of x and U, D by a scalar z = aᵀ x + v, var v = r, in place.
+///
+/// The worked example W1 of the specification:
+/// ```
+/// use boresight_filters::{linalg::UdFactors, ud::ud_scalar_update};
+/// use nalgebra::{Matrix4, Vector4};
+/// let u = Matrix4::new(1., 0.5, 0.25, 0.1, 0., 1., -0.3, 0.2, 0., 0., 1., 0.4, 0., 0., 0., 1.);
+/// let mut factors = UdFactors { u, d: Vector4::new(2.0, 1.0, 0.5, 0.25) };
+/// let mut x = Vector4::new(10.0, 1.0, 20.0, -1.0);
+/// let done = ud_scalar_update(&mut x, &mut factors, &Vector4::new(1.0, 0.0, 0.0, 0.0), 10.7, 0.5);
+/// assert!((done.alpha - 2.78375_f64).abs() < 1e-12);
+/// assert!((x[0] - 10.574270318815).abs() < 1e-11 && (x[3] + 0.99371351594073).abs() < 1e-12);
+/// assert!((factors.d[3] - 0.24977548271217).abs() < 1e-13);
+/// assert!((factors.u[(1, 3)] - 0.18337078651685).abs() < 1e-13);
+/// ```
+#[inline]
+pub fn ud_scalar_update<const N: usize, T: Real>(
+    x: &mut SVector<T, N>,
+    factors: &mut UdFactors<N, T>,
+    a: &SVector<T, N>,
+    z: T,
+    r: T,
+) -> ScalarUpdate<N, T> {
+    let mut predicted = T::zero();
+    for i in 0..N {
+        predicted += a[i] * x[i];
+    }
+    let done = factor_update(factors, a, r);
+    if done.alpha > T::zero() {
+        let innovation = z - predicted;
+        for i in 0..N {
+            x[i] += done.gain[i] * innovation;
+        }
+    }
+    done
+}
+
+/// The covariance part of Bierman's update: no measurement is needed.
+#[inline(always)]
+pub(crate) fn factor_update<const N: usize, T: Real>(
+    factors: &mut UdFactors<N, T>,
+    a: &SVector<T, N>,
+    r: T,
+) -> ScalarUpdate<N, T> {
+    let UdFactors { u, d } = factors;
+    let mut f = [T::zero(); N];
+    let mut g = [T::zero(); N];
+    for j in 0..N {
+        let mut sum = a[j];
+        for i in 0..j {
+            sum += u[(i, j)] * a[i];
+        }
+        f[j] = sum;
+        g[j] = d[j] * sum;
+    }
+    let mut gain = SVector::<T, N>::zeros();
+    let mut alpha = r;
+    for j in 0..N {
+        let before = alpha;
+        alpha += g[j] * f[j];
+        // Both are 0 only for r = 0 and directions already known exactly.
+        let lambda = if before > T::zero() { -f[j] / before } else { T::zero() };
+        if alpha > T::zero() {
+            d[j] *= before / alpha;
+        }
+        for i in 0..j {
+            let t = u[(i, j)];
+            u[(i, j)] = t + lambda * gain[i];
+            gain[i] += g[j] * t;
+        }
+        gain[j] = g[j];
+    }
+    if alpha > T::zero() {
+        let inv = T::one() / alpha;
+        for i in 0..N {
+            gain[i] *= inv;
+        }
+    }
+    ScalarUpdate { alpha, gain }
+}
+
+/// U-D filter of a model with N states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ud<M, const N: usize, T: Real = f64> {
+    model: M,
+    mean: SVector<T, N>,
+    factors: UdFactors<N, T>,
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> Ud<M, N, T> {
+    /// Returns the factors of the covariance.
+    pub fn factors(&self) -> &UdFactors<N, T> {
+        &self.factors
+    }
+
+    /// Returns the motion model.
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+
+    #[inline(always)]
+    fn accept(&mut self, mean: SVector<T, N>, factors: UdFactors<N, T>) -> Result<(), FilterError> {
+        if !(all_finite(&mean) & all_finite(&factors.u) & all_finite(&factors.d)) {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        self.mean = mean;
+        self.factors = factors;
+        Ok(())
+    }
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
+    fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
+        check_belief(&belief)?;
+        Ok(Self { model, mean: belief.mean, factors: ud_factorize(&belief.cov)? })
+    }
+}
+
+/// Thornton's time update with the model's noise factor.
+struct TimeUpdate<'a, const N: usize, T> {
+    phi_u: SMatrix<T, N, N>,
+    d: &'a SVector<T, N>,
+}
+
+impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<'_, N, T> {
+    type Out = UdFactors<N, T>;
+    #[inline]
+    fn visit<const W: usize>(self, g: &SMatrix<T, N, W>, q: &SVector<T, W>) -> Self::Out {
+        mwgs(&self.phi_u, self.d, g, q)
+    }
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ud<M, N, T> {
+    type Real = T;
+
+    #[inline]
+    fn predict(&mut self, dt_s: T) -> Result<(), FilterError> {
+        check_dt(dt_s)?;
+        if dt_s == T::zero() {
+            return Ok(());
+        }
+        let phi_u = mul(&self.model.transition(dt_s, &self.mean), &self.factors.u);
+        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi_u, d: &self.factors.d })?;
+        self.accept(self.model.moved(dt_s, &self.mean), next)
+    }
+
+    #[inline]
+    fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        check_measurement(m)?;
+        let (mut mean, mut factors) = (self.mean, self.factors);
+        for (a, z, r) in whitened_rows::<N, T>(m, M::POSITION)? {
+            let done = ud_scalar_update(&mut mean, &mut factors, &a, z, r);
+            if !(done.alpha > T::zero()) {
+                return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+            }
+        }
+        self.accept(mean, factors)
+    }
+
+    fn belief(&self) -> Gaussian<N, T> {
+        Gaussian { mean: self.mean, cov: self.factors.product() }
+    }
+
+    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
+        check_belief(belief)?;
+        self.factors = ud_factorize(&belief.cov)?;
+        self.mean = belief.mean;
+        Ok(())
+    }
+
+    #[inline]
+    fn position_at(&self) -> [usize; 2] {
+        M::POSITION
+    }
+
+    fn kinematics(&self) -> Gaussian<4, T> {
+        self.model.kinematics(&self.belief())
+    }
+
+    fn predicted(&self) -> Gaussian<2, T> {
+        position_of(&self.belief(), M::POSITION)
+    }
+}
+
+/// Returns the measurement as two independent scalars: row a, value, variance.
+#[inline(always)]
+pub(crate) fn whitened_rows<const N: usize, T: Real>(
+    m: &Measurement<T>,
+    at: [usize; 2],
+) -> Result<[(SVector<T, N>, T, T); 2], FilterError> {
+    let (mut a0, mut a1) = (SVector::<T, N>::zeros(), SVector::<T, N>::zeros());
+    a0[at[0]] = T::one();
+    a1[at[1]] = T::one();
+    let (r00, r10, r11) = (m.cov[(0, 0)], m.cov[(1, 0)], m.cov[(1, 1)]);
+    let (z0, mut z1, mut r1) = (m.position[0], m.position[1], r11);
+    if r10 != T::zero() {
+        // L D Lᵀ instead of Cholesky: no root, and the variances keep their meaning.
+        if !(r00 > T::zero()) {
+            return Err(FilterError::NotPositiveDefinite("the measurement covariance"));
+        }
+        let l = r10 / r00;
+        a1[at[0]] = -l;
+        z1 -= l * z0;
+        r1 = (r11 - l * r10).max(T::zero());
+    }
+    Ok([(a0, z0, r00), (a1, z1, r1)])
+}
