@@ -1,4 +1,21 @@
 //! From detections to tracks: filters, life cycle, birth; never sees pixels.
+//!
+//! [`build`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the living tracks come out.
+
+mod belief;
+pub mod birth;
+pub mod config;
+pub mod cv;
+pub mod gating;
+pub mod life;
+mod pace;
+mod stage;
+pub mod tracker;
+
+pub use birth::{BirthConfig, OnePointConfig, VelocityBoundsConfig};
+pub use config::{FilterConfig, TrackFilter, TrackerConfig};
+pub use life::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+pub use tracker::Tracker;
 
 use crate::{Result, Scan, TrackState};
 
@@ -8,4 +25,11 @@ pub trait Tracking: Send {
     /// # Errors
     /// A scan that runs back in time or holds values that are not finite; the tracks are then unchanged.
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]>;
+}
+
+/// Builds the tracker that a configuration describes.
+/// # Errors
+/// A value of the configuration outside its range.
+pub fn build(config: &TrackerConfig) -> Result<Box<dyn Tracking>> {
+    Ok(Box::new(Tracker::new(config)?))
 }

@@ -4,6 +4,7 @@
 #![allow(dead_code)] // until every room reads its vectors
 
 mod spatial;
+mod track;
 
 use serde_json::Value;
 use std::path::PathBuf;

@@ -1,0 +1,3 @@
+//! Linear assignment: least total cost, one to one; sparse with misses.
+
+pub mod sparse;

@@ -1,0 +1,198 @@
+//! The sparse table between tracks and detections, and the answer to it.
+//!
+//! Rows are compressed (CSR): row `i` of [`Gates`] holds the detections inside the gate of track `i`, in ascending order
+//! of their numbers. Nothing here knows filters, pixels or boxes: only numbers cross this border.
+//! Symbols: d² squared Mahalanobis distance (no unit); l likelihood density N(ν; 0, S) (1/px²); λ clutter density (1/px²);
+//! P_D probability that a target is detected; P_G that its detection lies in the gate; ψ probability that the track exists.
+//! Limits: at most 2³² − 1 detections in a scan and pairs in a table.
+
+/// One gated pair: a detection as a track sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// The detection's number in the scan.
+    pub detection: u32,
+    /// What hard associators add up: d² and the terms beside position (no unit).
+    pub cost: f64,
+    /// ln l of the pair, with the terms beside position (l in 1/px²).
+    pub log_likelihood: f64,
+}
+
+/// What is known of a track before its detections are looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Probability that the target is detected in this scan, 0..=1.
+    pub p_detection: f64,
+    /// Probability that its detection falls into the gate, 0..=1.
+    pub p_gate: f64,
+    /// Probability that the track exists, 0..=1.
+    pub existence: f64,
+    /// Cost of leaving the track without a detection; hard associators never take a pair that costs more.
+    pub miss_cost: f64,
+}
+
+/// The sparse table of gated pairs: a row per track.
+#[derive(Clone, Debug, Default)]
+pub struct Gates {
+    starts: Vec<u32>,
+    pairs: Vec<Pair>,
+    priors: Vec<Prior>,
+    log_clutter: Vec<f64>,
+    n_detections: usize,
+}
+
+impl Gates {
+    /// Builds an empty table.
+    pub fn new() -> Self {
+        Self { starts: vec![0], ..Self::default() }
+    }
+
+    /// Empties the table for a scan of `n_detections`, all with clutter density `clutter_density` (1/px², above 0).
+    pub fn reset(&mut self, n_detections: usize, clutter_density: f64) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.pairs.clear();
+        self.priors.clear();
+        self.log_clutter.clear();
+        self.log_clutter.push(ln_density(clutter_density));
+        self.n_detections = n_detections;
+    }
+
+    /// Gives every detection a clutter density of its own (1/px²), one per detection of the scan.
+    pub fn set_clutter(&mut self, density: impl Iterator<Item = f64>) {
+        self.log_clutter.clear();
+        self.log_clutter.extend(density.map(ln_density));
+        debug_assert!(self.log_clutter.len() == self.n_detections);
+    }
+
+    /// Adds a pair to the row under construction; detections ascend within a row.
+    #[inline]
+    pub fn push(&mut self, pair: Pair) {
+        debug_assert!((pair.detection as usize) < self.n_detections);
+        self.pairs.push(pair);
+    }
+
+    /// The pairs of the row under construction.
+    pub fn open_row(&mut self) -> &mut [Pair] {
+        let from = self.starts.last().map_or(0, |s| *s as usize);
+        &mut self.pairs[from..]
+    }
+
+    /// Keeps only the first `n` pairs of the row under construction.
+    pub fn truncate_open_row(&mut self, n: usize) {
+        let from = self.starts.last().map_or(0, |s| *s as usize);
+        self.pairs.truncate(from + n);
+    }
+
+    /// Ends the row under construction.
+    #[inline]
+    pub fn end_row(&mut self, prior: Prior) {
+        self.starts.push(self.pairs.len() as u32);
+        self.priors.push(prior);
+    }
+
+    /// Number of rows.
+    pub fn n_tracks(&self) -> usize {
+        self.priors.len()
+    }
+
+    /// Number of detections of the scan.
+    pub fn n_detections(&self) -> usize {
+        self.n_detections
+    }
+
+    /// Number of gated pairs.
+    pub fn n_pairs(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// The gated pairs of a track.
+    #[inline]
+    pub fn row(&self, track_idx: usize) -> &[Pair] {
+        &self.pairs[self.starts[track_idx] as usize..self.starts[track_idx + 1] as usize]
+    }
+
+    /// What is known of a track beforehand.
+    #[inline]
+    pub fn prior(&self, track_idx: usize) -> &Prior {
+        &self.priors[track_idx]
+    }
+
+    /// ln λ at a detection (λ in 1/px²).
+    #[inline]
+    pub fn log_clutter(&self, detection: u32) -> f64 {
+        // One value for all, or one each.
+        let at = if self.log_clutter.len() == 1 { 0 } else { detection as usize };
+        self.log_clutter[at]
+    }
+
+    /// ln of the weight that the pair is right, against clutter: ln(ψ P_D l / λ).
+    #[inline]
+    pub fn log_weight(&self, track_idx: usize, pair: &Pair) -> f64 {
+        let p = &self.priors[track_idx];
+        (p.existence * p.p_detection).ln() + pair.log_likelihood - self.log_clutter(pair.detection)
+    }
+
+    /// ln of the weight that none is right: ln(1 − ψ P_D P_G).
+    #[inline]
+    pub fn log_miss(&self, track_idx: usize) -> f64 {
+        let p = &self.priors[track_idx];
+        (1.0 - p.existence * p.p_detection * p.p_gate).max(0.0).ln()
+    }
+}
+
+fn ln_density(density: f64) -> f64 {
+    density.max(f64::MIN_POSITIVE).ln()
+}
+
+/// One detection of a track's answer, with the probability that it is the target's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// The detection's number in the scan.
+    pub detection: u32,
+    /// Its weight, 0..=1; a hard choice is one share of weight 1.
+    pub weight: f64,
+}
+
+/// The answer: a row of shares per track; weights of a row sum to at most 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assignment {
+    starts: Vec<u32>,
+    shares: Vec<Share>,
+}
+
+impl Assignment {
+    /// Builds an empty answer.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Empties the answer.
+    pub fn reset(&mut self) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.shares.clear();
+    }
+
+    /// Adds a share to the row under construction.
+    #[inline]
+    pub fn push(&mut self, detection: u32, weight: f64) {
+        self.shares.push(Share { detection, weight });
+    }
+
+    /// Ends the row under construction.
+    #[inline]
+    pub fn end_row(&mut self) {
+        self.starts.push(self.shares.len() as u32);
+    }
+
+    /// Number of rows.
+    pub fn n_tracks(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// The shares of a track.
+    #[inline]
+    pub fn row(&self, track_idx: usize) -> &[Share] {
+        &self.shares[self.starts[track_idx] as usize..self.starts[track_idx + 1] as usize]
+    }
+}

@@ -1,0 +1,80 @@
+//! Connected groups of a gating table: tracks that share no detection, even through others, are solved apart.
+//!
+//! Method: union-find over rows, linked through the first row that claimed each detection; near-linear in the pairs.
+//! Groups come in the order of their first row, rows within a group ascend: the answer does not depend on anything else.
+
+use super::Gates;
+
+/// No row yet.
+const NONE: u32 = u32::MAX;
+
+/// Finds connected groups; keeps its memory between scans.
+#[derive(Clone, Debug, Default)]
+pub struct Groups {
+    parent: Vec<u32>,
+    claimed_by: Vec<u32>,
+    n_claims: Vec<u32>,
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl Groups {
+    /// Finds the groups of `gates` among rows with at least one pair.
+    pub fn find(&mut self, gates: &Gates) {
+        let n = gates.n_tracks();
+        self.parent.clear();
+        self.parent.extend(0..n as u32);
+        self.claimed_by.clear();
+        self.claimed_by.resize(gates.n_detections(), NONE);
+        for i in 0..n {
+            for pair in gates.row(i) {
+                let claim = &mut self.claimed_by[pair.detection as usize];
+                if *claim == NONE {
+                    *claim = i as u32;
+                } else {
+                    let (a, b) = (root(&mut self.parent, *claim), root(&mut self.parent, i as u32));
+                    // The smaller number stays the root: groups are named by their first row.
+                    let (low, high) = (a.min(b), a.max(b));
+                    self.parent[high as usize] = low;
+                }
+            }
+        }
+        // Counting sort of the rows by root; singletons skip it in `for_each`.
+        self.n_claims.clear();
+        self.n_claims.resize(n + 1, 0);
+        for i in 0..n as u32 {
+            if !gates.row(i as usize).is_empty() {
+                let r = root(&mut self.parent, i);
+                self.n_claims[r as usize + 1] += 1;
+            }
+        }
+        for i in 0..n {
+            self.n_claims[i + 1] += self.n_claims[i];
+        }
+        self.starts.clear();
+        self.starts.extend_from_slice(&self.n_claims);
+        self.rows.clear();
+        self.rows.resize(self.starts[n] as usize, 0);
+        for i in 0..n as u32 {
+            if !gates.row(i as usize).is_empty() {
+                let r = root(&mut self.parent, i) as usize;
+                self.rows[self.n_claims[r] as usize] = i;
+                self.n_claims[r] += 1;
+            }
+        }
+    }
+
+    /// The groups found, each the ascending list of its rows.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.starts.windows(2).filter(|w| w[1] > w[0]).map(|w| &self.rows[w[0] as usize..w[1] as usize])
+    }
+}
+
+fn root(parent: &mut [u32], mut i: u32) -> u32 {
+    while parent[i as usize] != i {
+        let up = parent[parent[i as usize] as usize];
+        parent[i as usize] = up;
+        i = up;
+    }
+    i
+}

@@ -1,0 +1,56 @@
+//! The filter of one track as the tracker stores it: in place for the constant-velocity Kalman filter, boxed for the rest.
+
+use super::config::TrackFilter;
+use super::cv::ConstantVelocity;
+use boresight_filters::{Filter, FilterError, Gaussian, Weighted};
+
+/// A filter in place, or behind its trait.
+pub enum Belief {
+    /// Constant velocity, 15 numbers in the track itself: no pointer to follow at a hundred thousand tracks.
+    Cv(ConstantVelocity),
+    /// Any other filter.
+    Boxed(Box<dyn TrackFilter>),
+}
+
+impl Clone for Belief {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Cv(f) => Self::Cv(*f),
+            Self::Boxed(f) => Self::Boxed((**f).boxed_clone()),
+        }
+    }
+}
+
+impl Filter for Belief {
+    #[inline]
+    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
+        match self {
+            Self::Cv(f) => f.predict(dt_s),
+            Self::Boxed(f) => f.predict(dt_s),
+        }
+    }
+
+    #[inline]
+    fn predicted(&self) -> Gaussian<2> {
+        match self {
+            Self::Cv(f) => f.predicted(),
+            Self::Boxed(f) => f.predicted(),
+        }
+    }
+
+    #[inline]
+    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
+        match self {
+            Self::Cv(f) => f.update(hypotheses),
+            Self::Boxed(f) => f.update(hypotheses),
+        }
+    }
+
+    #[inline]
+    fn kinematics(&self) -> Gaussian<4> {
+        match self {
+            Self::Cv(f) => f.kinematics(),
+            Self::Boxed(f) => f.kinematics(),
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Starts of tracks from detections that no track took: from one point, from two points, or within velocity bounds.
+//!
+//! Source: two points SPEC D.5 (5): x = [z, Δz/T], P = R[[1, 1/T], [1/T, 2/T²]] per axis; with a covariance of its own on
+//! each point this is cov(z₂) = R₂, cov(z₂, v) = R₂/T, cov(v) = (R₁ + R₂)/T². One point: velocity unknown within bounds,
+//! its variance that of a uniform density.
+//! Symbols: T time between the points, s; R measurement covariance, px².
+
+use super::config::{check, positive};
+use crate::Result;
+use boresight_filters::Gaussian;
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How tracks start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BirthConfig {
+    /// Every left-over detection starts a track at once, with unknown velocity.
+    OnePoint(OnePointConfig),
+    /// Two left-over detections of scans in a row start a track when the speed between them is possible.
+    TwoPoint {},
+    /// As two points, but the velocity between them must lie in a box (a road, a river, a known approach).
+    VelocityBounds(VelocityBoundsConfig),
+}
+
+impl Default for BirthConfig {
+    fn default() -> Self {
+        Self::TwoPoint {}
+    }
+}
+
+/// Every left-over detection starts a track at once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct OnePointConfig {
+    /// Standard deviation of the unknown velocity per axis, px/s, above 0.
+    pub velocity_std_px_per_s: f64,
+}
+
+impl Default for OnePointConfig {
+    fn default() -> Self {
+        Self { velocity_std_px_per_s: 60.0 }
+    }
+}
+
+/// A box of possible velocities.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct VelocityBoundsConfig {
+    /// Least velocity (x, y), px/s.
+    pub min_px_per_s: [f64; 2],
+    /// Largest velocity (x, y), px/s, above the least.
+    pub max_px_per_s: [f64; 2],
+}
+
+impl Default for VelocityBoundsConfig {
+    fn default() -> Self {
+        Self { min_px_per_s: [-150.0; 2], max_px_per_s: [150.0; 2] }
+    }
+}
+
+impl BirthConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        match self {
+            Self::TwoPoint {} => Ok(()),
+            Self::OnePoint(c) => positive(
+                &format!("{at}.one-point"),
+                "velocity-std-px-per-s",
+                c.velocity_std_px_per_s,
+                "a third to a half of the largest speed",
+            ),
+            Self::VelocityBounds(c) => {
+                for a in 0..2 {
+                    let (low, high) = (c.min_px_per_s[a], c.max_px_per_s[a]);
+                    check(
+                        low.is_finite() && high.is_finite() && low < high,
+                        &format!("{at}.velocity-bounds"),
+                        "min-px-per-s",
+                        low,
+                        "a finite velocity below max-px-per-s",
+                        "[-10, -10] and [200, 10] let things move right only",
+                    )?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Whether a start needs a left-over of the scan before.
+    pub fn needs_two(&self) -> bool {
+        !matches!(self, Self::OnePoint(_))
+    }
+}
+
+/// First belief from one point: velocity zero, variance as given (px²/s²).
+pub fn from_one_point(
+    z: &Vector2<f64>,
+    r: &Matrix2<f64>,
+    velocity: Vector2<f64>,
+    variance: Vector2<f64>,
+) -> Gaussian<4> {
+    let mut cov = Matrix4::zeros();
+    for a in 0..2 {
+        for b in 0..2 {
+            cov[(2 * a, 2 * b)] = r[(a, b)];
+        }
+        cov[(2 * a + 1, 2 * a + 1)] = variance[a];
+    }
+    Gaussian { mean: Vector4::new(z.x, velocity.x, z.y, velocity.y), cov }
+}
+
+/// First belief from two points `dt_s` apart (above 0).
+pub fn from_two_points(
+    first: &Vector2<f64>,
+    r_first: &Matrix2<f64>,
+    z: &Vector2<f64>,
+    r: &Matrix2<f64>,
+    dt_s: f64,
+) -> Gaussian<4> {
+    let velocity = (z - first) / dt_s;
+    let mut cov = Matrix4::zeros();
+    for a in 0..2 {
+        for b in 0..2 {
+            cov[(2 * a, 2 * b)] = r[(a, b)];
+            cov[(2 * a, 2 * b + 1)] = r[(a, b)] / dt_s;
+            cov[(2 * a + 1, 2 * b)] = r[(a, b)] / dt_s;
+            cov[(2 * a + 1, 2 * b + 1)] = (r[(a, b)] + r_first[(a, b)]) / (dt_s * dt_s);
+        }
+    }
+    Gaussian { mean: Vector4::new(z.x, velocity.x, z.y, velocity.y), cov }
+}

@@ -1,0 +1,183 @@
+//! The tracker's configuration: every choice is an enum, every number has a unit and a range.
+
+use super::birth::BirthConfig;
+use super::life::LifeConfig;
+use crate::associate::AssociatorConfig;
+use crate::{Error, ErrorKind, Result};
+use boresight_filters::{Filter, Gaussian};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How detections become tracks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TrackerConfig {
+    /// The filter of each track.
+    pub filter: FilterConfig,
+    /// Standard deviation of the target's acceleration, px/s², above 0; larger follows manoeuvres, smaller smooths more.
+    /// 28 px/s² is 0.03 px per frame² at 30 frames/s.
+    pub acceleration_std_px_per_s2: f64,
+    /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
+    pub extra_noise_px: f64,
+    /// Probability that a target's detection lies in its gate, in (0, 1); the gate is χ² with 2 degrees of freedom.
+    pub gate_probability: f64,
+    /// Largest speed of a target, px/s, above 0: limits two-point starts and gates that grow while a track coasts.
+    pub max_speed_px_per_s: f64,
+    /// Whether a gate that grows while its track coasts is cut to what the largest speed allows.
+    pub gate_within_max_speed: bool,
+    /// Probability that a target is detected in a scan, in (0, 1].
+    pub detection_probability: f64,
+    /// False detections per px² and scan, 0 or more (used by every method that weighs detections against clutter).
+    pub clutter_density_per_px2: f64,
+    /// How detections are shared out among tracks.
+    pub associator: AssociatorConfig,
+    /// When a track is believed and when it is given up.
+    pub life: LifeConfig,
+    /// How tracks start.
+    pub birth: BirthConfig,
+    /// A confirmed track without detections is kept this long, s, 0 or more.
+    pub coast_s: f64,
+    /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
+    pub coast_scans: u32,
+    /// Most tracks alive at a time; no track is started beyond (a guard of memory and time).
+    pub max_tracks: u32,
+    /// Most gated detections kept per track, the nearest (a guard of memory and time).
+    pub max_gated: u32,
+}
+
+impl Default for TrackerConfig {
+    fn default() -> Self {
+        Self {
+            filter: FilterConfig::default(),
+            acceleration_std_px_per_s2: 28.0,
+            extra_noise_px: 0.3,
+            gate_probability: 0.99,
+            max_speed_px_per_s: 150.0,
+            gate_within_max_speed: true,
+            detection_probability: 0.9,
+            clutter_density_per_px2: 1e-5,
+            associator: AssociatorConfig::default(),
+            life: LifeConfig::default(),
+            birth: BirthConfig::default(),
+            coast_s: 0.5,
+            coast_scans: 5,
+            max_tracks: 250_000,
+            max_gated: 64,
+        }
+    }
+}
+
+/// The filter of each track.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilterConfig {
+    /// Constant-velocity Kalman filter (Joseph form), kept in place in the tracker: the fastest.
+    Kf {},
+}
+
+impl Default for FilterConfig {
+    fn default() -> Self {
+        Self::Kf {}
+    }
+}
+
+/// A filter that can be copied behind its trait: what the tracker holds when the filter is not kept in place.
+pub trait TrackFilter: Filter + Send + Sync {
+    /// Copies the filter.
+    fn boxed_clone(&self) -> Box<dyn TrackFilter>;
+}
+
+impl<F: Filter + Clone + Send + Sync + 'static> TrackFilter for F {
+    fn boxed_clone(&self) -> Box<dyn TrackFilter> {
+        Box::new(self.clone())
+    }
+}
+
+impl TrackerConfig {
+    /// Gate threshold on d²: γ = −2 ln(1 − P_G), the χ² quantile with 2 degrees of freedom (no unit).
+    pub fn gate(&self) -> f64 {
+        -2.0 * (1.0 - self.gate_probability).ln()
+    }
+
+    /// Builds the filter of a new track.
+    pub(super) fn belief(&self, start: &Gaussian<4>) -> super::belief::Belief {
+        match self.filter {
+            FilterConfig::Kf {} => {
+                super::belief::Belief::Cv(super::cv::ConstantVelocity::new(start, self.acceleration_std_px_per_s2))
+            }
+        }
+    }
+
+    /// Checks all values; `at` names the place in the configuration (`tracker`).
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        positive(
+            at,
+            "acceleration-std-px-per-s2",
+            self.acceleration_std_px_per_s2,
+            "0.03 px per frame², squared rates apart: 28 at 30 frames/s",
+        )?;
+        not_negative(at, "extra-noise-px", self.extra_noise_px, "0.3 covers the heavy tails of thresholded centroids")?;
+        check(
+            self.gate_probability > 0.0 && self.gate_probability < 1.0,
+            at,
+            "gate-probability",
+            self.gate_probability,
+            "a probability in (0, 1)",
+            "0.99 keeps 99 % of true detections inside the gate",
+        )?;
+        positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "5 px per frame at 30 frames/s is 150")?;
+        check(
+            self.detection_probability > 0.0 && self.detection_probability <= 1.0,
+            at,
+            "detection-probability",
+            self.detection_probability,
+            "a probability in (0, 1]",
+            "0.9 suits most detectors",
+        )?;
+        not_negative(
+            at,
+            "clutter-density-per-px2",
+            self.clutter_density_per_px2,
+            "3 false detections in 640 x 512 px are 1e-5",
+        )?;
+        self.associator.validate(&format!("{at}.associator"))?;
+        self.life.validate(&format!("{at}.life"))?;
+        self.birth.validate(&format!("{at}.birth"))?;
+        not_negative(at, "coast-s", self.coast_s, "0.5 bridges half a second without detections")?;
+        let whole = |ok: bool, key: &str, value: u32| {
+            check(ok, at, key, value, "a whole number of 1 or more", "leave it out for the default")
+        };
+        whole(self.coast_scans >= 1, "coast-scans", self.coast_scans)?;
+        whole(self.max_tracks >= 1, "max-tracks", self.max_tracks)?;
+        whole(self.max_gated >= 1, "max-gated", self.max_gated)
+    }
+}
+
+/// Refuses a value that is out of range, with place, value, expectation and mend.
+pub(crate) fn check(
+    ok: bool,
+    at: &str,
+    key: &str,
+    value: impl std::fmt::Display,
+    expected: &str,
+    mend: &str,
+) -> Result<()> {
+    if ok {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::Config, format!("expected {expected}")).at(format!("{at}.{key} = {value}")).hint(mend))
+}
+
+pub(crate) fn positive(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
+    check(value > 0.0 && value.is_finite(), at, key, value, "a number above 0", mend)
+}
+
+pub(crate) fn not_negative(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
+    check(value >= 0.0 && value.is_finite(), at, key, value, "a number of 0 or more", mend)
+}
+
+pub(crate) fn probability(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
+    check(value > 0.0 && value < 1.0, at, key, value, "a probability in (0, 1)", mend)
+}

@@ -1,0 +1,211 @@
+//! Constant-velocity Kalman filter of one track with the structure of the model used: no heap, 15 numbers.
+//!
+//! Source: SPEC D.1 (prediction with G Q Gᵀ, Joseph update), SPEC E for several weighted detections.
+//! Method: the covariance is kept as two axis blocks and their coupling; while every measurement covariance is diagonal
+//! the axes stay independent and a step is two 2x2 filters. Several hypotheses: each is corrected by itself and the
+//! mixture is matched in mean and covariance, which is SPEC E when all share one R.
+//! Symbols: state `[x, vx, y, vy]` (px, px/s); q acceleration variance, px²/s⁴; r measurement variance, px².
+//! Limits: linear, constant velocity with piecewise-constant acceleration over each dt.
+
+use boresight_filters::{Filter, FilterError, Gaussian, Measurement, Weighted};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+/// Mean and covariance of one axis: position and velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Axis {
+    x: f64,
+    v: f64,
+    xx: f64,
+    xv: f64,
+    vv: f64,
+}
+
+impl Axis {
+    #[inline]
+    fn predict(&mut self, dt_s: f64, q: f64) {
+        let (t, t2) = (dt_s, dt_s * dt_s);
+        self.x += t * self.v;
+        self.xx += t * (2.0 * self.xv + t * self.vv) + 0.25 * q * t2 * t2;
+        self.xv += t * self.vv + 0.5 * q * t2 * t;
+        self.vv += q * t2;
+    }
+
+    #[inline]
+    fn correct(&mut self, z: f64, r: f64) {
+        let s = self.xx + r;
+        let (kx, kv) = (self.xx / s, self.xv / s);
+        let nu = z - self.x;
+        self.x += kx * nu;
+        self.v += kv * nu;
+        // Joseph form written out for one axis.
+        let left = 1.0 - kx;
+        self.vv += kv * (kv * s - 2.0 * self.xv);
+        self.xv = left * (self.xv - kv * self.xx) + kx * kv * r;
+        self.xx = left * left * self.xx + kx * kx * r;
+    }
+}
+
+/// The belief of a constant-velocity track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantVelocity {
+    axes: [Axis; 2],
+    /// cov([x, vx], [y, vy]), row by row.
+    coupling: [f64; 4],
+    q: f64,
+    coupled: bool,
+}
+
+impl ConstantVelocity {
+    /// Builds a filter from a first belief and the standard deviation of the acceleration, px/s².
+    pub fn new(start: &Gaussian<4>, acceleration_std_px_per_s2: f64) -> Self {
+        let mut filter = Self {
+            axes: [Axis { x: 0.0, v: 0.0, xx: 0.0, xv: 0.0, vv: 0.0 }; 2],
+            coupling: [0.0; 4],
+            q: acceleration_std_px_per_s2 * acceleration_std_px_per_s2,
+            coupled: false,
+        };
+        filter.set(&start.mean, &start.cov);
+        filter
+    }
+
+    fn set(&mut self, m: &Vector4<f64>, p: &Matrix4<f64>) {
+        for (a, axis) in self.axes.iter_mut().enumerate() {
+            let i = 2 * a;
+            *axis = Axis {
+                x: m[i],
+                v: m[i + 1],
+                xx: p[(i, i)],
+                xv: 0.5 * (p[(i, i + 1)] + p[(i + 1, i)]),
+                vv: p[(i + 1, i + 1)],
+            };
+        }
+        let mid = |r: usize, c: usize| 0.5 * (p[(r, c)] + p[(c, r)]);
+        self.coupling = [mid(0, 2), mid(0, 3), mid(1, 2), mid(1, 3)];
+        self.coupled = self.coupling.iter().any(|c| *c != 0.0);
+    }
+
+    /// Position, px.
+    #[inline]
+    pub fn position(&self) -> [f64; 2] {
+        [self.axes[0].x, self.axes[1].x]
+    }
+
+    fn correct_one(&mut self, z: &Measurement) -> Result<(), FilterError> {
+        let r = &z.cov;
+        if !self.coupled && r[(0, 1)] == 0.0 && r[(1, 0)] == 0.0 {
+            let mut axes = self.axes;
+            for a in 0..2 {
+                axes[a].correct(z.position[a], r[(a, a)]);
+            }
+            let fine = axes.iter().all(|a| (a.x + a.v).is_finite() && a.xx > 0.0 && a.vv > 0.0);
+            if !fine {
+                return Err(FilterError::NotPositiveDefinite("innovation covariance"));
+            }
+            self.axes = axes;
+            return Ok(());
+        }
+        let (mean, cov) = corrected(&self.kinematics(), z)?;
+        self.set(&mean, &cov);
+        Ok(())
+    }
+}
+
+/// The Joseph update of a full belief by one position.
+fn corrected(belief: &Gaussian<4>, z: &Measurement) -> Result<(Vector4<f64>, Matrix4<f64>), FilterError> {
+    let p = &belief.cov;
+    let s = Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]) + z.cov;
+    let det = s.determinant();
+    if !(det > 0.0 && s[(0, 0)] > 0.0 && det.is_finite()) {
+        return Err(FilterError::NotPositiveDefinite("innovation covariance"));
+    }
+    let s_inv = Matrix2::new(s[(1, 1)], -s[(0, 1)], -s[(1, 0)], s[(0, 0)]) / det;
+    let pht = nalgebra::Matrix4x2::from_fn(|r, c| p[(r, 2 * c)]);
+    let k = pht * s_inv;
+    let nu = z.position - Vector2::new(belief.mean[0], belief.mean[2]);
+    let mut left = Matrix4::identity();
+    for r in 0..4 {
+        for c in 0..2 {
+            left[(r, 2 * c)] -= k[(r, c)];
+        }
+    }
+    let cov = left * p * left.transpose() + k * z.cov * k.transpose();
+    Ok((belief.mean + k * nu, cov))
+}
+
+impl Filter for ConstantVelocity {
+    #[inline]
+    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
+        if !(dt_s >= 0.0 && dt_s.is_finite()) {
+            return Err(FilterError::OutOfRange("a time step of 0 s or more"));
+        }
+        for axis in &mut self.axes {
+            axis.predict(dt_s, self.q);
+        }
+        if self.coupled {
+            let [xy, xw, vy, vw] = self.coupling;
+            self.coupling = [xy + dt_s * (xw + vy + dt_s * vw), xw + dt_s * vw, vy + dt_s * vw, vw];
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn predicted(&self) -> Gaussian<2> {
+        let [a, b] = &self.axes;
+        let c = self.coupling[0];
+        Gaussian { mean: Vector2::new(a.x, b.x), cov: Matrix2::new(a.xx, c, c, b.xx) }
+    }
+
+    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
+        for h in hypotheses {
+            let z = &h.measurement;
+            if !(z.position.iter().all(|v| v.is_finite()) && z.cov.iter().all(|v| v.is_finite())) {
+                return Err(FilterError::NotFinite("measurement"));
+            }
+            if !(h.weight >= 0.0 && h.weight <= 1.0 + 1e-9) {
+                return Err(FilterError::OutOfRange("a weight in 0..=1"));
+            }
+        }
+        match hypotheses {
+            [] => Ok(()),
+            [one] if one.weight >= 1.0 => self.correct_one(&one.measurement),
+            _ => {
+                let before = self.kinematics();
+                let missed = (1.0 - hypotheses.iter().map(|h| h.weight).sum::<f64>()).max(0.0);
+                let mut second = before.cov * missed;
+                let mut parts = 0.0;
+                // Deviations are taken from the prediction: small numbers keep their digits far from the origin.
+                let mut shift = Vector4::zeros();
+                for h in hypotheses {
+                    let (m, p) = corrected(&before, &h.measurement)?;
+                    let d = m - before.mean;
+                    shift += d * h.weight;
+                    second += (p + d * d.transpose()) * h.weight;
+                    parts += h.weight;
+                }
+                if parts > 1.0 + 1e-9 {
+                    return Err(FilterError::OutOfRange("weights that sum to at most 1"));
+                }
+                let cov = second - shift * shift.transpose();
+                let mean = before.mean + shift;
+                if !mean.iter().chain(cov.iter()).all(|v| v.is_finite()) {
+                    return Err(FilterError::NotPositiveDefinite("updated covariance"));
+                }
+                self.set(&mean, &cov);
+                Ok(())
+            }
+        }
+    }
+
+    fn kinematics(&self) -> Gaussian<4> {
+        let [a, b] = &self.axes;
+        let [xy, xw, vy, vw] = self.coupling;
+        #[rustfmt::skip]
+        let cov = Matrix4::new(
+            a.xx, a.xv, xy,   xw,
+            a.xv, a.vv, vy,   vw,
+            xy,   vy,   b.xx, b.xv,
+            xw,   vw,   b.xv, b.vv,
+        );
+        Gaussian { mean: Vector4::new(a.x, a.v, b.x, b.v), cov }
+    }
+}

@@ -1,0 +1,172 @@
+//! From predicted tracks and a scan to the sparse table of pairs that are near.
+//!
+//! Source: SPEC D.4: d² = νᵀ S⁻¹ ν ≤ γ, S = H P Hᵀ + R, with the R of each detection.
+//! Method: a grid over the detections hands out candidates in the rectangle that holds the gate's ellipse (pre-gate); the
+//! ellipse decides. A gate that has grown while its track coasted is cut to what the largest speed allows.
+//! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
+//! in one pixel cost bounded time and memory.
+
+use crate::associate::{Gates, Pair, Prior, UniformGrid};
+use crate::{Detection, Error, ErrorKind, Result, Scan};
+use nalgebra::{Matrix2, Vector2};
+
+/// Candidates looked at per track before the search stops.
+pub const MOST_LOOKED_AT: usize = 4096;
+
+/// ln 2π.
+const LN_2PI: f64 = 1.837_877_066_409_345_5;
+
+/// A detection's covariance with the extra noise, three numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// Variance along x, px².
+    pub xx: f64,
+    /// Covariance, px².
+    pub xy: f64,
+    /// Variance along y, px².
+    pub yy: f64,
+}
+
+impl Noise {
+    /// The covariance as a matrix.
+    #[inline]
+    pub fn matrix(&self) -> Matrix2<f64> {
+        Matrix2::new(self.xx, self.xy, self.xy, self.yy)
+    }
+}
+
+/// A track's predicted position and covariance, and how far it can have come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predicted {
+    /// Position, px.
+    pub x: f64,
+    /// Position, px.
+    pub y: f64,
+    /// Covariance H P Hᵀ, px².
+    pub cov: Noise,
+    /// Farthest distance from the prediction that the largest speed allows, squared, px².
+    pub reach2: f64,
+}
+
+/// A scan made ready for gating: checked, noise added, sorted into a grid.
+#[derive(Clone, Debug, Default)]
+pub struct ScanTable {
+    /// Noise of each detection.
+    pub noise: Vec<Noise>,
+    /// Largest variances in the scan, px².
+    max_xx: f64,
+    max_yy: f64,
+    grid: UniformGrid,
+}
+
+impl ScanTable {
+    /// Checks a scan and takes its noise; nothing else changes before the check is over.
+    /// # Errors
+    /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
+    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64) -> Result<()> {
+        let extra = extra_noise_px * extra_noise_px;
+        self.noise.clear();
+        self.noise.reserve(scan.detections.len());
+        (self.max_xx, self.max_yy) = (0.0, 0.0);
+        for (i, d) in scan.detections.iter().enumerate() {
+            let n = Noise {
+                xx: d.cov[(0, 0)] + extra,
+                xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
+                yy: d.cov[(1, 1)] + extra,
+            };
+            let finite = (d.position.x + d.position.y + n.xx + n.xy + n.yy).is_finite();
+            // Room for rounding: a covariance of rank one is a legal (if odd) measurement.
+            let sound = d.cov[(0, 0)] >= 0.0 && d.cov[(1, 1)] >= 0.0 && n.xy * n.xy <= n.xx * n.yy * (1.0 + 1e-9);
+            if !(finite && sound) {
+                return Err(refused(scan, i, d, finite));
+            }
+            self.max_xx = self.max_xx.max(n.xx);
+            self.max_yy = self.max_yy.max(n.yy);
+            self.noise.push(n);
+        }
+        Ok(())
+    }
+
+    /// Sorts the scan's detections into the grid.
+    pub fn sort(&mut self, scan: &Scan) {
+        self.grid.build(scan.detections.iter().map(|d| (d.position.x, d.position.y)));
+    }
+
+    /// The grid over the detections.
+    pub fn grid(&self) -> &UniformGrid {
+        &self.grid
+    }
+
+    /// Adds the pairs of one track to the open row of `gates`: those with d² ≤ `gate` that `free` lets pass.
+    /// `terms` returns what a pair costs beside position (0 if nothing).
+    #[inline]
+    pub fn gate_row(
+        &self,
+        track: &Predicted,
+        gate: f64,
+        max_gated: usize,
+        likelihood: bool,
+        free: impl Fn(u32) -> bool,
+        terms: impl Fn(u32) -> f64,
+        gates: &mut Gates,
+    ) {
+        let reach = track.reach2.sqrt();
+        let half_x = (gate * (track.cov.xx + self.max_xx)).sqrt().min(reach);
+        let half_y = (gate * (track.cov.yy + self.max_yy)).sqrt().min(reach);
+        let mut looked_at = 0;
+        let mut gated = 0;
+        self.grid.near(track.x, track.y, half_x, half_y, |p| {
+            looked_at += 1;
+            let (dx, dy) = (p.x - track.x, p.y - track.y);
+            if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
+                let r = &self.noise[p.index as usize];
+                let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
+                let det = sxx * syy - sxy * sxy;
+                let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
+                if distance2 <= gate && dx * dx + dy * dy <= track.reach2 {
+                    let cost = distance2 + terms(p.index);
+                    let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
+                    gates.push(Pair { detection: p.index, cost, log_likelihood });
+                    gated += 1;
+                }
+            }
+            looked_at < MOST_LOOKED_AT
+        });
+        if gated > 1 {
+            let row = gates.open_row();
+            if gated > max_gated {
+                row.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost).then(a.detection.cmp(&b.detection)));
+                gates.truncate_open_row(max_gated);
+            }
+            gates.open_row().sort_unstable_by_key(|p| p.detection);
+        }
+    }
+}
+
+/// What is known of a row beforehand.
+#[inline]
+pub fn prior(p_detection: f64, p_gate: f64, existence: f64, miss_cost: f64) -> Prior {
+    Prior { p_detection, p_gate, existence, miss_cost }
+}
+
+/// Innovation covariance of a track and a detection, px².
+pub fn innovation_cov(track: &Predicted, r: &Noise) -> Matrix2<f64> {
+    track.cov.matrix() + r.matrix()
+}
+
+/// νᵀ S⁻¹ ν (no unit).
+pub fn normalised_square(nu: &Vector2<f64>, s: &Matrix2<f64>) -> f64 {
+    let det = s.determinant();
+    (nu.x * (s[(1, 1)] * nu.x - s[(0, 1)] * nu.y) + nu.y * (s[(0, 0)] * nu.y - s[(0, 1)] * nu.x)) / det
+}
+
+fn refused(scan: &Scan, i: usize, d: &Detection, finite: bool) -> Error {
+    let what = if finite {
+        format!("covariance {:?} is not positive semi-definite", d.cov.as_slice())
+    } else {
+        format!("position {:?} or covariance {:?} is not finite", d.position.as_slice(), d.cov.as_slice())
+    };
+    Error::new(ErrorKind::Damaged, what)
+        .at(format!("frame {}, detection {i}", scan.index.0))
+        .hint("drop such detections before tracking, or mend the detector that makes them")
+}

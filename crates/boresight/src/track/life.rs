@@ -1,0 +1,322 @@
+//! The life of a track: tentative, confirmed, deleted; by counting, by a sequential test, or by existence probability.
+//!
+//! Source: M-of-N SPEC D.5 (4); score: S. S. Blackman, R. Popoli, *Design and Analysis of Modern Tracking Systems*, 1999,
+//! ch. 6 (Wald's sequential probability ratio test); existence: D. Mušicki, R. Evans, S. Stanković, "Integrated
+//! probabilistic data association", IEEE Trans. Automatic Control 39, 1994 (Markov chain one).
+//! Symbols: Λ likelihood ratio of this scan, target against none (no unit); ψ existence probability.
+//! Limits: M-of-N windows of at most 64 scans. A confirmed track also ends when its coasting budget (s) is over.
+
+use super::config::{check, positive, probability};
+use crate::Result;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// When a track is believed and when it is given up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LifeConfig {
+    /// Confirmed after M detections in N scans.
+    MOfN(MOfNConfig),
+    /// Confirmed and deleted by the log-likelihood ratio against clutter (sequential probability ratio test).
+    Score(ScoreConfig),
+    /// Confirmed and deleted by the probability that the target exists (IPDA; with JPDA: JIPDA).
+    Existence(ExistenceConfig),
+}
+
+impl Default for LifeConfig {
+    fn default() -> Self {
+        Self::MOfN(MOfNConfig::default())
+    }
+}
+
+/// Confirmed after M detections in N scans.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct MOfNConfig {
+    /// M: detections needed, 1..=`scans`; a two-point start counts as two. More means fewer false tracks, later ones.
+    pub hits: u32,
+    /// N: scans looked back, `hits`..=64.
+    pub scans: u32,
+    /// A tentative track is given up after this time without being confirmed, s, above 0.
+    pub tentative_s: f64,
+}
+
+impl Default for MOfNConfig {
+    fn default() -> Self {
+        Self { hits: 3, scans: 5, tentative_s: 1e9 }
+    }
+}
+
+/// Confirmed and deleted by the log-likelihood ratio against clutter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ScoreConfig {
+    /// Probability α that a start from clutter is confirmed, in (0, 1).
+    pub false_confirm_probability: f64,
+    /// Probability β that a true tentative track is deleted, in (0, 1).
+    pub true_delete_probability: f64,
+    /// New targets per px² and scan over the clutter density: the ratio a start begins with, above 0.
+    pub birth_to_clutter: f64,
+    /// A confirmed track is deleted when its score falls this far below its best, above 0 (natural units).
+    pub max_drop: f64,
+}
+
+impl Default for ScoreConfig {
+    fn default() -> Self {
+        Self { false_confirm_probability: 1e-3, true_delete_probability: 1e-2, birth_to_clutter: 0.1, max_drop: 12.0 }
+    }
+}
+
+/// Confirmed and deleted by the probability that the target exists.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ExistenceConfig {
+    /// Probability that a start is a target, in (0, 1).
+    pub birth_probability: f64,
+    /// A track at or above this is confirmed, in (0, 1).
+    pub confirm_probability: f64,
+    /// A track below this is deleted, in (0, 1), below the birth probability.
+    pub delete_probability: f64,
+    /// Mean time a target stays in view, s, above 0: existence fades with it while nothing is seen.
+    pub mean_life_s: f64,
+}
+
+impl Default for ExistenceConfig {
+    fn default() -> Self {
+        Self { birth_probability: 0.2, confirm_probability: 0.95, delete_probability: 0.01, mean_life_s: 30.0 }
+    }
+}
+
+impl LifeConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        match self {
+            Self::MOfN(c) => {
+                let at = format!("{at}.m-of-n");
+                check((1..=64).contains(&c.scans), &at, "scans", c.scans, "1..=64 scans", "3 of 5 is usual")?;
+                check((1..=c.scans).contains(&c.hits), &at, "hits", c.hits, "1..=scans", "3 of 5 is usual")?;
+                positive(&at, "tentative-s", c.tentative_s, "a second is long at video rate")
+            }
+            Self::Score(c) => {
+                let at = format!("{at}.score");
+                probability(&at, "false-confirm-probability", c.false_confirm_probability, "0.001 is usual")?;
+                probability(&at, "true-delete-probability", c.true_delete_probability, "0.01 is usual")?;
+                positive(&at, "birth-to-clutter", c.birth_to_clutter, "0.1: one new target for ten false detections")?;
+                positive(&at, "max-drop", c.max_drop, "12 is about five missed scans at P_D 0.9")
+            }
+            Self::Existence(c) => {
+                let at = format!("{at}.existence");
+                probability(&at, "birth-probability", c.birth_probability, "0.2 is usual")?;
+                probability(&at, "confirm-probability", c.confirm_probability, "0.95 is usual")?;
+                probability(&at, "delete-probability", c.delete_probability, "0.01 is usual")?;
+                check(
+                    c.delete_probability < c.birth_probability,
+                    &at,
+                    "delete-probability",
+                    c.delete_probability,
+                    "less than birth-probability",
+                    "else every track dies at birth",
+                )?;
+                positive(&at, "mean-life-s", c.mean_life_s, "30 s suits most scenes")
+            }
+        }
+    }
+}
+
+/// Where a track stands in its life.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Life {
+    /// Hits (1) and misses (0), the newest in the lowest bit.
+    history: u64,
+    /// Entries of the history, at most 64.
+    entries: u8,
+    /// Believed.
+    pub confirmed: bool,
+    /// Misses in a row.
+    pub misses: u32,
+    /// Score (ln Λ summed) or existence probability, by the method.
+    value: f64,
+    best: f64,
+    /// Time of the last detection, ns.
+    pub last_hit_ns: i64,
+    /// Time of the start, ns.
+    pub born_ns: i64,
+}
+
+/// What one scan said of a track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    /// A detection was taken.
+    pub hit: bool,
+    /// ln Λ of this scan.
+    pub log_ratio: f64,
+}
+
+/// What becomes of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It lives on.
+    Keep,
+    /// It is given up.
+    Delete,
+}
+
+impl LifeConfig {
+    /// Life at the start of a track from `n_points` detections (1 or 2).
+    pub fn begin(&self, n_points: u32, now_ns: i64) -> Life {
+        let value = match self {
+            Self::MOfN(_) => 0.0,
+            Self::Score(c) => c.birth_to_clutter.ln(),
+            Self::Existence(c) => c.birth_probability,
+        };
+        let mut life = Life {
+            history: (1 << n_points) - 1,
+            entries: n_points as u8,
+            confirmed: false,
+            misses: 0,
+            value,
+            best: value,
+            last_hit_ns: now_ns,
+            born_ns: now_ns,
+        };
+        if let Self::MOfN(c) = self {
+            life.confirmed = c.hits <= n_points;
+        }
+        life
+    }
+
+    /// Existence before the detections of a scan are seen: it fades over `dt_s`.
+    #[inline]
+    pub fn fade(&self, life: &mut Life, dt_s: f64) {
+        if let Self::Existence(c) = self {
+            life.value *= (-dt_s / c.mean_life_s).exp();
+        }
+    }
+
+    /// Existence probability that weighs in the association: ψ, or 1 where the method has none.
+    #[inline]
+    pub fn existence(&self, life: &Life) -> f64 {
+        match self {
+            Self::Existence(_) => life.value.clamp(1e-12, 1.0 - 1e-12),
+            _ => 1.0,
+        }
+    }
+
+    /// Confidence of a track, 0..=1.
+    pub fn confidence(&self, life: &Life) -> f32 {
+        match self {
+            Self::MOfN(c) => {
+                let n = u32::from(life.entries).min(c.scans).max(1);
+                (life.history & low_bits(n)).count_ones() as f32 / n as f32
+            }
+            Self::Score(_) => (1.0 / (1.0 + (-life.value).exp())) as f32,
+            Self::Existence(_) => life.value as f32,
+        }
+    }
+
+    /// Takes the evidence of a scan and says whether the track lives on; the coasting budget is the tracker's.
+    pub fn advance(&self, life: &mut Life, evidence: Evidence, now_ns: i64) -> Verdict {
+        life.history = (life.history << 1) | u64::from(evidence.hit);
+        life.entries = life.entries.saturating_add(1).min(64);
+        if evidence.hit {
+            life.misses = 0;
+            life.last_hit_ns = now_ns;
+        } else {
+            life.misses = life.misses.saturating_add(1);
+        }
+        match self {
+            Self::MOfN(c) => {
+                if life.confirmed {
+                    return Verdict::Keep;
+                }
+                let entries = u32::from(life.entries);
+                let hits = (life.history & low_bits(c.scans)).count_ones();
+                if hits >= c.hits && entries >= c.hits {
+                    life.confirmed = true;
+                    return Verdict::Keep;
+                }
+                let late = (now_ns.saturating_sub(life.born_ns)) as f64 * 1e-9 > c.tentative_s;
+                if entries >= c.scans || hits + (c.scans - entries) < c.hits || late {
+                    return Verdict::Delete;
+                }
+            }
+            Self::Score(c) => {
+                life.value += evidence.log_ratio;
+                life.best = life.best.max(life.value);
+                let (alpha, beta) = (c.false_confirm_probability, c.true_delete_probability);
+                if !life.confirmed {
+                    if life.value >= ((1.0 - beta) / alpha).ln() {
+                        life.confirmed = true;
+                        life.best = life.value;
+                    } else if life.value <= (beta / (1.0 - alpha)).ln() + c.birth_to_clutter.ln() {
+                        return Verdict::Delete;
+                    }
+                } else if life.best - life.value > c.max_drop {
+                    return Verdict::Delete;
+                }
+                // A long good past must not carry a lost track for as long again.
+                life.best = life.best.min(1e3);
+                life.value = life.value.min(1e3);
+            }
+            Self::Existence(c) => {
+                // ψ ← ψ Λ / (1 − ψ + ψ Λ), by odds so that nothing overflows.
+                let log_odds = (life.value / (1.0 - life.value).max(1e-15)).ln() + evidence.log_ratio;
+                life.value = (1.0 / (1.0 + (-log_odds).exp())).clamp(1e-12, 1.0 - 1e-12);
+                if life.value >= c.confirm_probability {
+                    life.confirmed = true;
+                } else if life.value < c.delete_probability {
+                    return Verdict::Delete;
+                }
+            }
+        }
+        Verdict::Keep
+    }
+}
+
+fn low_bits(n: u32) -> u64 {
+    if n >= 64 { u64::MAX } else { (1 << n) - 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(config: &LifeConfig, points: u32, hits: &[bool]) -> Vec<(bool, Verdict)> {
+        let mut life = config.begin(points, 0);
+        hits.iter()
+            .map(|h| {
+                let e = Evidence { hit: *h, log_ratio: if *h { 3.0 } else { 0.11_f64.ln() } };
+                let v = config.advance(&mut life, e, 0);
+                (life.confirmed, v)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn three_of_five_confirms_at_the_third_hit_and_gives_up_when_it_cannot_be_reached() {
+        let c = LifeConfig::default();
+        assert_eq!(run(&c, 2, &[false, true]), [(false, Verdict::Keep), (true, Verdict::Keep)]);
+        let all_missed = run(&c, 2, &[false, false, false]);
+        assert_eq!(all_missed.last(), Some(&(false, Verdict::Delete)));
+        assert_eq!(run(&c, 1, &[false, false, false]).last(), Some(&(false, Verdict::Delete)));
+    }
+
+    #[test]
+    fn the_sequential_test_confirms_at_walds_threshold() {
+        // ln(0.99 / 0.001) = 6.898; from ln 0.1 = -2.303 four hits of 3 are needed (-2.303 + 12 = 9.697; three give 6.697).
+        let c = LifeConfig::Score(ScoreConfig::default());
+        let confirmed: Vec<bool> = run(&c, 1, &[true; 5]).iter().map(|s| s.0).collect();
+        assert_eq!(confirmed, [false, false, false, true, true]);
+    }
+
+    #[test]
+    fn existence_follows_bayes() {
+        let c = LifeConfig::Existence(ExistenceConfig::default());
+        let mut life = c.begin(1, 0);
+        c.advance(&mut life, Evidence { hit: true, log_ratio: 8f64.ln() }, 0);
+        // 0.2 * 8 / (0.8 + 0.2 * 8) = 2/3.
+        assert!((life.value - 2.0 / 3.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,47 @@
+//! The usual interval between scans, learnt from the time stamps: the median of the last nine.
+//!
+//! Budgets are in seconds; the interval only says what a scan is when a budget has a floor in scans, and keeps a gap
+//! (dropped frames, an hour's pause) from being taken for one.
+
+const KEPT: usize = 9;
+
+/// The usual interval between scans.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pace {
+    recent: [f64; KEPT],
+    n: usize,
+    next: usize,
+    median_s: f64,
+}
+
+impl Pace {
+    /// Takes the newest interval, s.
+    pub fn note(&mut self, dt_s: f64) {
+        self.recent[self.next] = dt_s;
+        self.next = (self.next + 1) % KEPT;
+        self.n = (self.n + 1).min(KEPT);
+        let mut sorted = self.recent;
+        let sorted = &mut sorted[..self.n];
+        sorted.sort_unstable_by(f64::total_cmp);
+        self.median_s = sorted[(self.n - 1) / 2];
+    }
+
+    /// The usual interval, s; 0 before two scans were seen.
+    pub fn interval_s(&self) -> f64 {
+        self.median_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_hours_pause_does_not_change_the_pace() {
+        let mut pace = Pace::default();
+        for dt in [0.04, 0.04, 0.08, 0.04, 3600.0, 0.04] {
+            pace.note(dt);
+        }
+        assert_eq!(pace.interval_s(), 0.04);
+    }
+}
