@@ -34,7 +34,7 @@ impl Timestamp {
 
     /// Returns the time in seconds.
     pub fn as_secs_f64(self) -> f64 {
-        self.ns as f64 * 1e-9
+        self.ns as f64 / 1e9
     }
 
     /// Returns `self - earlier` in seconds (negative if `self` is the earlier one).

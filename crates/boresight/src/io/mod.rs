@@ -1,20 +1,26 @@
 //! Frames and tables in and out: images, video, CSV, MOTChallenge.
 
 mod folder;
+mod gif_frames;
 mod natural;
 mod open;
 mod pixels;
+mod raw;
 mod sniff;
 mod still;
 pub mod tables;
 mod tiff_count;
 mod tiff_pages;
+mod y4m;
 
 pub use folder::ImageFiles;
+pub use gif_frames::GifFrames;
 pub use natural::natural_order;
 pub use open::open;
 pub use pixels::gray_of_rgb8;
+pub use raw::RawFrames;
 pub use tables::{AtomicFile, DetectionsCsv, JsonLines, MotWriter, Output, TracksCsv};
+pub use y4m::Y4m;
 
 use crate::{Error, ErrorKind, Result};
 

@@ -2,10 +2,14 @@
 
 use super::OpenOptions;
 use super::folder::ImageFiles;
+use super::gif_frames::GifFrames;
 use super::natural::natural_order;
+use super::raw::RawFrames;
 use super::sniff::{self, Format, sniff};
+use super::y4m::Y4m;
 use crate::{Error, ErrorKind, FrameSource, Result};
 use std::fs::File;
+use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// Opens a sequence of frames.
@@ -26,7 +30,10 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
     }
     let path = Path::new(input);
     if path.is_dir() {
-        return Ok(Box::new(ImageFiles::open(input, list_folder(path)?, options)?));
+        if let Some(format) = options.raw {
+            return Ok(Box::new(RawFrames::files(input, list_folder(path, |_| true)?, format, options)?));
+        }
+        return Ok(Box::new(ImageFiles::open(input, list_folder(path, has_image_name)?, options)?));
     }
     if path.exists() {
         return open_file(input, path, options);
@@ -40,14 +47,21 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
 }
 
 fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if let Some(format) = options.raw {
+        return Ok(Box::new(RawFrames::files(input, vec![path.to_path_buf()], format, options)?));
+    }
     let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be read").at(input).because(e);
     let mut file = File::open(path).map_err(cannot)?;
+    let data = file.metadata().map_err(cannot)?;
     let head = sniff::read_up_to(&mut file, sniff::SNIFF_BYTES).map_err(cannot)?;
+    let whole = BufReader::new(Cursor::new(head.clone()).chain(file));
     match sniff(&head) {
         Format::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
         Format::Text => Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
             .at(input)
             .hint("a table of detections goes to 'boresight track' as it is, and needs no frames")),
+        Format::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
+        Format::Gif => Ok(Box::new(GifFrames::open(input, whole, options)?)),
         format if format.is_image() && format != Format::Apng => {
             Ok(Box::new(ImageFiles::open(input, vec![path.to_path_buf()], options)?))
         }
@@ -55,8 +69,24 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
     }
 }
 
-fn open_stdin(_options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    Err(Error::new(ErrorKind::Unsupported, "standard input is not read yet"))
+/// Standard input: raw frames if their layout is given, else YUV4MPEG2 or GIF.
+fn open_stdin(options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    const LABEL: &str = "standard input";
+    let mut input = BufReader::with_capacity(1 << 20, std::io::stdin());
+    if let Some(format) = options.raw {
+        return Ok(Box::new(RawFrames::stream(LABEL, Box::new(input), format, options)));
+    }
+    let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be read").at(LABEL).because(e);
+    let head = sniff::read_up_to(&mut input, sniff::SNIFF_BYTES).map_err(cannot)?;
+    let whole = BufReader::new(Cursor::new(head.clone()).chain(input));
+    match sniff(&head) {
+        Format::Y4m => Ok(Box::new(Y4m::open(LABEL, whole, None, options)?)),
+        Format::Gif => Ok(Box::new(GifFrames::open(LABEL, whole, options)?)),
+        Format::Empty => Err(Error::new(ErrorKind::Damaged, "nothing came (0 bytes)").at(LABEL)),
+        other => Err(Error::new(ErrorKind::Unsupported, format!("expected YUV4MPEG2, found {}", other.name()))
+            .at(LABEL)
+            .hint("pipe video in with: ffmpeg -i INPUT -f yuv4mpegpipe - | boresight track -; raw frames need their size and type")),
+    }
 }
 
 fn open_other(input: &str, _options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
@@ -64,7 +94,7 @@ fn open_other(input: &str, _options: &OpenOptions) -> Result<Box<dyn FrameSource
 }
 
 /// The image files of a folder in natural order; hidden files and other kinds are passed over.
-fn list_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+fn list_folder(folder: &Path, wanted: fn(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be read").at(folder.display()).because(e);
     let mut files = Vec::new();
     let mut folders = Vec::new();
@@ -76,7 +106,7 @@ fn list_folder(folder: &Path) -> Result<Vec<PathBuf>> {
         }
         if path.is_dir() {
             folders.push(path);
-        } else if has_image_name(&path) {
+        } else if wanted(&path) {
             files.push(path);
         }
     }
