@@ -17,6 +17,7 @@ pub mod report;
 pub mod sim;
 pub mod time;
 pub mod track;
+pub mod tracks;
 pub mod view;
 pub mod vision;
 
@@ -26,4 +27,5 @@ pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
 pub use record::{TrackId, TrackState, TrackStatus};
 pub use time::{FrameIndex, Timestamp};
+pub use tracks::{PixelOrigin, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};

@@ -11,6 +11,7 @@ mod still;
 pub mod tables;
 mod tiff_count;
 mod tiff_pages;
+pub mod tracks;
 mod y4m;
 
 pub use folder::ImageFiles;

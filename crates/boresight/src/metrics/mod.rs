@@ -1,1 +1,17 @@
 //! How good are tracks: image, state, consistency, set and multi-object measures; sees only records.
+//!
+//! [`evaluate`] gives CLEAR, identity and HOTA of a result against a truth; [`set`] the distances between sets of points.
+
+pub mod assignment;
+pub mod clear;
+pub mod hota;
+pub mod identity;
+pub mod multi_object;
+pub mod overlap;
+pub mod pairs;
+pub mod preprocess;
+pub mod set;
+
+pub use multi_object::{MatchOptions, Scores, evaluate};
+pub use overlap::Similarity;
+pub use preprocess::{KittiClass, Rules, preprocess};

@@ -1,4 +1,5 @@
 //! Integration tests: one binary, a module per matter.
 
 mod golden;
+mod metrics;
 mod rooms;

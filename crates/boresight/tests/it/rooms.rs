@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Leaf types, open to all.
-const LEAVES: [&str; 7] = ["image", "frame", "detection", "record", "view", "error", "time"];
+const LEAVES: [&str; 8] = ["image", "frame", "detection", "record", "tracks", "view", "error", "time"];
 
 /// room -> rooms it may use besides the leaves and itself.
 const ARROWS: [(&str, &[&str]); 9] = [

@@ -1,0 +1,136 @@
+//! MOTChallenge tables: frame, id, left, top, width, height, confidence, class, visibility (or x, y, z), counted from 1.
+//!
+//! Source: A. Milan et al., *MOT16: a benchmark for multi-object tracking*, arXiv 1603.00831, and the files themselves.
+//! In a truth, column 7 says whether the row counts; column 8 is a class in MOT16 and later and a world coordinate
+//! (or -1) in MOT15. In a result, column 7 is the confidence and the rest is -1.
+//! Limits: frames and pixels count from 1 in the file; [`PixelOrigin::Pixel1`] and frames from 0 in the table.
+
+use super::lines::{BadRows, Fields, ReadOptions, each_line, separator};
+use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
+use std::io::Write;
+use std::path::Path;
+
+/// Reads a table; rows may stand in any order.
+/// # Errors
+/// A missing file; a malformed row (file, line, column, what was expected) unless such rows are skipped.
+pub fn read(path: &Path, options: ReadOptions) -> Result<(TrackTable, BadRows)> {
+    let mut table = TrackTableBuilder::new(path.display().to_string(), PixelOrigin::Pixel1);
+    let mut bad = BadRows::default();
+    let mut comma = None;
+    if let Ok(meta) = std::fs::metadata(path) {
+        // About 40 bytes a row; a wrong guess only costs a move.
+        table.reserve((meta.len() / 48).min(1 << 24) as usize);
+    }
+    each_line(path, |number, line| {
+        if number == 1 || comma.is_none() {
+            comma = separator(line);
+        }
+        let pushed = row(Fields::new(line, comma)).and_then(|r| table.push(&r));
+        pushed.or_else(|e| bad.note(options, e.at(format!("{} line {number}", path.display()))))
+    })?;
+    Ok((table.finish(0)?, bad))
+}
+
+fn row(mut f: Fields<'_>) -> Result<TrackRow> {
+    let frame = f.integer("a frame number")?;
+    if !(1..=100_000_000).contains(&frame) {
+        let e = Error::new(ErrorKind::Damaged, format!("frame {frame}: expected a number from 1 to 100 000 000"));
+        return Err(if frame == 0 {
+            e.at("column 1").hint("MOTChallenge counts frames from 1; are these counted from 0?")
+        } else {
+            e.at("column 1")
+        });
+    }
+    let id = f.integer("a track id")?;
+    let mut bbox = [0.0; 4];
+    for (v, what) in bbox.iter_mut().zip(["a left edge", "a top edge", "a width", "a height"]) {
+        *v = f.number(what)?;
+    }
+    let score = f.optional("a confidence")?.unwrap_or(1.0);
+    let class = f.optional("a class")?;
+    let visibility = f.optional("a visible share")?;
+    // MOT15 holds world coordinates (or -1) here: not a class.
+    let class = class.filter(|c| (1.0..=1e6).contains(c) && c.fract() == 0.0);
+    Ok(TrackRow {
+        frame: (frame - 1) as u32,
+        id,
+        bbox,
+        score,
+        class: class.map_or(1, |c| c as i32),
+        visibility: visibility.filter(|v| (0.0..=1.0).contains(v) && class.is_some()).unwrap_or(1.0),
+        ..TrackRow::default()
+    })
+}
+
+/// Writes a table as a truth (`truth`: class and visibility in columns 8 and 9) or as a result (-1 there).
+/// # Errors
+/// What the writer fails with.
+pub fn write(table: &TrackTable, truth: bool, out: &mut impl Write) -> Result<()> {
+    let mut table = std::borrow::Cow::Borrowed(table);
+    if table.origin != PixelOrigin::Pixel1 {
+        table.to_mut().set_origin(PixelOrigin::Pixel1);
+    }
+    let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
+    for frame in 0..table.n_frames() {
+        for r in table.rows(frame) {
+            let [l, t, w, h] = table.boxes[r];
+            let id = table.ids[table.tracks[r] as usize];
+            write!(out, "{},{id},{l},{t},{w},{h},{}", frame + 1, table.score.get(r)).map_err(failed)?;
+            if truth {
+                writeln!(out, ",{},{}", table.class.get(r), table.visibility.get(r)).map_err(failed)?;
+            } else {
+                writeln!(out, ",-1,-1,-1").map_err(failed)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(text: &str) -> tempfile::NamedTempFile {
+        let f = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(f.path(), text).unwrap();
+        f
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let f = file("2,5,10.25,20,30,40.5,0,8,0.25\n1,7,1,1,3,3,1,1,1\n");
+        let (t, _) = read(f.path(), ReadOptions::default()).unwrap();
+        assert_eq!(
+            (t.ids.as_slice(), t.n_frames(), t.class.get(1), t.visibility.get(1)),
+            ([5, 7].as_slice(), 2, 8, 0.25)
+        );
+        let mut out = Vec::new();
+        write(&t, true, &mut out).unwrap();
+        let again = file(std::str::from_utf8(&out).unwrap());
+        let (mut u, _) = read(again.path(), ReadOptions::default()).unwrap();
+        u.label = t.label.clone();
+        assert_eq!(t, u);
+    }
+
+    #[test]
+    fn a_malformed_row_is_named_by_line_and_column_or_counted() {
+        let f = file("1,1,1,1,5,5,1\n1,2,1,x,5,5,1\n");
+        let e = read(f.path(), ReadOptions::default()).unwrap_err().to_string();
+        assert!(e.contains("line 2: column 4: expected a top edge, found \"x\""), "{e}");
+        let (t, bad) = read(f.path(), ReadOptions { skip_bad_rows: true, ..ReadOptions::default() }).unwrap();
+        assert_eq!((t.n_rows(), bad.count), (1, 1));
+    }
+
+    #[test]
+    fn frame_zero_is_refused_with_the_likely_cause() {
+        let f = file("0,1,1,1,5,5,1\n");
+        assert!(read(f.path(), ReadOptions::default()).unwrap_err().to_string().contains("column 1"));
+    }
+
+    #[test]
+    fn world_coordinates_of_mot15_are_no_class() {
+        let f = file("1,1,1,1,5,5,1,-3.5,14.2,0\n1,2,1,1,5,5,1,-1,-1,-1\n");
+        let (t, _) = read(f.path(), ReadOptions::default()).unwrap();
+        assert_eq!((t.class.get(0), t.class.get(1), t.visibility.get(0)), (1, 1, 1.0));
+    }
+}

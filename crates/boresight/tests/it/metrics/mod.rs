@@ -1,0 +1,3 @@
+//! Evaluation against independent references: TrackEval, py-motmetrics, Stone Soup.
+
+mod real_sequences;
