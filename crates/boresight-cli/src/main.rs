@@ -2,6 +2,8 @@
 
 mod commands;
 mod exit;
+#[allow(dead_code)] // used by simulate
+mod frame_writer;
 #[allow(dead_code)] // used by the commands that follow
 mod progress;
 

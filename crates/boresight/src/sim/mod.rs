@@ -1,1 +1,20 @@
-//! Simulated scenes: targets, noise, background, radar; never sees the tracker.
+//! Simulated scenes: targets, noise, background, sensors, radar; never sees the tracker.
+//!
+//! A [`SceneConfig`] (from TOML or by [`named`] name) builds a [`SceneSource`], which is a [`crate::FrameSource`] and knows the
+//! truth of the frame it handed out last. Nothing is held but one frame: scenes of any length stream. The same seed gives the
+//! same bits on every machine of the architecture and for any number of threads.
+
+mod draw;
+pub mod motion;
+pub mod named;
+pub mod random;
+pub mod render;
+pub mod scene;
+mod source;
+
+pub use motion::MotionConfig;
+pub use named::named;
+pub use random::{LevelNoise, LevelTable, Seed};
+pub use render::{PaperTarget, quantise, render_from_normals};
+pub use scene::SceneConfig;
+pub use source::SceneSource;

@@ -1,0 +1,110 @@
+//! Writes frames: a folder of PNG or PGM files, or one YUV4MPEG2 stream (a file or standard output).
+//!
+//! Files are named `frame_000000.png` by the frame's number; 16-bit frames keep their values (PGM: big end first, as the format asks).
+
+use boresight::{Error, ErrorKind, Frame, Pixels, SourceInfo};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// How frames are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FrameFormat {
+    /// A folder of PNG files (8 or 16 bit grey).
+    Png,
+    /// A folder of PGM files (8 or 16 bit grey).
+    Pgm,
+    /// One YUV4MPEG2 file (8 bit grey), which carries the frame rate.
+    Y4m,
+}
+
+/// An open output for frames.
+pub enum FrameWriter {
+    /// A folder and the format of its files.
+    Folder(PathBuf, FrameFormat),
+    /// A YUV4MPEG2 stream.
+    Stream(Box<dyn Write>),
+}
+
+fn output_error(path: &Path, e: std::io::Error) -> Error {
+    Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e)
+}
+
+impl FrameWriter {
+    /// Opens `dir/frames/` or `dir/frames.y4m`.
+    pub fn create(dir: &Path, format: FrameFormat, info: &SourceInfo) -> boresight::Result<Self> {
+        if format == FrameFormat::Y4m {
+            let path = dir.join("frames.y4m");
+            let file = File::create(&path).map_err(|e| output_error(&path, e))?;
+            return Self::stream(Box::new(BufWriter::with_capacity(1 << 20, file)), info);
+        }
+        let path = dir.join("frames");
+        std::fs::create_dir_all(&path).map_err(|e| output_error(&path, e))?;
+        Ok(Self::Folder(path, format))
+    }
+
+    /// Starts a YUV4MPEG2 stream.
+    pub fn stream(mut out: Box<dyn Write>, info: &SourceInfo) -> boresight::Result<Self> {
+        if info.kind != boresight::PixelKind::Gray8 {
+            return Err(Error::new(ErrorKind::Config, "YUV4MPEG2 holds 8-bit frames, these have more bits")
+                .at("--format y4m")
+                .hint("take --format png"));
+        }
+        // Rates are written as a fraction of thousandths.
+        let rate = (info.rate_hz.unwrap_or(25.0) * 1000.0).round().max(1.0) as u64;
+        let header = format!("YUV4MPEG2 W{} H{} F{rate}:1000 Ip A1:1 Cmono\n", info.width, info.height);
+        out.write_all(header.as_bytes()).map_err(|e| output_error(Path::new("frames.y4m"), e))?;
+        Ok(Self::Stream(out))
+    }
+
+    /// Writes one frame.
+    pub fn put(&mut self, frame: &Frame) -> boresight::Result<()> {
+        let (w, h) = (frame.pixels.width(), frame.pixels.height());
+        match self {
+            Self::Stream(out) => {
+                let Pixels::Gray8(image) = &frame.pixels else {
+                    return Err(
+                        Error::new(ErrorKind::Unsupported, "YUV4MPEG2 holds 8-bit grey frames").at("frames.y4m")
+                    );
+                };
+                let written = out.write_all(b"FRAME\n").and_then(|()| out.write_all(image.as_slice()));
+                written.map_err(|e| output_error(Path::new("frames.y4m"), e))
+            }
+            Self::Folder(dir, format) => {
+                let (sixteen, bytes) = match &frame.pixels {
+                    Pixels::Gray8(i) => (false, i.as_slice().to_vec()),
+                    Pixels::Gray16(i) => (true, i.as_slice().iter().flat_map(|v| v.to_be_bytes()).collect()),
+                    _ => {
+                        return Err(Error::new(ErrorKind::Unsupported, "only grey frames of 8 or 16 bit are written")
+                            .at(dir.display()));
+                    }
+                };
+                let extension = if *format == FrameFormat::Pgm { "pgm" } else { "png" };
+                let path = dir.join(format!("frame_{:06}.{extension}", frame.index.0));
+                let fail = |e| output_error(&path, e);
+                let mut file = BufWriter::new(File::create(&path).map_err(fail)?);
+                if *format == FrameFormat::Pgm {
+                    let max = if sixteen { 65535 } else { 255 };
+                    file.write_all(format!("P5\n{w} {h}\n{max}\n").as_bytes()).map_err(fail)?;
+                    file.write_all(&bytes).map_err(fail)?;
+                } else {
+                    let mut encoder = png::Encoder::new(&mut file, w as u32, h as u32);
+                    encoder.set_color(png::ColorType::Grayscale);
+                    encoder.set_depth(if sixteen { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
+                    encoder.set_compression(png::Compression::Fast);
+                    let written = encoder.write_header().and_then(|mut w| w.write_image_data(&bytes));
+                    written.map_err(|e| output_error(&path, std::io::Error::other(e)))?;
+                }
+                file.flush().map_err(fail)
+            }
+        }
+    }
+
+    /// Ends the output.
+    pub fn finish(self) -> boresight::Result<()> {
+        match self {
+            Self::Stream(mut out) => out.flush().map_err(|e| output_error(Path::new("frames.y4m"), e)),
+            Self::Folder(..) => Ok(()),
+        }
+    }
+}
