@@ -10,6 +10,8 @@
 use super::config::ClusterConfig;
 use super::pixel::Pixel;
 use super::region::Region;
+use super::threshold::band::{band_bits, words};
+use crate::Image;
 
 /// A horizontal run of set pixels.
 #[derive(Clone, Copy, Debug)]
@@ -160,6 +162,45 @@ impl Clusterer {
     }
 }
 
+/// Returns the regions of the pixels with `low` <= value <= `high` of a whole image.
+///
+/// SPEC, worked example W5 (its coordinates count from 1):
+/// ```
+/// use boresight::{Image, vision::cluster::segment};
+/// use boresight::vision::{config::{CentroidMethod, ClusterConfig}, centroid::{Surroundings, centroid}};
+/// let image = Image::from_vec(6, 6, vec![
+///     95u8, 100, 20, 30, 105, 40,   98, 60, 20, 97, 10, 40,     30, 20, 99, 20, 10, 108,
+///     10, 101, 10, 20, 200, 90,     10, 20, 30, 110, 20, 30,    94, 20, 111, 89, 20, 103,
+/// ]).unwrap();
+/// let sizes = |distance_px, inclusive| {
+///     let config = ClusterConfig { distance_px, inclusive, ..Default::default() };
+///     segment(&image, 90, 110, &config).iter().map(|r| r.area).collect::<Vec<_>>()
+/// };
+/// assert_eq!(sizes(1.0, false), [1; 12]);
+/// assert_eq!(sizes(1.0, true), [3, 1, 1, 1, 2, 1, 1, 1, 1]);
+/// assert_eq!(sizes(1.5, false), [3, 4, 2, 1, 1, 1]);
+/// assert_eq!(sizes(2.0, false), [3, 4, 2, 1, 1, 1]);
+/// assert_eq!(sizes(2.0, true), [3, 4, 3, 1, 1]);
+/// assert_eq!(sizes(3.0, false), [12]);
+///
+/// let plain = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
+/// let regions = segment(&image, 90, 110, &ClusterConfig::default());
+/// let mask = centroid(&regions[0], &image, CentroidMethod::Mask, &plain).position.add_scalar(1.0);
+/// assert!((mask.x - 1.3412969283276).abs() < 1e-12 && (mask.y - 1.3344709897611).abs() < 1e-12);
+/// let bbox = centroid(&regions[0], &image, CentroidMethod::Bbox, &plain).position.add_scalar(1.0);
+/// assert!((bbox.x - 1.4532577903683).abs() < 1e-12 && (bbox.y - 1.4475920679887).abs() < 1e-12);
+/// ```
+pub fn segment<T: Pixel>(image: &Image<T>, low: T, high: T, config: &ClusterConfig) -> Vec<Region> {
+    let mut clusters = Clusterer::new(config);
+    clusters.begin(image.width());
+    let mut bits = vec![0; words(image.width())];
+    for y in 0..image.height() {
+        band_bits(image.row(y), low, high, &mut bits);
+        clusters.row(y, &bits, image.row(y));
+    }
+    clusters.regions().cloned().collect()
+}
+
 /// Calls `run(start, last)` for every run of set bits, from the left.
 fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
     let mut open: Option<u32> = None;
@@ -198,6 +239,69 @@ fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    /// Clusters by comparing all pairs of set pixels: area, Σx, Σy and first pixel of each, in raster order.
+    fn brute(image: &Image<u8>, distance_px: f64, inclusive: bool) -> Vec<(u32, f64, f64, u32, u32)> {
+        let set: Vec<(i64, i64)> = (0..image.height())
+            .flat_map(|y| (0..image.width()).map(move |x| (x as i64, y as i64)))
+            .filter(|&(x, y)| image.row(y as usize)[x as usize] > 0)
+            .collect();
+        let mut label: Vec<usize> = (0..set.len()).collect();
+        for i in 0..set.len() {
+            for j in 0..i {
+                let d = (((set[i].0 - set[j].0).pow(2) + (set[i].1 - set[j].1).pow(2)) as f64).sqrt();
+                if (if inclusive { d <= distance_px } else { d < distance_px }) && label[i] != label[j] {
+                    let (a, b) = (label[i], label[j]);
+                    label.iter_mut().filter(|l| **l == a.max(b)).for_each(|l| *l = a.min(b));
+                }
+            }
+        }
+        let mut out = Vec::new();
+        for k in 0..set.len() {
+            let members: Vec<_> = (0..set.len()).filter(|&i| label[i] == k).map(|i| set[i]).collect();
+            if let Some(first) = members.first() {
+                let sum = |f: fn(&(i64, i64)) -> i64| members.iter().map(f).sum::<i64>() as f64;
+                out.push((members.len() as u32, sum(|p| p.0), sum(|p| p.1), first.0 as u32, first.1 as u32));
+            }
+        }
+        out
+    }
+
+    fn distance() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            3 => 0.2f64..9.0,
+            // Distances that pixels really have: where < and <= differ.
+            2 => (0u32..6, 0u32..6).prop_filter("not zero", |p| *p != (0, 0)).prop_map(|(a, b)| f64::from(a * a + b * b).sqrt()),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        #[test]
+        fn clusters_are_those_of_all_pairs_of_pixels(
+            width in prop_oneof![1usize..12, 60usize..70, Just(129usize)],
+            height in 1usize..9,
+            share in 1u8..=255,
+            seed in any::<u64>(),
+            distance_px in distance(),
+            inclusive in any::<bool>(),
+        ) {
+            // A cheap generator of pixels; proptest's own vectors are slow for whole images.
+            let mut state = seed | 1;
+            let data = (0..width * height).map(|_| {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                u8::from(((state >> 32) as u8) < share / if width > 20 { 8 } else { 1 })
+            }).collect();
+            let image = Image::from_vec(width, height, data).unwrap();
+            let config = ClusterConfig { distance_px, inclusive, ..Default::default() };
+            let ours: Vec<_> =
+                segment(&image, 1, 255, &config).iter().map(|r| (r.area, r.x, r.y, r.first, r.top)).collect();
+            prop_assert_eq!(ours, brute(&image, distance_px, inclusive));
+        }
+    }
 
     #[test]
     fn the_reach_gives_the_neighbour_sets_of_the_specification() {

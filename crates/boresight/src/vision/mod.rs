@@ -7,11 +7,15 @@ pub mod centroid;
 pub mod cluster;
 pub mod config;
 pub mod detector;
+pub mod llr;
 pub mod noise_level;
 pub mod pixel;
+pub mod probability;
 pub mod region;
 pub mod spatial;
+pub mod tbd;
 pub mod threshold;
+pub mod window;
 
 pub use config::DetectorConfig;
 pub use detector::build;

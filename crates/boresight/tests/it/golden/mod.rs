@@ -6,6 +6,7 @@
 mod sim;
 mod spatial;
 mod track;
+mod vision;
 
 use serde_json::Value;
 use std::path::PathBuf;

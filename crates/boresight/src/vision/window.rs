@@ -1,0 +1,94 @@
+//! The box of a dark target and the window to look for it in the next frame.
+//!
+//! Source: SPEC I.2, I.3, I.6 (0-based pixels). One stray dark pixel ruins a box that is taken over a whole frame, so the
+//! box is taken inside a window around the predicted centre. Δ = d(t-1) - d(t-2), the last displacement per axis.
+
+use super::pixel::Pixel;
+use super::probability::PixelRect;
+use crate::Image;
+use nalgebra::Vector2;
+
+impl PixelRect {
+    /// The whole image, or `None` for an empty one.
+    pub fn of_image<T: Copy>(image: &Image<T>) -> Option<Self> {
+        Some(Self { left: 0, top: 0, right: image.width().checked_sub(1)?, bottom: image.height().checked_sub(1)? })
+    }
+
+    /// Middle, px.
+    pub fn centre(&self) -> Vector2<f64> {
+        Vector2::new((self.left + self.right) as f64 / 2.0, (self.top + self.bottom) as f64 / 2.0)
+    }
+
+    /// Half the differences of the sides, px.
+    pub fn semi_size(&self) -> Vector2<f64> {
+        Vector2::new((self.right - self.left) as f64 / 2.0, (self.bottom - self.top) as f64 / 2.0)
+    }
+}
+
+/// Returns the smallest box around all pixels of `window` with value <= `level` (or < if `exclusive`); `None` without any.
+pub fn dark_box<T: Pixel>(image: &Image<T>, level: f64, exclusive: bool, window: PixelRect) -> Option<PixelRect> {
+    let dark = |p: &T| if exclusive { p.value() < level } else { p.value() <= level };
+    let mut found: Option<PixelRect> = None;
+    for y in window.top..=window.bottom.min(image.height().checked_sub(1)?) {
+        let row = image.row(y);
+        let part = row.get(window.left..=window.right.min(row.len().checked_sub(1)?))?;
+        let Some(first) = part.iter().position(dark) else { continue };
+        let last = part.iter().rposition(dark).unwrap_or(first);
+        let (left, right) = (window.left + first, window.left + last);
+        let all = found.get_or_insert(PixelRect { left, top: y, right, bottom: y });
+        all.left = all.left.min(left);
+        all.right = all.right.max(right);
+        all.bottom = y;
+    }
+    found
+}
+
+/// Returns the window to search: half sizes = the box's + |Δ| + margin around the prediction, clipped to the image.
+///
+/// `None` if it lies wholly outside.
+pub fn search_window(
+    predicted: Vector2<f64>,
+    semi_size: Vector2<f64>,
+    displacement: Vector2<f64>,
+    margin_px: f64,
+    (width, height): (usize, usize),
+) -> Option<PixelRect> {
+    let side = |axis: usize, n: usize| {
+        let half = semi_size[axis] + displacement[axis].abs() + margin_px;
+        let (low, high) = ((predicted[axis] - half).floor(), (predicted[axis] + half).ceil());
+        // Casts saturate; NaN fails the comparison.
+        (low <= high && high >= 0.0 && low < n as f64 && n > 0)
+            .then(|| (low.max(0.0) as usize, (high as usize).min(n - 1)))
+    };
+    let ((left, right), (top, bottom)) = (side(0, width)?, side(1, height)?);
+    Some(PixelRect { left, top, right, bottom })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stray_dark_pixel_outside_the_window_does_not_count() {
+        let mut image = Image::filled(20, 20, 200u8);
+        image.row_mut(0)[0] = 10;
+        image.row_mut(10)[11] = 10;
+        image.row_mut(11)[12] = 150;
+        let window =
+            search_window(Vector2::new(11.0, 11.0), Vector2::new(1.0, 1.0), Vector2::zeros(), 2.0, (20, 20)).unwrap();
+        assert_eq!(window, PixelRect { left: 8, top: 8, right: 14, bottom: 14 });
+        let found = dark_box(&image, 150.0, false, window).unwrap();
+        assert_eq!((found.centre(), found.semi_size()), (Vector2::new(11.5, 10.5), Vector2::new(0.5, 0.5)));
+        // the text's "less than 150" leaves the pixel on the level out.
+        assert_eq!(dark_box(&image, 150.0, true, window).unwrap().centre(), Vector2::new(11.0, 10.0));
+        assert_eq!(dark_box(&image, 150.0, false, PixelRect::of_image(&image).unwrap()).unwrap().left, 0);
+    }
+
+    #[test]
+    fn a_window_outside_the_image_is_none() {
+        let away = |x: f64| search_window(Vector2::new(x, 3.0), Vector2::zeros(), Vector2::zeros(), 1.0, (10, 10));
+        assert!(away(-5.0).is_none() && away(12.0).is_none() && away(f64::NAN).is_none());
+        assert_eq!(away(10.5).unwrap().left, 9);
+        assert!(search_window(Vector2::zeros(), Vector2::zeros(), Vector2::zeros(), 1.0, (0, 4)).is_none());
+    }
+}
