@@ -202,7 +202,7 @@ pub fn segment<T: Pixel>(image: &Image<T>, low: T, high: T, config: &ClusterConf
 }
 
 /// Calls `run(start, last)` for every run of set bits, from the left.
-fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
+pub(crate) fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
     let mut open: Option<u32> = None;
     for (w, &word) in bits.iter().enumerate() {
         let base = w as u32 * 64;

@@ -3,6 +3,7 @@
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
 use super::config::{DetectorConfig, NoiseConfig, Weight};
+use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
 use super::threshold::band::{band_bits, words};
@@ -37,6 +38,7 @@ struct ThresholdDetector {
     bright: Clusterer,
     dark: Clusterer,
     samples: Vec<f32>,
+    isolated: IsolatedDetector,
 }
 
 impl ThresholdDetector {
@@ -55,6 +57,7 @@ impl ThresholdDetector {
             bright: Clusterer::new(&config.cluster),
             dark: Clusterer::new(&config.cluster),
             samples: Vec::new(),
+            isolated: IsolatedDetector::default(),
             config,
         }
     }
@@ -68,12 +71,17 @@ impl ThresholdDetector {
                 ThresholdConfig::Band(_) => false,
                 ThresholdConfig::Level(LevelConfig { side, .. }) => *side == Side::Dark,
                 ThresholdConfig::Otsu(c) => c.side == Side::Dark,
-                ThresholdConfig::Local(_) => true,
+                ThresholdConfig::Local(_) | ThresholdConfig::Isolated(_) => true,
             },
         }
     }
 
     fn run<T: Pixel>(&mut self, image: &Image<T>, scan: &mut Scan) {
+        if let ThresholdConfig::Isolated(c) = &self.config.threshold {
+            self.isolated.run(image, &self.config, c, scan);
+            keep_strongest(&mut scan.detections, self.config.max_detections);
+            return;
+        }
         let above_background = self.above_background();
         if above_background || matches!(self.config.threshold, ThresholdConfig::Local(_)) {
             self.grid.refresh(image);
@@ -92,6 +100,8 @@ impl ThresholdDetector {
                     one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
                 }
             }
+            // Ran above: its rows are swept once a level.
+            ThresholdConfig::Isolated(_) => {}
             ThresholdConfig::Local(c) => {
                 for y in 0..image.height() {
                     let row = image.row(y);

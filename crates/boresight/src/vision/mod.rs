@@ -7,6 +7,7 @@ pub mod centroid;
 pub mod cluster;
 pub mod config;
 pub mod detector;
+pub mod isolated;
 pub mod llr;
 pub mod noise_level;
 pub mod pixel;

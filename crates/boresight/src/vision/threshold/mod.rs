@@ -6,6 +6,7 @@ pub mod local;
 pub mod otsu;
 
 use super::config::wrong;
+use super::isolated::IsolatedConfig;
 use crate::Result;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,8 @@ pub enum ThresholdConfig {
     Otsu(OtsuConfig),
     /// Values that stand out from their local background by k robust standard deviations.
     Local(LocalConfig),
+    /// Closed blobs of any size that stand clear of the ring around them.
+    Isolated(IsolatedConfig),
 }
 
 impl Default for ThresholdConfig {
@@ -152,6 +155,7 @@ impl ThresholdConfig {
                 }
             }
             Self::Otsu(_) => {}
+            Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Local(c) => {
                 if !(c.k > 0.0 && c.k.is_finite()) {
                     return Err(wrong(

@@ -1,0 +1,125 @@
+//! The ring around a blob's box: a plane through it, the spread about the plane, and how far the blob stands clear.
+//!
+//! The ring begins one pixel outside the box (blurred edges) and is as wide as half the blob, at least 3 px. Large rings are
+//! sampled evenly with at most about 600 pixels. The plane takes a gradient of the sky or of the optics out.
+
+use super::Candidate;
+use super::sweep::{Blob, band};
+use crate::Image;
+use crate::vision::pixel::Pixel;
+use crate::vision::threshold::Side;
+use nalgebra::{Matrix3, Vector3};
+
+const MAX_SAMPLES: f64 = 600.0;
+const MIN_SAMPLES: usize = 8;
+
+/// Scratch of the ring's samples.
+#[derive(Debug, Default)]
+pub struct Ring {
+    /// x, y from the blob's middle, value.
+    samples: Vec<(f64, f64, f64)>,
+    residuals: Vec<f64>,
+}
+
+impl Ring {
+    /// Compares a blob with its surroundings; `None` if there are too few of them or the blob does not stand clear.
+    pub fn judge<T: Pixel>(
+        &mut self,
+        image: &Image<T>,
+        side: Side,
+        level: f64,
+        blob: &Blob,
+        noise: f64,
+    ) -> Option<Candidate> {
+        let sign = if side == Side::Bright { 1.0 } else { -1.0 };
+        let (w, h) = (blob.right - blob.left + 1, blob.bottom - blob.top + 1);
+        let margin = (w.max(h) / 2).max(3) as usize;
+        let inner = (blob.left as usize - 1, blob.top as usize - 1, blob.right as usize + 1, blob.bottom as usize + 1);
+        let x0 = inner.0.saturating_sub(margin);
+        let y0 = inner.1.saturating_sub(margin);
+        let x1 = (inner.2 + margin).min(image.width() - 1);
+        let y1 = (inner.3 + margin).min(image.height() - 1);
+        let (cx, cy) = (f64::from(blob.left + blob.right) / 2.0, f64::from(blob.top + blob.bottom) / 2.0);
+        if !self.closed(image, side, level, [x0, y0, x1, y1]) {
+            return None;
+        }
+        let stride = ((((x1 - x0 + 1) * (y1 - y0 + 1)) as f64 / MAX_SAMPLES).sqrt() as usize).max(1);
+        self.samples.clear();
+        for y in (y0..=y1).step_by(stride) {
+            let row = image.row(y);
+            let beside = y >= inner.1 && y <= inner.3;
+            for (x, p) in row.iter().enumerate().take(x1 + 1).skip(x0).step_by(stride) {
+                if beside && x >= inner.0 && x <= inner.2 {
+                    continue;
+                }
+                let v = sign * p.value();
+                if v.is_finite() {
+                    self.samples.push((x as f64 - cx, y as f64 - cy, v));
+                }
+            }
+        }
+        if self.samples.len() < MIN_SAMPLES {
+            return None;
+        }
+        let (mean, peak) = inside(image, side, level, blob)?;
+        let plane = fit(&self.samples)?;
+        self.residuals.clear();
+        self.residuals.extend(self.samples.iter().map(|&(x, y, v)| v - plane[0] - plane[1] * x - plane[2] * y));
+        let n = self.residuals.len();
+        let spread = (self.residuals.iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt();
+        let at = (n - 1) * 99 / 100;
+        let (_, &mut clear, _) = self.residuals.select_nth_unstable_by(at, f64::total_cmp);
+        let height = sign * mean - plane[0] - clear.max(0.0);
+        if height <= 0.0 {
+            return None;
+        }
+        let unit = noise + f64::from(T::STEP) + spread;
+        let score = if unit > 0.0 { height / unit } else { f64::from(f32::MAX) };
+        Some(Candidate { blob: *blob, level, background: sign * plane[0], peak, score })
+    }
+}
+
+impl Ring {
+    /// A quick look at 24 points of the outer edge: whether most of them lie on the other side of the level.
+    fn closed<T: Pixel>(&self, image: &Image<T>, side: Side, level: f64, [x0, y0, x1, y1]: [usize; 4]) -> bool {
+        let Some((low, high)) = band::<T>(side, level) else { return false };
+        let beyond = |x: usize, y: usize| image.get(x, y).is_some_and(|p| p >= low && p <= high);
+        let mut n = 0;
+        for i in 0..6 {
+            let (x, y) = (x0 + (x1 - x0) * i / 6, y0 + (y1 - y0) * (i + 1) / 6);
+            n += usize::from(beyond(x, y0)) + usize::from(beyond(x1 - (x - x0), y1));
+            n += usize::from(beyond(x0, y)) + usize::from(beyond(x1, y1 - (y - y0)));
+        }
+        n <= 12
+    }
+}
+
+/// Mean and extreme of the pixels beyond the level inside the blob's box.
+fn inside<T: Pixel>(image: &Image<T>, side: Side, level: f64, blob: &Blob) -> Option<(f64, f64)> {
+    let (low, high) = band::<T>(side, level)?;
+    let (mut n, mut sum) = (0u32, 0.0);
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for y in blob.top..=blob.bottom {
+        let row = image.row(y as usize).get(blob.left as usize..=blob.right as usize)?;
+        for &p in row.iter().filter(|p| **p >= low && **p <= high) {
+            let v = p.value();
+            n += 1;
+            sum += v;
+            least = least.min(v);
+            most = most.max(v);
+        }
+    }
+    (n > 0).then(|| (sum / f64::from(n), if side == Side::Bright { most } else { least }))
+}
+
+/// Least-squares plane v = p0 + p1 x + p2 y.
+fn fit(samples: &[(f64, f64, f64)]) -> Option<Vector3<f64>> {
+    let mut a = Matrix3::zeros();
+    let mut b = Vector3::zeros();
+    for &(x, y, v) in samples {
+        let row = Vector3::new(1.0, x, y);
+        a += row * row.transpose();
+        b += row * v;
+    }
+    a.cholesky().map(|c| c.solve(&b))
+}
