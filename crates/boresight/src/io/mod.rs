@@ -20,7 +20,10 @@ pub use natural::natural_order;
 pub use open::open;
 pub use pixels::gray_of_rgb8;
 pub use raw::RawFrames;
-pub use tables::{AtomicFile, DetectionsCsv, JsonLines, MotWriter, Output, TracksCsv};
+pub use tables::{
+    AtomicFile, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, Output, TableOptions, TrackFrame,
+    TrackTable, TracksCsv, read_detections, read_tracks,
+};
 pub use y4m::Y4m;
 
 use crate::{Error, ErrorKind, Result};

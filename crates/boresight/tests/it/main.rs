@@ -3,3 +3,4 @@
 mod golden;
 mod metrics;
 mod rooms;
+mod tables;

@@ -1,14 +1,24 @@
 //! Tables in and out: tracks, detections, MOTChallenge, JSON lines.
 
 mod atomic;
+mod columns;
 mod detections_csv;
 mod json_lines;
 mod mot;
 mod number;
+mod options;
+mod read_detections;
+mod read_tracks;
+mod rows;
+mod seqinfo;
 mod tracks_csv;
 
 pub use atomic::{AtomicFile, Output};
-pub use detections_csv::DetectionsCsv;
+pub use columns::Columns;
+pub use detections_csv::{DETECTIONS_HEADER, DetectionsCsv};
 pub use json_lines::JsonLines;
 pub use mot::{MotWriter, extent_of_mot_box, mot_box_of_extent};
-pub use tracks_csv::TracksCsv;
+pub use options::TableOptions;
+pub use read_detections::{DetectionTable, read_detections};
+pub use read_tracks::{TrackFrame, TrackTable, read_tracks};
+pub use tracks_csv::{TRACKS_HEADER, TracksCsv};

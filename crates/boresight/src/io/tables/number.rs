@@ -41,7 +41,6 @@ pub(crate) fn push_seconds(out: &mut String, time: Timestamp) {
 }
 
 /// Reads seconds exactly to the nanosecond where they are written as plain decimals, else through f64.
-#[cfg_attr(not(test), expect(dead_code, reason = "the table readers use it"))]
 pub(crate) fn parse_seconds(text: &str) -> Option<Timestamp> {
     let text = text.trim();
     let (negative, digits) = match text.strip_prefix('-') {
