@@ -40,6 +40,14 @@ impl Border {
             }
         }
     }
+
+    /// Fills the `r` values left and right of `row[r..r + width]`.
+    pub(super) fn pad<V: Copy>(self, row: &mut [V], r: usize, width: usize, zero: V) {
+        for i in 0..r {
+            row[i] = self.index(i as isize - r as isize, width).map_or(zero, |x| row[r + x]);
+            row[r + width + i] = self.index((width + i) as isize, width).map_or(zero, |x| row[r + x]);
+        }
+    }
 }
 
 /// The rows that a window of radius `r` needs, padded left and right, in the keys `K` a filter calculates with.
@@ -73,45 +81,34 @@ impl<K: Copy> RowRing<K> {
         self.stride
     }
 
+    pub(super) fn border(&self) -> Border {
+        self.border
+    }
+
     pub(super) fn radius(&self) -> usize {
         self.radius
     }
 
-    /// Whether a window centred on row `y` still lacks a row.
-    pub(super) fn wants_row(&self, y: usize) -> bool {
-        self.n_read < self.height && self.n_read <= y + self.radius
-    }
-
-    /// Reads the next row; `fill` writes the `width` keys of row `n_read`.
-    pub(super) fn push(&mut self, fill: impl FnOnce(usize, &mut [K])) {
+    /// Reads the rows that a window centred on row `y` still lacks; `fill` writes the `width` keys of a row.
+    pub(super) fn read(&mut self, y: usize, mut fill: impl FnMut(usize, &mut [K])) {
         let (w, r) = (self.width, self.radius);
-        let at = (self.n_read % self.n_slots) * self.stride;
-        // The zero row lies behind the slots and gives the key of 0.
-        let zero = self.keys.last().copied();
-        let row = &mut self.keys[at..at + self.stride];
-        fill(self.n_read, &mut row[r..r + w]);
-        for i in 0..r {
-            let left = self.border.index(i as isize - r as isize, w);
-            let right = self.border.index((w + i) as isize, w);
-            if let Some(key) = left.map(|x| row[r + x]).or(zero) {
-                row[i] = key;
+        while self.n_read < self.height && self.n_read <= y + r {
+            let at = (self.n_read % self.n_slots) * self.stride;
+            // The zero row lies behind the slots and gives the key of 0.
+            let zero = self.keys.last().copied();
+            let row = &mut self.keys[at..at + self.stride];
+            fill(self.n_read, &mut row[r..r + w]);
+            if let Some(zero) = zero {
+                self.border.pad(row, r, w, zero);
             }
-            if let Some(key) = right.map(|x| row[r + x]).or(zero) {
-                row[r + w + i] = key;
-            }
+            self.n_read += 1;
         }
-        self.n_read += 1;
     }
 
     /// The padded row that row `y` (also outside the image) stands for; column `x` of the image is at `x + r`.
     pub(super) fn row(&self, y: isize) -> &[K] {
         let slot = self.border.index(y, self.height).map_or(self.n_slots, |i| i % self.n_slots);
         &self.keys[slot * self.stride..(slot + 1) * self.stride]
-    }
-
-    /// The `N` rows of the window centred on row `y`; `N = 2r + 1`.
-    pub(super) fn window<const N: usize>(&self, y: usize) -> [&[K]; N] {
-        std::array::from_fn(|i| self.row(y as isize + i as isize - self.radius as isize))
     }
 }
 

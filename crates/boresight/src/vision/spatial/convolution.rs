@@ -67,13 +67,11 @@ pub(super) fn each_row<T: SpatialPixel>(
     ring.begin(w, src.height(), r, border, 0.0f64);
     let mut sum = vec![0.0; w];
     for y in 0..src.height() {
-        while ring.wants_row(y) {
-            ring.push(|i, keys| {
-                for (k, v) in keys.iter_mut().zip(src.row(i)) {
-                    *k = v.to_f64();
-                }
-            });
-        }
+        ring.read(y, |i, keys| {
+            for (k, v) in keys.iter_mut().zip(src.row(i)) {
+                *k = v.to_f64();
+            }
+        });
         sum.fill(0.0);
         for (a, weights) in kernel.weights.chunks_exact(n).enumerate() {
             // Kernel row a (from the top) takes the image row on the other side.

@@ -48,9 +48,7 @@ impl Gaussian {
     }
 
     pub(super) fn row<T: SpatialPixel>(&mut self, src: &Image<T>, y: usize, out: &mut [T]) {
-        while self.ring.wants_row(y) {
-            self.ring.push(|i, keys| T::to_f32_row(src.row(i), keys));
-        }
+        self.ring.read(y, |i, keys| T::to_f32_row(src.row(i), keys));
         let (w, r, y) = (out.len(), self.weights.len() - 1, y as isize);
         let (first, rest) = (self.weights[0], &self.weights[1..]);
         scale(self.ring.row(y), first, &mut self.columns);

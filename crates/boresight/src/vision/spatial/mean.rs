@@ -3,22 +3,22 @@
 //! Source: SPEC B, eq 4.2. Integers: column sums are updated by the row that enters and the row that leaves; u8 up to
 //! 15x15 stays in 16-bit lanes (15² * 255 < 2¹⁶), the rest in 32 bits; the result is the nearest integer (n² is odd, so
 //! there are no ties: OpenCV's `blur` gives the same). f32: summed afresh in f64, rounded once, so that one NaN or
-//! infinity spoils its own windows only.
-//! The sum of n neighbours doubles (1, 2, 4, ... columns) and adds up the powers of n: about 2 log2(n) vector additions.
+//! infinity spoils its own windows only. The sums are padded, not the pixels: a padded column is a copy of another.
+//! The sum of n neighbours: n additions up to 5; above, doubling (1, 2, 4, ... columns) or, in 32 bits, a running sum.
 
-use super::border::RowRing;
+use super::border::Border;
 use super::pixel::SpatialPixel;
 use crate::Image;
 use multiversion::multiversion;
 
-/// Column sums and the doubled sums.
+/// Column sums, padded, and room for the sums of neighbours.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     columns16: Vec<u16>,
     columns32: Vec<u32>,
     columns64: Vec<f64>,
     work16: [Vec<u16>; 3],
-    work32: [Vec<u32>; 3],
+    sum32: Vec<u32>,
     work64: [Vec<f64>; 3],
 }
 
@@ -32,14 +32,14 @@ fn narrow<T: SpatialPixel>(n: usize) -> bool {
 }
 
 /// Clears the sums for a new image.
-pub(super) fn begin<T: SpatialPixel>(ring: &RowRing<T>, s: &mut Scratch) {
-    let len = ring.stride();
-    if narrow::<T>(2 * ring.radius() + 1) {
+pub(super) fn begin<T: SpatialPixel>(width: usize, n: usize, s: &mut Scratch) {
+    let len = width + n - 1;
+    if narrow::<T>(n) {
         refill(&mut s.columns16, len, 0);
         s.work16.iter_mut().for_each(|v| refill(v, len, 0));
     } else if T::INTEGER {
         refill(&mut s.columns32, len, 0);
-        s.work32.iter_mut().for_each(|v| refill(v, len, 0));
+        refill(&mut s.sum32, width, 0);
     } else {
         refill(&mut s.columns64, len, 0.0);
         s.work64.iter_mut().for_each(|v| refill(v, len, 0.0));
@@ -47,64 +47,47 @@ pub(super) fn begin<T: SpatialPixel>(ring: &RowRing<T>, s: &mut Scratch) {
 }
 
 /// Writes row `y` of the mean.
-pub(super) fn row<T: SpatialPixel>(
-    ring: &mut RowRing<T>,
-    src: &Image<T>,
-    y: usize,
-    n: usize,
-    s: &mut Scratch,
-    out: &mut [T],
-) {
+pub(super) fn row<T: SpatialPixel>(src: &Image<T>, y: usize, n: usize, border: Border, s: &mut Scratch, out: &mut [T]) {
     if n == 1 {
-        out.copy_from_slice(src.row(y));
-        return;
+        return out.copy_from_slice(src.row(y));
     }
-    let r = ring.radius() as isize;
-    let first = y == 0;
-    let leaving = y as isize - r - 1;
-    if !T::INTEGER {
-        while ring.wants_row(y) {
-            ring.push(|i, keys| keys.copy_from_slice(src.row(i)));
-        }
-        s.columns64.fill(0.0);
-        for i in -r..=r {
-            add_f64(ring.row(y as isize + i), &mut s.columns64);
-        }
-        let sum = neighbours_f64(n, &s.columns64, &mut s.work64, out.len());
-        divide_f64(sum, (n * n) as f64, out);
-        return;
-    }
-    // The row that leaves may share its slot with the row that enters: take it off first.
+    let (w, r, top) = (out.len(), n / 2, y as isize);
+    let reach = r as isize;
+    let at = |i: isize| border.index(i, src.height()).map(|i| src.row(i));
+    let entering = || if y == 0 { -reach..=reach } else { reach..=reach };
+    let leaving = if y == 0 { None } else { at(top - reach - 1) };
     if narrow::<T>(n) {
-        if !first {
-            sub_u16(ring.row(leaving), &mut s.columns16);
+        let columns = &mut s.columns16[r..r + w];
+        match (at(top + reach), leaving) {
+            (Some(new), Some(old)) => exchange_u16(new, old, columns),
+            _ => {
+                leaving.into_iter().for_each(|old| sub_u16(old, columns));
+                entering().filter_map(|i| at(top + i)).for_each(|new| add_u16(new, columns));
+            }
         }
-        while ring.wants_row(y) {
-            ring.push(|i, keys| keys.copy_from_slice(src.row(i)));
-        }
-        for i in if first { -r..=r } else { r..=r } {
-            add_u16(ring.row(y as isize + i), &mut s.columns16);
-        }
+        border.pad(&mut s.columns16, r, w, 0);
         match n {
             3 => mean_u16::<3, T>(&s.columns16, out),
             5 => mean_u16::<5, T>(&s.columns16, out),
-            _ => {
-                let sum = neighbours_u16(n, &s.columns16, &mut s.work16, out.len());
-                divide_u16(sum, n * n, out);
-            }
+            _ => divide_u16(neighbours_u16(n, &s.columns16, &mut s.work16, w), n * n, out),
+        }
+    } else if T::INTEGER {
+        let columns = &mut s.columns32[r..r + w];
+        leaving.into_iter().for_each(|old| sub_u32(old, columns));
+        entering().filter_map(|i| at(top + i)).for_each(|new| add_u32(new, columns));
+        border.pad(&mut s.columns32, r, w, 0);
+        running_u32(n, &s.columns32, &mut s.sum32);
+        if size_of::<T>() == 1 {
+            divide_u24(&s.sum32, n * n, out);
+        } else {
+            divide_u32(&s.sum32, n * n, out);
         }
     } else {
-        if !first {
-            sub_u32(ring.row(leaving), &mut s.columns32);
-        }
-        while ring.wants_row(y) {
-            ring.push(|i, keys| keys.copy_from_slice(src.row(i)));
-        }
-        for i in if first { -r..=r } else { r..=r } {
-            add_u32(ring.row(y as isize + i), &mut s.columns32);
-        }
-        let sum = neighbours_u32(n, &s.columns32, &mut s.work32, out.len());
-        divide_u32(sum, n * n, out);
+        s.columns64.fill(0.0);
+        let columns = &mut s.columns64[r..r + w];
+        (-reach..=reach).filter_map(|i| at(top + i)).for_each(|new| add_f64(new, columns));
+        border.pad(&mut s.columns64, r, w, 0.0);
+        divide_f64(neighbours_f64(n, &s.columns64, &mut s.work64, w), (n * n) as f64, out);
     }
 }
 
@@ -124,21 +107,29 @@ accumulate!(add_u32, u32, to_u32, wrapping_add);
 accumulate!(sub_u32, u32, to_u32, wrapping_sub);
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
+fn exchange_u16<T: SpatialPixel>(new: &[T], old: &[T], columns: &mut [u16]) {
+    for ((c, &new), &old) in columns.iter_mut().zip(new).zip(old) {
+        *c = c.wrapping_add(new.to_u32() as u16).wrapping_sub(old.to_u32() as u16);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
 fn add_f64<T: SpatialPixel>(row: &[T], columns: &mut [f64]) {
     for (c, &v) in columns.iter_mut().zip(row) {
         *c += v.to_f64();
     }
 }
 
-/// floor(2¹⁸ / area) + 1: multiplying and dropping 18 bits divides every sum up to 255 `area` + `area / 2` exactly
-/// for the areas 9 and 25 (tested one by one).
-fn reciprocal(area: usize) -> u16 {
-    ((1 << 18) / area as u32 + 1) as u16
+/// Division of 16-bit sums by multiplication: floor(2^(16 + t) / area) + 1 and t = floor(log2(area)); exact for every sum
+/// up to 255 `area` + `area / 2` and every odd window up to 15x15 (tested one by one).
+fn reciprocal(area: usize) -> (u16, u32) {
+    let t = area.ilog2();
+    (((1u32 << (16 + t)) / area as u32 + 1) as u16, t)
 }
 
 #[inline(always)]
-fn divide(sum: u16, half: u16, k: u16) -> u16 {
-    ((u32::from(sum.wrapping_add(half)) * u32::from(k)) >> 16) as u16 >> 2
+fn divide(sum: u16, half: u16, (k, t): (u16, u32)) -> u16 {
+    ((u32::from(sum.wrapping_add(half)) * u32::from(k)) >> 16) as u16 >> t
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
@@ -157,19 +148,27 @@ fn mean_u16<const N: usize, T: SpatialPixel>(columns: &[u16], out: &mut [T]) {
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
 fn divide_u16<T: SpatialPixel>(sum: &[u16], area: usize, out: &mut [T]) {
-    // The fraction is at least 1 / (2 * 225) away from 1/2; the error of a product of floats below 256 is 3e-5.
-    let inverse = 1.0 / area as f32;
+    let (half, k) = ((area / 2) as u16, reciprocal(area));
     for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_u16_exact((f32::from(s) * inverse + 0.5) as u16);
+        *o = T::from_u16_exact(divide(s, half, k));
     }
 }
 
+/// Sums of 8-bit pixels over 17x17 to 255x255: below 2²⁴, and 2⁴⁰ / area below 2³².
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn divide_u32<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
-    // The sum's fraction is at least 1 / (2 * 255²) away from 1/2, far above the error of a product of doubles.
-    let inverse = 1.0 / area as f64;
+fn divide_u24<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
+    let (half, k) = (area as u32 / 2, ((1u64 << 40) / area as u64 + 1) as u32);
     for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_u16_exact((f64::from(s) * inverse + 0.5) as u16);
+        *o = T::from_u16_exact(((u64::from(s + half) * u64::from(k)) >> 40) as u16);
+    }
+}
+
+/// Sums of 16-bit pixels up to 255x255: below 2³²; the product stays below 2⁶⁴ since sum / area <= 2¹⁶ - 1.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2", "x86_64+sse4.2"))]
+fn divide_u32<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
+    let (half, k) = (area as u64 / 2, (1u64 << 48) / area as u64 + 1);
+    for (o, &s) in out.iter_mut().zip(sum) {
+        *o = T::from_u16_exact(((u64::from(s) + half).wrapping_mul(k) >> 48) as u16);
     }
 }
 
@@ -177,6 +176,18 @@ fn divide_u32<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
 fn divide_f64<T: SpatialPixel>(sum: &[f64], area: f64, out: &mut [T]) {
     for (o, &s) in out.iter_mut().zip(sum) {
         *o = T::from_f64(s / area);
+    }
+}
+
+/// Sums of `n` neighbours, each from the one before it.
+fn running_u32(n: usize, columns: &[u32], sum: &mut [u32]) {
+    let mut s = columns[..n - 1].iter().fold(0u32, |s, &c| s.wrapping_add(c));
+    // One addition is on the way from one sum to the next: the difference is ready before.
+    let mut left = 0u32;
+    for ((o, &new), &old) in sum.iter_mut().zip(&columns[n - 1..]).zip(columns) {
+        s = s.wrapping_add(new.wrapping_sub(left));
+        *o = s;
+        left = old;
     }
 }
 
@@ -222,7 +233,6 @@ macro_rules! neighbours {
     };
 }
 neighbours!(neighbours_u16, double_u16, sum_u16, u16, wrapping_add);
-neighbours!(neighbours_u32, double_u32, sum_u32, u32, wrapping_add);
 
 trait PlainAdd {
     fn plain_add(self, other: Self) -> Self;
@@ -248,10 +258,31 @@ mod tests {
             let mut ours = vec![0u8; sums.len()];
             divide_u16(&sums, area as usize, &mut ours);
             assert!(ours == exact, "{n} x {n}");
-            if n <= 5 {
-                let (half, k) = ((area / 2) as u16, reciprocal(area as usize));
-                let ours: Vec<u8> = sums.iter().map(|&s| divide(s, half, k) as u8).collect();
-                assert!(ours == exact, "{n} x {n}");
+        }
+    }
+
+    #[test]
+    fn the_division_of_large_sums_is_exact_next_to_every_half() {
+        for n in (3..=255u64).step_by(2) {
+            let area = n * n;
+            // The hardest sums lie on both sides of a half; every tenth quotient and the last.
+            let quotients = (0..65_535u64).step_by(10).chain([65_534]);
+            let sums: Vec<u32> =
+                quotients.flat_map(|q| [q * area + area / 2, q * area + area / 2 + 1]).map(|s| s as u32).collect();
+            let mut ours = vec![0u16; sums.len()];
+            divide_u32(&sums, area as usize, &mut ours);
+            assert!(
+                sums.iter().zip(&ours).all(|(&s, &o)| u64::from(o) == (u64::from(s) + area / 2) / area),
+                "{n} x {n}"
+            );
+            if n >= 17 {
+                let sums: Vec<u32> = sums.into_iter().filter(|&s| u64::from(s) <= 255 * area).collect();
+                let mut ours = vec![0u8; sums.len()];
+                divide_u24(&sums, area as usize, &mut ours);
+                assert!(
+                    sums.iter().zip(&ours).all(|(&s, &o)| u64::from(o) == (u64::from(s) + area / 2) / area),
+                    "{n} x {n}"
+                );
             }
         }
     }

@@ -1,16 +1,16 @@
 //! Median of an n x n window: networks of minima and maxima for 3x3 and 5x5, bisection up to 15x15, histograms beyond.
 //!
-//! Source: SPEC B (n odd, so the median is a pixel of the window). 3x3 and 5x5: see [`super::network`]. Bisection: the
-//! median's key is built from its highest bit down; a bit is set if at most half the window lies below; a block of 64
-//! pixels counts at a time, with no branch: n² * bits / lanes operations a pixel.
-//! Above 15x15 for u8: column histograms, see [`super::median_histogram`].
+//! Source: SPEC B (n odd, so the median is a pixel of the window). 3x3 and 5x5: see [`super::network`]; columns are sorted
+//! once and padded after sorting, which is the same as padding the pixels. Bisection: the median's key is built from
+//! its highest bit down; a bit is set if at most half the window lies below; one register of pixels counts at a time,
+//! with no branch: n² * bits / lanes operations a pixel. Above 15x15 for u8: [`super::median_histogram`].
 
-use super::border::RowRing;
+use super::border::{Border, RowRing};
 use super::median_histogram::Histograms;
-use super::network::{median9, median25, sort3, sort5};
+use super::network::{Lattice, median9, median25, sort3, sort5};
 use super::pixel::{Key, SpatialPixel};
 use crate::Image;
-use multiversion::multiversion;
+use fearless_simd::{Level, Select, Simd, SimdBase, dispatch};
 
 /// Largest window of the bisection with 8-bit counters: 15² = 225.
 const BISECTION_MAX: usize = 15;
@@ -19,21 +19,23 @@ const BISECTION_MAX: usize = 15;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch<K> {
     ranks: [Vec<K>; 5],
+    zeros: Vec<K>,
     keys: Vec<K>,
     histograms: Histograms,
 }
 
 /// Prepares for a new image; the ring has begun it.
-pub(super) fn begin<T: SpatialPixel>(ring: &mut RowRing<T::Key>, src: &Image<T>, s: &mut Scratch<T::Key>) {
+pub(super) fn begin<T: SpatialPixel>(ring: &RowRing<T::Key>, src: &Image<T>, s: &mut Scratch<T::Key>) {
     let zero = T::default().key();
-    for v in s.ranks.iter_mut().chain([&mut s.keys]) {
-        v.clear();
-    }
     for v in &mut s.ranks {
+        v.clear();
         v.resize(ring.stride(), zero);
     }
-    s.keys.resize(src.width(), zero);
-    if T::Key::BITS == 8 && 2 * ring.radius() + 1 > BISECTION_MAX {
+    for v in [&mut s.keys, &mut s.zeros] {
+        v.clear();
+        v.resize(src.width(), zero);
+    }
+    if <T::Key as Key>::N_BITS == 8 && 2 * ring.radius() + 1 > BISECTION_MAX {
         s.histograms.begin(ring.stride());
     }
 }
@@ -47,135 +49,227 @@ pub(super) fn row<T: SpatialPixel>(
     s: &mut Scratch<T::Key>,
     out: &mut [T],
 ) {
-    if n == 1 {
-        out.copy_from_slice(src.row(y));
-        return;
-    }
-    let large8 = T::Key::BITS == 8 && n > BISECTION_MAX;
-    if large8 && y > 0 {
-        let leaving = ring.row(y as isize - ring.radius() as isize - 1);
-        s.histograms.remove(leaving);
-    }
-    while ring.wants_row(y) {
-        ring.push(|i, keys| T::keys(src.row(i), keys));
-    }
-    let [r0, r1, r2, r3, r4] = &mut s.ranks;
+    let (zero, border) = (T::default().key(), ring.border());
     match n {
+        1 => out.copy_from_slice(src.row(y)),
         3 => {
-            sort_columns3(ring.window(y), [r0, r1, r2]);
-            median3::<T::Key>([r0, r1, r2], &mut s.keys);
+            let rows = window::<3, T>(ring, src, y, &s.zeros);
+            T::fill_keys(out, &mut s.keys, |out| {
+                dispatch!(Level::new(), simd => median3(simd, rows, border, zero, out));
+            });
         }
         5 => {
-            sort_columns5(ring.window(y), [r0, r1, r2, r3, r4]);
-            median5::<T::Key>([r0, r1, r2, r3, r4], &mut s.keys);
+            let rows = window::<5, T>(ring, src, y, &s.zeros);
+            let ranks = s.ranks.each_mut().map(Vec::as_mut_slice);
+            T::fill_keys(
+                out,
+                &mut s.keys,
+                |out| dispatch!(Level::new(), simd => median5(simd, rows, ranks, border, zero, out)),
+            );
         }
-        _ if large8 => {
+        _ if <T::Key as Key>::N_BITS == 8 && n > BISECTION_MAX => {
             let r = ring.radius() as isize;
+            // The row that leaves may share its slot with the row that enters: take it off first.
+            if y > 0 {
+                s.histograms.remove(ring.row(y as isize - r - 1));
+            }
+            ring.read(y, |i, keys| T::keys(src.row(i), keys));
             for i in if y == 0 { -r..=r } else { r..=r } {
                 s.histograms.add(ring.row(y as isize + i));
             }
-            s.histograms.row(n, &mut s.keys);
+            T::fill_keys(out, &mut s.keys, |out| s.histograms.row(n, out));
         }
-        _ if n <= BISECTION_MAX => bisect_small(ring, y, n, &mut s.keys),
-        _ => bisect_large(ring, y, n, &mut s.keys),
-    }
-    for (o, &k) in out.iter_mut().zip(&s.keys) {
-        *o = T::from_key(k);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn sort_columns3<K: Key>(rows: [&[K]; 3], ranks: [&mut [K]; 3]) {
-    let [a, b, c] = rows;
-    let n = a.len();
-    let (b, c) = (&b[..n], &c[..n]);
-    let [r0, r1, r2] = ranks;
-    let (r0, r1, r2) = (&mut r0[..n], &mut r1[..n], &mut r2[..n]);
-    for x in 0..n {
-        [r0[x], r1[x], r2[x]] = sort3([a[x], b[x], c[x]]);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn median3<K: Key>(ranks: [&[K]; 3], out: &mut [K]) {
-    let w = out.len();
-    let shifted = ranks.map(|r| [&r[..w], &r[1..][..w], &r[2..][..w]]);
-    for x in 0..w {
-        out[x] = median9(shifted.map(|r| r.map(|s| s[x])));
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn sort_columns5<K: Key>(rows: [&[K]; 5], ranks: [&mut [K]; 5]) {
-    let n = rows[0].len();
-    let [a, b, c, d, e] = rows.map(|r| &r[..n]);
-    let [r0, r1, r2, r3, r4] = ranks.map(|r| &mut r[..n]);
-    for x in 0..n {
-        [r0[x], r1[x], r2[x], r3[x], r4[x]] = sort5([a[x], b[x], c[x], d[x], e[x]]);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn median5<K: Key>(ranks: [&[K]; 5], out: &mut [K]) {
-    let w = out.len();
-    let shifted = ranks.map(|r| [&r[..w], &r[1..][..w], &r[2..][..w], &r[3..][..w], &r[4..][..w]]);
-    for x in 0..w {
-        out[x] = median25(shifted.map(|r| r.map(|s| s[x])));
-    }
-}
-
-/// Pixels that a bisection treats at a time.
-const BLOCK: usize = 64;
-
-macro_rules! bisection {
-    ($name:ident, $kernel:ident, $count:ty) => {
-        /// Bisection with counters wide enough for the window.
-        fn $name<K: Key>(ring: &RowRing<K>, y: usize, n: usize, out: &mut [K]) {
-            let w = out.len();
-            let mut x0 = 0;
-            while x0 < w {
-                // A last partial block goes back over pixels already done, or stays short in a narrow image.
-                let at = if x0 + BLOCK <= w { x0 } else { w.saturating_sub(BLOCK) };
-                let len = BLOCK.min(w);
-                $kernel(ring, y, n, at, &mut out[at..at + len]);
-                x0 += BLOCK;
-            }
+        _ => {
+            ring.read(y, |i, keys| T::keys(src.row(i), keys));
+            let ring = &*ring;
+            T::fill_keys(out, &mut s.keys, |out| dispatch!(Level::new(), simd => bisect(simd, ring, y, n, out)));
         }
+    }
+}
 
-        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-        fn $kernel<K: Key>(ring: &RowRing<K>, y: usize, n: usize, x0: usize, out: &mut [K]) {
-            let half = (n * n / 2) as $count;
-            let len = out.len();
-            let mut low = [K::default(); BLOCK];
-            for bit in (0..K::BITS).rev() {
-                let mut trial = low;
-                for t in &mut trial {
-                    *t = t.with_bit(bit);
-                }
-                let mut below = [0 as $count; BLOCK];
-                let r = ring.radius() as isize;
-                for i in -r..=r {
-                    let row = &ring.row(y as isize + i)[x0..];
-                    for dx in 0..n {
-                        if len == BLOCK {
-                            let part = &row[dx..dx + BLOCK];
-                            for j in 0..BLOCK {
-                                below[j] += <$count>::from(part[j] < trial[j]);
-                            }
-                        } else {
-                            for (j, &v) in row[dx..dx + len].iter().enumerate() {
-                                below[j] += <$count>::from(v < trial[j]);
-                            }
-                        }
+/// The rows of the window as keys, without padding: straight from the image where values are their own keys.
+fn window<'a, const N: usize, T: SpatialPixel>(
+    ring: &'a mut RowRing<T::Key>,
+    src: &'a Image<T>,
+    y: usize,
+    zeros: &'a [T::Key],
+) -> [&'a [T::Key]; N] {
+    let (r, border) = (ring.radius(), ring.border());
+    let direct = T::as_keys(&[]).is_some();
+    if !direct {
+        ring.read(y, |i, keys| T::keys(src.row(i), keys));
+    }
+    let ring = &*ring;
+    std::array::from_fn(|i| {
+        let at = (y + i) as isize - r as isize;
+        let row = border.index(at, src.height()).map(|i| src.row(i));
+        match row {
+            None => zeros,
+            Some(row) => T::as_keys(row).unwrap_or_else(|| &ring.row(at)[r..r + src.width()]),
+        }
+    })
+}
+
+/// A register of keys as a lattice: minima and maxima lane by lane.
+#[derive(Clone, Copy)]
+struct Register<S: Simd, K: Key>(K::Lanes<S>);
+
+impl<S: Simd, K: Key> Lattice for Register<S, K> {
+    #[inline(always)]
+    fn low(self, other: Self) -> Self {
+        Self(self.0.min(other.0))
+    }
+    #[inline(always)]
+    fn high(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd, K: Key>(simd: S, row: &[K], x: usize) -> Register<S, K> {
+    Register(K::Lanes::<S>::from_slice(simd, &row[x..x + K::Lanes::<S>::LEN]))
+}
+
+#[inline(always)]
+fn store<S: Simd, K: Key>(lanes: Register<S, K>, row: &mut [K], x: usize) {
+    lanes.0.store_slice(&mut row[x..x + K::Lanes::<S>::LEN]);
+}
+
+/// Sorts the columns of the window and pads the sorted columns.
+#[inline(always)]
+fn sort_columns<const N: usize, S: Simd, K: Key>(
+    simd: S,
+    rows: [&[K]; N],
+    ranks: &mut [&mut [K]; N],
+    border: Border,
+    zero: K,
+    sort: impl Fn([Register<S, K>; N]) -> [Register<S, K>; N],
+) {
+    let (w, r) = (rows[0].len(), N / 2);
+    let lanes = K::Lanes::<S>::LEN;
+    let mut x = 0;
+    while x < w {
+        if x + lanes > w {
+            // Back over columns already done, or column by column in an image narrower than a register.
+            x = w.saturating_sub(lanes);
+            if w < lanes {
+                for x in 0..w {
+                    let mut column = rows.map(|row| row[x]);
+                    column.sort_unstable();
+                    for (rank, key) in ranks.iter_mut().zip(column) {
+                        rank[r + x] = key;
                     }
                 }
-                for j in 0..BLOCK {
-                    low[j] = if below[j] <= half { trial[j] } else { low[j] };
+                break;
+            }
+        }
+        let column = sort(rows.map(|row| load(simd, row, x)));
+        for (rank, lanes) in ranks.iter_mut().zip(column) {
+            store(lanes, rank, r + x);
+        }
+        x += lanes;
+    }
+    for rank in ranks {
+        border.pad(rank, r, w, zero);
+    }
+}
+
+#[inline(always)]
+fn sort_at<S: Simd, K: Key>(simd: S, [a, b, c]: [&[K]; 3], x: usize) -> [Register<S, K>; 3] {
+    sort3([load(simd, a, x), load(simd, b, x), load(simd, c, x)])
+}
+
+#[inline(always)]
+fn median3<S: Simd, K: Key>(simd: S, rows: [&[K]; 3], border: Border, zero: K, out: &mut [K]) {
+    let (w, lanes) = (out.len(), K::Lanes::<S>::LEN);
+    let one = |x: usize| {
+        let columns: [[K; 3]; 3] = std::array::from_fn(|i| {
+            let at = border.index((x + i) as isize - 1, w);
+            sort3(rows.map(|row| at.map_or(zero, |x| row[x])))
+        });
+        median9(std::array::from_fn(|k| columns.map(|c| c[k])))
+    };
+    if w < lanes + 2 {
+        return out.iter_mut().enumerate().for_each(|(x, o)| *o = one(x));
+    }
+    // Sorting a column three times costs less than storing it sorted and loading it three times.
+    for block in 0..(w - 2).div_ceil(lanes) {
+        let x = (block * lanes).min(w - 2 - lanes);
+        let [a0, a1, a2] = sort_at(simd, rows, x);
+        let [b0, b1, b2] = sort_at(simd, rows, x + 1);
+        let [c0, c1, c2] = sort_at(simd, rows, x + 2);
+        store(median9([[a0, b0, c0], [a1, b1, c1], [a2, b2, c2]]), out, x + 1);
+    }
+    (out[0], out[w - 1]) = (one(0), one(w - 1));
+}
+
+#[inline(always)]
+fn five<S: Simd, K: Key>(simd: S, rank: &[K], x: usize) -> [Register<S, K>; 5] {
+    [
+        load(simd, rank, x),
+        load(simd, rank, x + 1),
+        load(simd, rank, x + 2),
+        load(simd, rank, x + 3),
+        load(simd, rank, x + 4),
+    ]
+}
+
+#[inline(always)]
+fn median5<S: Simd, K: Key>(
+    simd: S,
+    rows: [&[K]; 5],
+    mut ranks: [&mut [K]; 5],
+    border: Border,
+    zero: K,
+    out: &mut [K],
+) {
+    sort_columns(simd, rows, &mut ranks, border, zero, sort5);
+    let (w, lanes) = (out.len(), K::Lanes::<S>::LEN);
+    if w < lanes {
+        for x in 0..w {
+            out[x] = median25(std::array::from_fn(|k| std::array::from_fn(|i| ranks[k][x + i])));
+        }
+        return;
+    }
+    for block in 0..w.div_ceil(lanes) {
+        let x = (block * lanes).min(w - lanes);
+        let [a, b, c, d, e] = &ranks;
+        let rank = [five(simd, a, x), five(simd, b, x), five(simd, c, x), five(simd, d, x), five(simd, e, x)];
+        store(median25(rank), out, x);
+    }
+}
+
+#[inline(always)]
+fn bisect<S: Simd, K: Key>(simd: S, ring: &RowRing<K>, y: usize, n: usize, out: &mut [K]) {
+    let (w, lanes, r) = (out.len(), K::Lanes::<S>::LEN, ring.radius() as isize);
+    if w < lanes {
+        let mut window = Vec::with_capacity(n * n);
+        for x in 0..w {
+            window.clear();
+            for i in -r..=r {
+                window.extend_from_slice(&ring.row(y as isize + i)[x..x + n]);
+            }
+            out[x] = *window.select_nth_unstable(n * n / 2).1;
+        }
+        return;
+    }
+    let (zero, one) = (K::Lanes::<S>::splat(simd, K::from_level(0)), K::Lanes::<S>::splat(simd, K::from_level(1)));
+    let half = K::Lanes::<S>::splat(simd, K::from_level(n * n / 2));
+    for block in 0..w.div_ceil(lanes) {
+        let x = (block * lanes).min(w - lanes);
+        let mut low = zero;
+        for bit in (0..K::N_BITS).rev() {
+            let trial = low + K::from_level(1 << bit);
+            let mut below = zero;
+            for i in -r..=r {
+                let row = &ring.row(y as isize + i)[x..x + lanes + n - 1];
+                for dx in 0..n {
+                    let less = load::<S, K>(simd, row, dx).0.simd_lt(trial);
+                    below += less.select(one, zero);
                 }
             }
-            out.copy_from_slice(&low[..len]);
+            low = below.simd_le(half).select(trial, low);
         }
-    };
+        store(Register::<S, K>(low), out, x);
+    }
 }
-bisection!(bisect_small, bisect_block8, u8);
-bisection!(bisect_large, bisect_block16, u16);

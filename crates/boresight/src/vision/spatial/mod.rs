@@ -135,7 +135,6 @@ fn check_sigma(sigma_px: f64, at: &str) -> Result<()> {
 pub struct SpatialFilter<T: SpatialPixel> {
     config: SpatialConfig,
     ring: RowRing<T::Key>,
-    values: RowRing<T>,
     mean: mean::Scratch,
     median: median::Scratch<T::Key>,
     gaussian: gaussian::Gaussian,
@@ -151,7 +150,6 @@ impl<T: SpatialPixel> SpatialFilter<T> {
         Ok(Self {
             config,
             ring: RowRing::default(),
-            values: RowRing::default(),
             mean: mean::Scratch::default(),
             median: median::Scratch::default(),
             gaussian: gaussian::Gaussian::new(sigma_px),
@@ -180,12 +178,11 @@ impl<T: SpatialPixel> SpatialFilter<T> {
         match self.config {
             SpatialConfig::None => {}
             SpatialConfig::Mean(c) => {
-                self.values.begin(w, h, r, c.border, T::default());
-                mean::begin::<T>(&self.values, &mut self.mean);
+                mean::begin::<T>(w, c.size, &mut self.mean);
             }
             SpatialConfig::Median(c) => {
                 self.ring.begin(w, h, r, c.border, T::default().key());
-                median::begin(&mut self.ring, src, &mut self.median);
+                median::begin(&self.ring, src, &mut self.median);
             }
             SpatialConfig::Gaussian(c) => self.gaussian.begin(w, h, c.border),
         }
@@ -198,7 +195,7 @@ impl<T: SpatialPixel> SpatialFilter<T> {
         assert_eq!(out.len(), src.width(), "a row of another length");
         match self.config {
             SpatialConfig::None => out.copy_from_slice(src.row(y)),
-            SpatialConfig::Mean(c) => mean::row(&mut self.values, src, y, c.size, &mut self.mean, out),
+            SpatialConfig::Mean(c) => mean::row(src, y, c.size, c.border, &mut self.mean, out),
             SpatialConfig::Median(c) => median::row(&mut self.ring, src, y, c.size, &mut self.median, out),
             SpatialConfig::Gaussian(_) => self.gaussian.row(src, y, out),
         }

@@ -4,14 +4,15 @@
 //! for NaN. For u8 and u16 the key is the value; for f32 it is the total order of IEEE 754-2008 (5.10) as an unsigned
 //! integer: -NaN < -inf < ... < -0 < +0 < ... < +inf < +NaN.
 
+use fearless_simd::{Simd, SimdInt, SimdIntElement};
 use multiversion::multiversion;
 
 /// Integers that the median sorts.
-pub trait Key: Copy + Ord + Default + std::fmt::Debug + Send + Sync + 'static {
+pub trait Key: SimdIntElement + Ord + Default + std::fmt::Debug + Send + Sync + 'static {
+    /// As many keys as a register holds.
+    type Lanes<S: Simd>: SimdInt<S, Element = Self>;
     /// Number of bits.
-    const BITS: u32;
-    /// The key with only bit `i` set, added to `self`.
-    fn with_bit(self, i: u32) -> Self;
+    const N_BITS: u32;
     /// The key as a histogram level.
     fn level(self) -> usize;
     /// The key of a histogram level.
@@ -40,18 +41,19 @@ pub trait SpatialPixel: Copy + Default + PartialEq + std::fmt::Debug + Send + Sy
     fn from_f32(v: f32) -> Self;
     /// Writes the keys of a row.
     fn keys(row: &[Self], out: &mut [Self::Key]);
+    /// The row itself, where values are their own keys.
+    fn as_keys(row: &[Self]) -> Option<&[Self::Key]>;
+    /// Lets `write` fill `out` with keys, through `work` where values are not their own keys.
+    fn fill_keys(out: &mut [Self], work: &mut [Self::Key], write: impl FnOnce(&mut [Self::Key]));
     /// Writes a row of values as single precision.
     fn to_f32_row(row: &[Self], out: &mut [f32]);
 }
 
 macro_rules! key {
-    ($t:ty) => {
+    ($t:ty, $lanes:ident) => {
         impl Key for $t {
-            const BITS: u32 = <$t>::BITS;
-            #[inline(always)]
-            fn with_bit(self, i: u32) -> Self {
-                self | (1 << i)
-            }
+            type Lanes<S: Simd> = S::$lanes;
+            const N_BITS: u32 = <$t>::BITS;
             #[inline(always)]
             fn level(self) -> usize {
                 self as usize
@@ -63,9 +65,9 @@ macro_rules! key {
         }
     };
 }
-key!(u8);
-key!(u16);
-key!(u32);
+key!(u8, u8s);
+key!(u16, u16s);
+key!(u32, u32s);
 
 macro_rules! integer_pixel {
     ($t:ty) => {
@@ -103,6 +105,12 @@ macro_rules! integer_pixel {
             }
             fn keys(row: &[Self], out: &mut [$t]) {
                 out.copy_from_slice(row);
+            }
+            fn as_keys(row: &[Self]) -> Option<&[$t]> {
+                Some(row)
+            }
+            fn fill_keys(out: &mut [Self], _: &mut [$t], write: impl FnOnce(&mut [$t])) {
+                write(out);
             }
             fn to_f32_row(row: &[Self], out: &mut [f32]) {
                 for (o, &v) in out.iter_mut().zip(row) {
@@ -162,6 +170,15 @@ impl SpatialPixel for f32 {
     }
     fn keys(row: &[Self], out: &mut [u32]) {
         ordered_row(row, out);
+    }
+    fn as_keys(_: &[Self]) -> Option<&[u32]> {
+        None
+    }
+    fn fill_keys(out: &mut [Self], work: &mut [u32], write: impl FnOnce(&mut [u32])) {
+        write(work);
+        for (o, &k) in out.iter_mut().zip(&*work) {
+            *o = Self::from_key(k);
+        }
     }
     fn to_f32_row(row: &[Self], out: &mut [f32]) {
         out.copy_from_slice(row);
