@@ -4,6 +4,7 @@
 
 pub mod assignment;
 pub mod clear;
+pub mod clear_classic;
 pub mod hota;
 pub mod identity;
 pub mod multi_object;
@@ -11,7 +12,9 @@ pub mod overlap;
 pub mod pairs;
 pub mod preprocess;
 pub mod set;
+pub mod siap;
 
+pub use clear_classic::{ClearClassic, clear_classic};
 pub use multi_object::{MatchOptions, Scores, evaluate};
 pub use overlap::Similarity;
 pub use preprocess::{KittiClass, Rules, preprocess};

@@ -97,7 +97,8 @@ fn power(d2: f64, p: f64) -> f64 {
 
 impl SetDistance {
     /// Matches points nearer than the cutoff so that Σ (c^q − d^q) is greatest; afterwards `taken` lists the pairs.
-    fn assign(&mut self, truth: &[[f64; 2]], result: &[[f64; 2]], c: f64, q: f64) {
+    /// False if other matchings are as good.
+    fn assign(&mut self, truth: &[[f64; 2]], result: &[[f64; 2]], c: f64, q: f64) -> bool {
         self.order.clear();
         self.order.extend(result.iter().enumerate().map(|(j, p)| (p[0], p[1], j as u32)));
         self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
@@ -121,7 +122,7 @@ impl SetDistance {
                 }
             }
         }
-        self.matcher.solve_any(truth.len(), result.len(), &self.pairs, &mut self.taken);
+        self.matcher.solve_unique(truth.len(), result.len(), &self.pairs, &mut self.taken)
     }
 
     /// The pairs (truth, result) matched last.
@@ -167,9 +168,29 @@ impl SetDistance {
             return 0.0;
         }
         let q = if options.assignment == OspaAssignment::FirstPower { 1.0 } else { p };
-        self.assign(truth, result, c, q);
+        let unique = self.assign(truth, result, c, q);
+        if !unique && q != p && n <= 1 << 13 {
+            // Assignments that are equally good by the distances are not so by their powers: find the one scipy finds.
+            return self.ospa_of_dense(truth, result, n, c, p);
+        }
         let rest = (n - self.taken.len()) as f64 * c.powf(p);
         ((self.sum_of_powers(p) + rest) / n as f64).powf(1.0 / p)
+    }
+}
+
+impl SetDistance {
+    fn ospa_of_dense(&mut self, truth: &[[f64; 2]], result: &[[f64; 2]], n: usize, c: f64, p: f64) -> f64 {
+        let mut costs = vec![c; n * n];
+        for (i, r) in result.iter().enumerate() {
+            for (j, t) in truth.iter().enumerate() {
+                let (dx, dy) = (r[0] - t[0], r[1] - t[1]);
+                costs[i * n + j] = (dx * dx + dy * dy).sqrt().min(c);
+            }
+        }
+        let mut chosen = Vec::new();
+        self.matcher.solve_costs(n, n, &costs, &mut chosen);
+        let sum: f64 = chosen.iter().map(|&(i, j)| costs[i as usize * n + j as usize].powf(p)).sum();
+        (sum / n as f64).powf(1.0 / p)
     }
 }
 

@@ -74,18 +74,46 @@ impl Matcher {
     /// `pairs` holds the positive pairs, by row and within a row by column. Afterwards `out[k]` is the number of the
     /// pair that the matching takes, by row; pairs of weight 0 are never among them.
     pub fn solve(&mut self, n_rows: usize, n_cols: usize, pairs: &[Pair], out: &mut Vec<u32>) {
-        self.run(n_rows, n_cols, pairs, true, out);
+        if !self.solve_unique(n_rows, n_cols, pairs, out) && n_rows.saturating_mul(n_cols) <= DENSE_LIMIT {
+            self.n_dense += 1;
+            self.solve_dense(n_rows, n_cols, pairs);
+            out.clear();
+            out.extend(self.row_match.iter().filter(|&&k| k != NONE));
+        }
     }
 
     /// The same where any of several best matchings will do, as for distances between sets: never dense.
     pub fn solve_any(&mut self, n_rows: usize, n_cols: usize, pairs: &[Pair], out: &mut Vec<u32>) {
-        self.run(n_rows, n_cols, pairs, false, out);
+        self.quick(n_rows, n_cols, pairs, false, out);
     }
 
-    fn run(&mut self, n_rows: usize, n_cols: usize, pairs: &[Pair], as_scipy: bool, out: &mut Vec<u32>) {
+    /// One of the best matchings, and whether it is the only one.
+    pub fn solve_unique(&mut self, n_rows: usize, n_cols: usize, pairs: &[Pair], out: &mut Vec<u32>) -> bool {
+        self.quick(n_rows, n_cols, pairs, true, out)
+    }
+
+    /// The columns of the rows at the least sum of dense costs (row-major), as scipy finds them, also for more rows than
+    /// columns; `out` holds (row, column).
+    pub fn solve_costs(&mut self, n_rows: usize, n_cols: usize, costs: &[f64], out: &mut Vec<(u32, u32)>) {
+        out.clear();
+        if n_rows <= n_cols {
+            let cols = self.lsap.solve(n_rows, n_cols, costs);
+            out.extend(cols.iter().enumerate().map(|(i, &j)| (i as u32, j)));
+        } else {
+            self.costs.clear();
+            for j in 0..n_cols {
+                self.costs.extend((0..n_rows).map(|i| costs[i * n_cols + j]));
+            }
+            let rows = self.lsap.solve(n_cols, n_rows, &self.costs);
+            out.extend(rows.iter().enumerate().map(|(j, &i)| (i, j as u32)));
+            out.sort_unstable();
+        }
+    }
+
+    fn quick(&mut self, n_rows: usize, n_cols: usize, pairs: &[Pair], ask: bool, out: &mut Vec<u32>) -> bool {
         out.clear();
         if pairs.is_empty() {
-            return;
+            return true;
         }
         self.rows.clear();
         self.rows.resize(n_rows, Best::NONE);
@@ -118,19 +146,13 @@ impl Matcher {
             let p = &pairs[k as usize];
             row_match[p.row as usize] == NONE && !col_taken[p.col as usize]
         });
-        if !self.rest.is_empty() && !self.solve_rest(pairs, tol, as_scipy) {
-            if n_rows.saturating_mul(n_cols) <= DENSE_LIMIT {
-                self.n_dense += 1;
-                self.solve_dense(n_rows, n_cols, pairs);
-            } else {
-                self.take_sparse();
-            }
-        }
+        let unique = self.rest.is_empty() || self.solve_rest(pairs, tol, ask);
         out.extend(self.row_match.iter().filter(|&&k| k != NONE));
+        unique
     }
 
     /// Solves what dominance left over; false if the best matching is not unique.
-    fn solve_rest(&mut self, pairs: &[Pair], tol: f64, as_scipy: bool) -> bool {
+    fn solve_rest(&mut self, pairs: &[Pair], tol: f64, ask: bool) -> bool {
         self.sub.clear();
         self.sub_rows.clear();
         self.sub_of_row.clear();
@@ -146,11 +168,8 @@ impl Matcher {
         }
         self.sub.close();
         self.sparse.solve(&self.sub, self.cols.len());
-        if as_scipy && !self.sparse.is_unique(&self.sub, tol) {
-            return false;
-        }
         self.take_sparse();
-        true
+        !ask || self.sparse.is_unique(&self.sub, tol)
     }
 
     fn take_sparse(&mut self) {
