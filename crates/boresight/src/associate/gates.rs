@@ -6,6 +6,9 @@
 //! P_D probability that a target is detected; P_G that its detection lies in the gate; ψ probability that the track exists.
 //! Limits: at most 2³² − 1 detections in a scan and pairs in a table.
 
+/// Clutter of no density would make every weight infinite.
+const LEAST_DENSITY: f64 = 1e-200;
+
 /// One gated pair: a detection as a track sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
@@ -36,7 +39,8 @@ pub struct Gates {
     starts: Vec<u32>,
     pairs: Vec<Pair>,
     priors: Vec<Prior>,
-    log_clutter: Vec<f64>,
+    /// One value for all, or one each.
+    clutter: Vec<f64>,
     n_detections: usize,
 }
 
@@ -52,16 +56,16 @@ impl Gates {
         self.starts.push(0);
         self.pairs.clear();
         self.priors.clear();
-        self.log_clutter.clear();
-        self.log_clutter.push(ln_density(clutter_density));
+        self.clutter.clear();
+        self.clutter.push(clutter_density.max(LEAST_DENSITY));
         self.n_detections = n_detections;
     }
 
     /// Gives every detection a clutter density of its own (1/px²), one per detection of the scan.
     pub fn set_clutter(&mut self, density: impl Iterator<Item = f64>) {
-        self.log_clutter.clear();
-        self.log_clutter.extend(density.map(ln_density));
-        debug_assert!(self.log_clutter.len() == self.n_detections);
+        self.clutter.clear();
+        self.clutter.extend(density.map(|d| d.max(LEAST_DENSITY)));
+        debug_assert!(self.clutter.len() == self.n_detections);
     }
 
     /// Adds a pair to the row under construction; detections ascend within a row.
@@ -117,12 +121,17 @@ impl Gates {
         &self.priors[track_idx]
     }
 
+    /// λ at a detection, 1/px².
+    #[inline]
+    pub fn clutter(&self, detection: u32) -> f64 {
+        let at = if self.clutter.len() == 1 { 0 } else { detection as usize };
+        self.clutter[at]
+    }
+
     /// ln λ at a detection (λ in 1/px²).
     #[inline]
     pub fn log_clutter(&self, detection: u32) -> f64 {
-        // One value for all, or one each.
-        let at = if self.log_clutter.len() == 1 { 0 } else { detection as usize };
-        self.log_clutter[at]
+        self.clutter(detection).ln()
     }
 
     /// ln of the weight that the pair is right, against clutter: ln(ψ P_D l / λ).
@@ -138,10 +147,6 @@ impl Gates {
         let p = &self.priors[track_idx];
         (1.0 - p.existence * p.p_detection * p.p_gate).max(0.0).ln()
     }
-}
-
-fn ln_density(density: f64) -> f64 {
-    density.max(f64::MIN_POSITIVE).ln()
 }
 
 /// One detection of a track's answer, with the probability that it is the target's own.

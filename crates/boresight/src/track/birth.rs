@@ -19,14 +19,14 @@ pub enum BirthConfig {
     /// Every left-over detection starts a track at once, with unknown velocity.
     OnePoint(OnePointConfig),
     /// Two left-over detections of scans in a row start a track when the speed between them is possible.
-    TwoPoint {},
+    TwoPoint(TwoPointConfig),
     /// As two points, but the velocity between them must lie in a box (a road, a river, a known approach).
     VelocityBounds(VelocityBoundsConfig),
 }
 
 impl Default for BirthConfig {
     fn default() -> Self {
-        Self::TwoPoint {}
+        Self::TwoPoint(TwoPointConfig::default())
     }
 }
 
@@ -42,6 +42,15 @@ impl Default for OnePointConfig {
     fn default() -> Self {
         Self { velocity_std_px_per_s: 60.0 }
     }
+}
+
+/// Two left-over detections of scans in a row start a track.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TwoPointConfig {
+    /// Standard deviation of the targets' velocities per axis, px/s, above 0, if it is known: starts are then surer and
+    /// better told from clutter. Left out: nothing is known but the largest speed (SPEC D.5).
+    pub velocity_std_px_per_s: Option<f64>,
 }
 
 /// A box of possible velocities.
@@ -66,7 +75,14 @@ impl BirthConfig {
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
         match self {
-            Self::TwoPoint {} => Ok(()),
+            Self::TwoPoint(c) => c.velocity_std_px_per_s.map_or(Ok(()), |std| {
+                positive(
+                    &format!("{at}.two-point"),
+                    "velocity-std-px-per-s",
+                    std,
+                    "a third to a half of the largest speed",
+                )
+            }),
             Self::OnePoint(c) => positive(
                 &format!("{at}.one-point"),
                 "velocity-std-px-per-s",

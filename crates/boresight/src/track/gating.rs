@@ -6,7 +6,7 @@
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
 //! in one pixel cost bounded time and memory.
 
-use crate::associate::{Gates, Pair, Prior, UniformGrid};
+use crate::associate::{Gates, Pair, UniformGrid};
 use crate::{Detection, Error, ErrorKind, Result, Scan};
 use nalgebra::{Matrix2, Vector2};
 
@@ -44,15 +44,15 @@ pub struct Predicted {
     pub y: f64,
     /// Covariance H P Hᵀ, px².
     pub cov: Noise,
-    /// Farthest distance from the prediction that the largest speed allows, squared, px².
-    pub reach2: f64,
+    /// Farthest distance from the prediction that the largest speed allows, px.
+    pub reach: f64,
 }
 
 /// A scan made ready for gating: checked, noise added, sorted into a grid.
 #[derive(Clone, Debug, Default)]
 pub struct ScanTable {
-    /// Noise of each detection.
-    pub noise: Vec<Noise>,
+    /// Noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
+    noise: Vec<Noise>,
     /// Largest variances in the scan, px².
     max_xx: f64,
     max_yy: f64,
@@ -66,7 +66,6 @@ impl ScanTable {
     pub fn read(&mut self, scan: &Scan, extra_noise_px: f64) -> Result<()> {
         let extra = extra_noise_px * extra_noise_px;
         self.noise.clear();
-        self.noise.reserve(scan.detections.len());
         (self.max_xx, self.max_yy) = (0.0, 0.0);
         for (i, d) in scan.detections.iter().enumerate() {
             let n = Noise {
@@ -80,11 +79,25 @@ impl ScanTable {
             if !(finite && sound) {
                 return Err(refused(scan, i, d, finite));
             }
+            if self.noise.len() == 1 && self.noise[0] == n {
+                continue;
+            }
             self.max_xx = self.max_xx.max(n.xx);
             self.max_yy = self.max_yy.max(n.yy);
+            if self.noise.len() == 1 && i > 1 {
+                let same = self.noise[0];
+                self.noise.resize(i, same);
+            }
             self.noise.push(n);
         }
         Ok(())
+    }
+
+    /// Noise of a detection.
+    #[inline]
+    pub fn noise(&self, detection: u32) -> Noise {
+        let at = if self.noise.len() == 1 { 0 } else { detection as usize };
+        self.noise[at]
     }
 
     /// Sorts the scan's detections into the grid.
@@ -110,7 +123,7 @@ impl ScanTable {
         terms: impl Fn(u32) -> f64,
         gates: &mut Gates,
     ) {
-        let reach = track.reach2.sqrt();
+        let (reach, reach2) = (track.reach, track.reach * track.reach);
         let half_x = (gate * (track.cov.xx + self.max_xx)).sqrt().min(reach);
         let half_y = (gate * (track.cov.yy + self.max_yy)).sqrt().min(reach);
         let mut looked_at = 0;
@@ -119,11 +132,11 @@ impl ScanTable {
             looked_at += 1;
             let (dx, dy) = (p.x - track.x, p.y - track.y);
             if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
-                let r = &self.noise[p.index as usize];
+                let r = self.noise(p.index);
                 let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
                 let det = sxx * syy - sxy * sxy;
                 let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
-                if distance2 <= gate && dx * dx + dy * dy <= track.reach2 {
+                if distance2 <= gate && dx * dx + dy * dy <= reach2 {
                     let cost = distance2 + terms(p.index);
                     let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
                     gates.push(Pair { detection: p.index, cost, log_likelihood });
@@ -141,12 +154,6 @@ impl ScanTable {
             gates.open_row().sort_unstable_by_key(|p| p.detection);
         }
     }
-}
-
-/// What is known of a row beforehand.
-#[inline]
-pub fn prior(p_detection: f64, p_gate: f64, existence: f64, miss_cost: f64) -> Prior {
-    Prior { p_detection, p_gate, existence, miss_cost }
 }
 
 /// Innovation covariance of a track and a detection, px².

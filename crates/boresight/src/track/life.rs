@@ -55,15 +55,20 @@ pub struct ScoreConfig {
     pub false_confirm_probability: f64,
     /// Probability β that a true tentative track is deleted, in (0, 1).
     pub true_delete_probability: f64,
-    /// New targets per px² and scan over the clutter density: the ratio a start begins with, above 0.
-    pub birth_to_clutter: f64,
+    /// New targets per px² and scan, above 0: a start's first odds are this over the clutter density.
+    pub birth_density_per_px2: f64,
     /// A confirmed track is deleted when its score falls this far below its best, above 0 (natural units).
     pub max_drop: f64,
 }
 
 impl Default for ScoreConfig {
     fn default() -> Self {
-        Self { false_confirm_probability: 1e-3, true_delete_probability: 1e-2, birth_to_clutter: 0.1, max_drop: 12.0 }
+        Self {
+            false_confirm_probability: 1e-3,
+            true_delete_probability: 1e-2,
+            birth_density_per_px2: 1e-6,
+            max_drop: 12.0,
+        }
     }
 }
 
@@ -71,21 +76,32 @@ impl Default for ScoreConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ExistenceConfig {
-    /// Probability that a start is a target, in (0, 1).
-    pub birth_probability: f64,
+    /// New targets per px² and scan, above 0: a start's first odds are this over the clutter density.
+    pub birth_density_per_px2: f64,
     /// A track at or above this is confirmed, in (0, 1).
     pub confirm_probability: f64,
-    /// A track below this is deleted, in (0, 1), below the birth probability.
+    /// A track below this is deleted, in (0, 1), below the probability that confirms.
     pub delete_probability: f64,
+    /// A confirmed track that falls below this is tentative again until it recovers, in (0, 1), below the one that
+    /// confirms: a target that left is no longer reported, but still known if it comes back.
+    pub doubt_probability: f64,
     /// Mean time a target stays in view, s, above 0: existence fades with it while nothing is seen.
     pub mean_life_s: f64,
 }
 
 impl Default for ExistenceConfig {
     fn default() -> Self {
-        Self { birth_probability: 0.2, confirm_probability: 0.95, delete_probability: 0.01, mean_life_s: 30.0 }
+        Self {
+            birth_density_per_px2: 1e-6,
+            confirm_probability: 0.95,
+            delete_probability: 0.001,
+            doubt_probability: 0.5,
+            mean_life_s: 30.0,
+        }
     }
 }
+
+const BIRTH_HINT: &str = "1e-6 is one new target in three scans of 640 x 512 px";
 
 impl LifeConfig {
     /// Checks all values; `at` names the place in the configuration.
@@ -103,21 +119,30 @@ impl LifeConfig {
                 let at = format!("{at}.score");
                 probability(&at, "false-confirm-probability", c.false_confirm_probability, "0.001 is usual")?;
                 probability(&at, "true-delete-probability", c.true_delete_probability, "0.01 is usual")?;
-                positive(&at, "birth-to-clutter", c.birth_to_clutter, "0.1: one new target for ten false detections")?;
+                positive(&at, "birth-density-per-px2", c.birth_density_per_px2, BIRTH_HINT)?;
                 positive(&at, "max-drop", c.max_drop, "12 is about five missed scans at P_D 0.9")
             }
             Self::Existence(c) => {
                 let at = format!("{at}.existence");
-                probability(&at, "birth-probability", c.birth_probability, "0.2 is usual")?;
+                positive(&at, "birth-density-per-px2", c.birth_density_per_px2, BIRTH_HINT)?;
                 probability(&at, "confirm-probability", c.confirm_probability, "0.95 is usual")?;
                 probability(&at, "delete-probability", c.delete_probability, "0.01 is usual")?;
+                probability(&at, "doubt-probability", c.doubt_probability, "0.5 is usual")?;
                 check(
-                    c.delete_probability < c.birth_probability,
+                    c.doubt_probability <= c.confirm_probability,
+                    &at,
+                    "doubt-probability",
+                    c.doubt_probability,
+                    "at most confirm-probability",
+                    "0.5 and 0.95 are usual",
+                )?;
+                check(
+                    c.delete_probability < c.confirm_probability,
                     &at,
                     "delete-probability",
                     c.delete_probability,
-                    "less than birth-probability",
-                    "else every track dies at birth",
+                    "less than confirm-probability",
+                    "0.01 and 0.95 are usual",
                 )?;
                 positive(&at, "mean-life-s", c.mean_life_s, "30 s suits most scenes")
             }
@@ -130,19 +155,19 @@ impl LifeConfig {
 pub struct Life {
     /// Hits (1) and misses (0), the newest in the lowest bit.
     history: u64,
-    /// Entries of the history, at most 64.
-    entries: u8,
-    /// Believed.
-    pub confirmed: bool,
-    /// Misses in a row.
-    pub misses: u32,
-    /// Score (ln Λ summed) or existence probability, by the method.
+    /// Score (ln Λ summed), or odds that the target exists, by the method.
     value: f64,
     best: f64,
     /// Time of the last detection, ns.
     pub last_hit_ns: i64,
     /// Time of the start, ns.
     pub born_ns: i64,
+    /// Misses in a row.
+    pub misses: u32,
+    /// Entries of the history, at most 64.
+    entries: u8,
+    /// Believed.
+    pub confirmed: bool,
 }
 
 /// What one scan said of a track.
@@ -150,8 +175,8 @@ pub struct Life {
 pub struct Evidence {
     /// A detection was taken.
     pub hit: bool,
-    /// ln Λ of this scan.
-    pub log_ratio: f64,
+    /// Λ of this scan.
+    pub ratio: f64,
 }
 
 /// What becomes of a track.
@@ -163,35 +188,50 @@ pub enum Verdict {
     Delete,
 }
 
+/// Odds stay within these, so that no past, good or bad, outweighs a new scan for ever.
+const ODDS: (f64, f64) = (1e-12, 1e12);
+
 impl LifeConfig {
     /// Life at the start of a track from `n_points` detections (1 or 2).
-    pub fn begin(&self, n_points: u32, now_ns: i64) -> Life {
+    ///
+    /// `clutter_density` is in 1/px²; `ratio` is P_D l / λ of the second point given the first (1 for one point).
+    pub fn begin(&self, n_points: u32, now_ns: i64, clutter_density: f64, ratio: f64) -> Life {
+        let first = |birth: f64| (birth / clutter_density.max(1e-300) * ratio).clamp(ODDS.0, ODDS.1);
         let value = match self {
             Self::MOfN(_) => 0.0,
-            Self::Score(c) => c.birth_to_clutter.ln(),
-            Self::Existence(c) => c.birth_probability,
+            Self::Score(c) => first(c.birth_density_per_px2).ln(),
+            Self::Existence(c) => first(c.birth_density_per_px2),
         };
-        let mut life = Life {
+        let confirmed = match self {
+            Self::MOfN(c) => c.hits <= n_points,
+            Self::Score(c) => value >= c.confirm_score(),
+            Self::Existence(c) => probability_of(value) >= c.confirm_probability,
+        };
+        Life {
             history: (1 << n_points) - 1,
             entries: n_points as u8,
-            confirmed: false,
+            confirmed,
             misses: 0,
             value,
             best: value,
             last_hit_ns: now_ns,
             born_ns: now_ns,
-        };
-        if let Self::MOfN(c) = self {
-            life.confirmed = c.hits <= n_points;
         }
-        life
     }
 
-    /// Existence before the detections of a scan are seen: it fades over `dt_s`.
+    /// Existence before the detections of a scan are seen: `survival` is the probability to stay in view since the last.
     #[inline]
-    pub fn fade(&self, life: &mut Life, dt_s: f64) {
-        if let Self::Existence(c) = self {
-            life.value *= (-dt_s / c.mean_life_s).exp();
+    pub fn fade(&self, life: &mut Life, survival: f64) {
+        if let Self::Existence(_) = self {
+            life.value *= survival / (1.0 + life.value * (1.0 - survival));
+        }
+    }
+
+    /// Probability that a target stays in view for `dt_s`.
+    pub fn survival(&self, dt_s: f64) -> f64 {
+        match self {
+            Self::Existence(c) => (-dt_s / c.mean_life_s).exp(),
+            _ => 1.0,
         }
     }
 
@@ -199,12 +239,13 @@ impl LifeConfig {
     #[inline]
     pub fn existence(&self, life: &Life) -> f64 {
         match self {
-            Self::Existence(_) => life.value.clamp(1e-12, 1.0 - 1e-12),
+            Self::Existence(_) => probability_of(life.value),
             _ => 1.0,
         }
     }
 
     /// Confidence of a track, 0..=1.
+    #[inline]
     pub fn confidence(&self, life: &Life) -> f32 {
         match self {
             Self::MOfN(c) => {
@@ -212,11 +253,12 @@ impl LifeConfig {
                 (life.history & low_bits(n)).count_ones() as f32 / n as f32
             }
             Self::Score(_) => (1.0 / (1.0 + (-life.value).exp())) as f32,
-            Self::Existence(_) => life.value as f32,
+            Self::Existence(_) => probability_of(life.value) as f32,
         }
     }
 
     /// Takes the evidence of a scan and says whether the track lives on; the coasting budget is the tracker's.
+    #[inline]
     pub fn advance(&self, life: &mut Life, evidence: Evidence, now_ns: i64) -> Verdict {
         life.history = (life.history << 1) | u64::from(evidence.hit);
         life.entries = life.entries.saturating_add(1).min(64);
@@ -227,52 +269,79 @@ impl LifeConfig {
             life.misses = life.misses.saturating_add(1);
         }
         match self {
-            Self::MOfN(c) => {
-                if life.confirmed {
-                    return Verdict::Keep;
-                }
-                let entries = u32::from(life.entries);
-                let hits = (life.history & low_bits(c.scans)).count_ones();
-                if hits >= c.hits && entries >= c.hits {
-                    life.confirmed = true;
-                    return Verdict::Keep;
-                }
-                let late = (now_ns.saturating_sub(life.born_ns)) as f64 * 1e-9 > c.tentative_s;
-                if entries >= c.scans || hits + (c.scans - entries) < c.hits || late {
-                    return Verdict::Delete;
-                }
-            }
-            Self::Score(c) => {
-                life.value += evidence.log_ratio;
-                life.best = life.best.max(life.value);
-                let (alpha, beta) = (c.false_confirm_probability, c.true_delete_probability);
-                if !life.confirmed {
-                    if life.value >= ((1.0 - beta) / alpha).ln() {
-                        life.confirmed = true;
-                        life.best = life.value;
-                    } else if life.value <= (beta / (1.0 - alpha)).ln() + c.birth_to_clutter.ln() {
-                        return Verdict::Delete;
-                    }
-                } else if life.best - life.value > c.max_drop {
-                    return Verdict::Delete;
-                }
-                // A long good past must not carry a lost track for as long again.
-                life.best = life.best.min(1e3);
-                life.value = life.value.min(1e3);
-            }
-            Self::Existence(c) => {
-                // ψ ← ψ Λ / (1 − ψ + ψ Λ), by odds so that nothing overflows.
-                let log_odds = (life.value / (1.0 - life.value).max(1e-15)).ln() + evidence.log_ratio;
-                life.value = (1.0 / (1.0 + (-log_odds).exp())).clamp(1e-12, 1.0 - 1e-12);
-                if life.value >= c.confirm_probability {
-                    life.confirmed = true;
-                } else if life.value < c.delete_probability {
-                    return Verdict::Delete;
-                }
-            }
+            Self::MOfN(c) => c.judge(life, now_ns),
+            Self::Score(c) => c.judge(life, evidence.ratio.clamp(ODDS.0, ODDS.1)),
+            Self::Existence(c) => c.judge(life, evidence.ratio),
+        }
+    }
+}
+
+impl MOfNConfig {
+    fn judge(&self, life: &mut Life, now_ns: i64) -> Verdict {
+        if life.confirmed {
+            return Verdict::Keep;
+        }
+        let entries = u32::from(life.entries);
+        let hits = (life.history & low_bits(self.scans)).count_ones();
+        if hits >= self.hits && entries >= self.hits {
+            life.confirmed = true;
+            return Verdict::Keep;
+        }
+        let late = (now_ns.saturating_sub(life.born_ns)) as f64 * 1e-9 > self.tentative_s;
+        if entries >= self.scans || hits + (self.scans - entries) < self.hits || late {
+            return Verdict::Delete;
         }
         Verdict::Keep
     }
+}
+
+impl ScoreConfig {
+    /// Wald's upper threshold ln((1 − β) / α).
+    fn confirm_score(&self) -> f64 {
+        ((1.0 - self.true_delete_probability) / self.false_confirm_probability).ln()
+    }
+
+    fn judge(&self, life: &mut Life, ratio: f64) -> Verdict {
+        // A long good past must not carry a lost track for as long again.
+        life.value = (life.value + ratio.ln()).clamp(-50.0, 50.0);
+        life.best = life.best.max(life.value);
+        if !life.confirmed {
+            if life.value >= self.confirm_score() {
+                life.confirmed = true;
+                life.best = life.value;
+            } else if life.best - life.value
+                > -(self.true_delete_probability / (1.0 - self.false_confirm_probability)).ln()
+            {
+                // Wald's lower threshold ln(β / (1 − α)), counted from the best so far: a late fall counts as an early one.
+                return Verdict::Delete;
+            }
+        } else if life.best - life.value > self.max_drop {
+            return Verdict::Delete;
+        }
+        Verdict::Keep
+    }
+}
+
+impl ExistenceConfig {
+    fn judge(&self, life: &mut Life, ratio: f64) -> Verdict {
+        // ψ ← ψ Λ / (1 − ψ + ψ Λ) is odds ← odds Λ.
+        life.value = (life.value * ratio).clamp(ODDS.0, ODDS.1);
+        let psi = probability_of(life.value);
+        if psi >= self.confirm_probability {
+            life.confirmed = true;
+        } else if psi < self.doubt_probability {
+            life.confirmed = false;
+        }
+        if psi < self.delete_probability {
+            return Verdict::Delete;
+        }
+        Verdict::Keep
+    }
+}
+
+#[inline]
+fn probability_of(odds: f64) -> f64 {
+    odds / (1.0 + odds)
 }
 
 fn low_bits(n: u32) -> u64 {
@@ -284,10 +353,10 @@ mod tests {
     use super::*;
 
     fn run(config: &LifeConfig, points: u32, hits: &[bool]) -> Vec<(bool, Verdict)> {
-        let mut life = config.begin(points, 0);
+        let mut life = config.begin(points, 0, 1e-5, 1.0);
         hits.iter()
             .map(|h| {
-                let e = Evidence { hit: *h, log_ratio: if *h { 3.0 } else { 0.11_f64.ln() } };
+                let e = Evidence { hit: *h, ratio: if *h { 3f64.exp() } else { 0.11 } };
                 let v = config.advance(&mut life, e, 0);
                 (life.confirmed, v)
             })
@@ -314,9 +383,12 @@ mod tests {
     #[test]
     fn existence_follows_bayes() {
         let c = LifeConfig::Existence(ExistenceConfig::default());
-        let mut life = c.begin(1, 0);
-        c.advance(&mut life, Evidence { hit: true, log_ratio: 8f64.ln() }, 0);
+        let mut life = c.begin(1, 0, 4e-6, 1.0);
+        assert!((c.existence(&life) - 0.2).abs() < 1e-12);
+        c.advance(&mut life, Evidence { hit: true, ratio: 8.0 }, 0);
         // 0.2 * 8 / (0.8 + 0.2 * 8) = 2/3.
-        assert!((life.value - 2.0 / 3.0).abs() < 1e-12);
+        assert!((c.existence(&life) - 2.0 / 3.0).abs() < 1e-12);
+        c.fade(&mut life, 0.9);
+        assert!((c.existence(&life) - 0.6).abs() < 1e-12);
     }
 }

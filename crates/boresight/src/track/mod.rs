@@ -5,14 +5,16 @@
 mod belief;
 pub mod birth;
 pub mod config;
+mod correct;
 pub mod cv;
 pub mod gating;
 pub mod life;
 mod pace;
 mod stage;
+mod starts;
 pub mod tracker;
 
-pub use birth::{BirthConfig, OnePointConfig, VelocityBoundsConfig};
+pub use birth::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
 pub use config::{FilterConfig, TrackFilter, TrackerConfig};
 pub use life::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
 pub use tracker::Tracker;

@@ -10,16 +10,17 @@
 
 use super::Tracking;
 use super::belief::Belief;
-use super::birth::{BirthConfig, from_one_point, from_two_points};
 use super::config::TrackerConfig;
+use super::correct::Scratch;
 use super::gating::{Noise, Predicted, ScanTable};
 use super::life::{Evidence, Life, Verdict};
 use super::pace::Pace;
 use super::stage::Stage;
+use super::starts::LeftOver;
 use crate::associate::AssociatorConfig;
 use crate::record::Innovation;
-use crate::{Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
-use boresight_filters::{Filter, Gaussian};
+use crate::{Detection, Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
+use boresight_filters::Filter;
 use nalgebra::Vector2;
 
 /// One living track.
@@ -40,15 +41,9 @@ pub(super) struct Outcome {
     pub hit: bool,
     /// The detection of the largest weight.
     pub detection: Option<u32>,
-    pub log_ratio: f64,
+    /// Λ of the scan.
+    pub ratio: f64,
     pub innovation: Option<Innovation>,
-}
-
-/// A detection that no track took, kept for the next scan.
-#[derive(Clone, Copy, Debug)]
-struct LeftOver {
-    position: Vector2<f64>,
-    noise: Noise,
 }
 
 /// How much a new box moves the smoothed one.
@@ -57,20 +52,21 @@ const SIZE_GAIN: f64 = 0.3;
 /// The tracker.
 pub struct Tracker {
     pub(super) config: TrackerConfig,
-    pub(super) gate: f64,
+    gate: f64,
     pub(super) tracks: Vec<Track>,
-    pub(super) predicted: Vec<Predicted>,
-    pub(super) outcomes: Vec<Outcome>,
+    predicted: Vec<Predicted>,
     pub(super) table: ScanTable,
     pub(super) used: Vec<bool>,
-    confirmed_stage: Stage,
-    tentative_stage: Stage,
-    left_over: Vec<LeftOver>,
-    left_over_time: Timestamp,
-    states: Vec<TrackState>,
+    /// Confirmed tracks, then tentative ones.
+    stages: [Stage; 2],
+    tentative: Vec<u32>,
+    scratch: Scratch,
+    pub(super) left_over: Vec<LeftOver>,
+    pub(super) left_over_time: Timestamp,
+    pub(super) states: Vec<TrackState>,
     last: Option<Timestamp>,
     pace: Pace,
-    next_id: u64,
+    pub(super) next_id: u64,
 }
 
 impl Tracker {
@@ -81,12 +77,12 @@ impl Tracker {
         config.validate("tracker")?;
         Ok(Self {
             gate: config.gate(),
-            confirmed_stage: Stage::new(&config.associator),
-            tentative_stage: Stage::new(&AssociatorConfig::default()),
+            stages: [Stage::new(&config.associator), Stage::new(&AssociatorConfig::default())],
+            tentative: Vec::new(),
+            scratch: Scratch::default(),
             config: config.clone(),
             tracks: Vec::new(),
             predicted: Vec::new(),
-            outcomes: Vec::new(),
             table: ScanTable::default(),
             used: Vec::new(),
             left_over: Vec::new(),
@@ -119,171 +115,121 @@ impl Tracker {
         self.config.coast_s.max(f64::from(self.config.coast_scans) * self.pace.interval_s())
     }
 
+    /// Predicts every track, and gates the confirmed ones while they are at hand.
     fn predict(&mut self, dt_s: f64, now: Timestamp) -> Result<()> {
         self.predicted.clear();
+        self.tentative.clear();
         let speed = self.config.max_speed_px_per_s;
-        for t in &mut self.tracks {
+        let survival = self.config.life.survival(dt_s);
+        for (i, t) in self.tracks.iter_mut().enumerate() {
             t.belief.predict(dt_s)?;
-            self.config.life.fade(&mut t.life, dt_s);
+            self.config.life.fade(&mut t.life, survival);
             let p = t.belief.predicted();
             let elapsed_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
             // From where it was last seen the target came at most this far; the prediction may already lie off it.
             let [ax, ay, std] = t.anchor;
-            let off = (p.mean.x - ax).hypot(p.mean.y - ay);
             let far = speed * elapsed_s + 3.0 * std;
-            let reach = if self.config.gate_within_max_speed { far + off } else { f64::INFINITY };
-            self.predicted.push(Predicted {
+            let off = (p.mean - Vector2::new(ax, ay)).norm();
+            let predicted = Predicted {
                 x: p.mean.x,
                 y: p.mean.y,
                 cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
-                reach2: reach * reach,
-            });
+                reach: if self.config.gate_within_max_speed { far + off } else { f64::INFINITY },
+            };
+            self.predicted.push(predicted);
+            if t.life.confirmed {
+                let existence = self.config.life.existence(&t.life);
+                self.stages[0].add(i, &predicted, existence, &self.table, self.gate, &self.config, |_| true);
+            } else {
+                self.tentative.push(i as u32);
+            }
         }
         Ok(())
     }
 
-    /// Life of every track after the scan; the dead leave, the order stays.
-    fn live_on(&mut self, now: Timestamp) {
+    /// Associates: the confirmed tracks first, then the tentative ones with what is left.
+    fn associate(&mut self) {
+        self.stages[0].solve(&mut self.used);
+        for i in &self.tentative {
+            let i = *i as usize;
+            let existence = self.config.life.existence(&self.tracks[i].life);
+            let used = &self.used;
+            self.stages[1]
+                .add(i, &self.predicted[i], existence, &self.table, self.gate, &self.config, |j| !used[j as usize]);
+        }
+        self.stages[1].solve(&mut self.used);
+    }
+
+    /// Corrects every track, lets it live on or die, and reports it; the order stays.
+    fn correct(&mut self, scan: &Scan) {
+        let now = scan.time;
         let budget_s = self.coast_budget_s();
+        self.states.clear();
         let mut kept = 0;
         for i in 0..self.tracks.len() {
-            let outcome = self.outcomes[i];
             let t = &mut self.tracks[i];
-            let evidence = Evidence { hit: outcome.hit, log_ratio: outcome.log_ratio };
+            let mut outcome = Outcome::default();
+            for stage in &mut self.stages {
+                if let Some(found) =
+                    stage.correct(i, t, &self.predicted[i], scan, &self.table, &self.config, &mut self.scratch)
+                {
+                    outcome = found;
+                }
+            }
+            let evidence = Evidence { hit: outcome.hit, ratio: outcome.ratio };
             let mut verdict = self.config.life.advance(&mut t.life, evidence, now.ns);
-            let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
-            if t.life.confirmed && t.life.misses > 0 && silent_s >= budget_s - 1e-9 {
-                verdict = Verdict::Delete;
+            if t.life.misses > 0 {
+                let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
+                if silent_s >= budget_s - 1e-9 {
+                    verdict = Verdict::Delete;
+                }
             }
             if verdict == Verdict::Keep {
-                self.tracks.swap(kept, i);
-                self.outcomes[kept] = outcome;
+                self.states.push(t.state(&outcome, &self.config));
+                if kept != i {
+                    self.tracks.swap(kept, i);
+                }
                 kept += 1;
             }
         }
         self.tracks.truncate(kept);
-        self.outcomes.truncate(kept);
-    }
-
-    /// Starts tracks from what is left over.
-    fn start(&mut self, scan: &Scan) {
-        let now = scan.time;
-        let room = (self.config.max_tracks as usize).saturating_sub(self.tracks.len());
-        let first_new = self.tracks.len();
-        match self.config.birth {
-            BirthConfig::OnePoint(ref c) => {
-                let variance = Vector2::repeat(c.velocity_std_px_per_s.powi(2));
-                for j in 0..scan.detections.len() {
-                    if !self.used[j] && self.tracks.len() - first_new < room {
-                        let r = self.table.noise[j].matrix();
-                        let start = from_one_point(&scan.detections[j].position, &r, Vector2::zeros(), variance);
-                        self.begin(scan, j, &start, 1);
-                    }
-                }
-            }
-            BirthConfig::TwoPoint {} | BirthConfig::VelocityBounds(_) => {
-                let dt_s = now.seconds_since(self.left_over_time);
-                let left_over = std::mem::take(&mut self.left_over);
-                if dt_s > 0.0 {
-                    for first in &left_over {
-                        if self.tracks.len() - first_new >= room {
-                            break;
-                        }
-                        if let Some(j) = self.partner(scan, first, dt_s) {
-                            self.used[j] = true;
-                            let r = self.table.noise[j].matrix();
-                            let z = &scan.detections[j].position;
-                            let start = from_two_points(&first.position, &first.noise.matrix(), z, &r, dt_s);
-                            self.begin(scan, j, &start, 2);
-                        }
-                    }
-                }
-                self.left_over = left_over;
-                self.left_over.clear();
-                self.left_over.extend(scan.detections.iter().zip(&self.table.noise).zip(&self.used).filter_map(
-                    |((d, noise), used)| (!used).then_some(LeftOver { position: d.position, noise: *noise }),
-                ));
-                self.left_over_time = now;
-            }
-        }
-    }
-
-    /// The nearest left-over detection that a target at `first` can have reached.
-    fn partner(&self, scan: &Scan, first: &LeftOver, dt_s: f64) -> Option<usize> {
-        let far = self.config.max_speed_px_per_s * dt_s;
-        let mut best: Option<(f64, u32)> = None;
-        let mut looked_at = 0;
-        self.table.grid().near(first.position.x, first.position.y, far, far, |p| {
-            looked_at += 1;
-            let (dx, dy) = (p.x - first.position.x, p.y - first.position.y);
-            let distance2 = dx * dx + dy * dy;
-            let nearer = best.is_none_or(|(d, i)| distance2 < d || (distance2 == d && p.index < i));
-            let possible = match &self.config.birth {
-                BirthConfig::VelocityBounds(b) => [dx, dy]
-                    .iter()
-                    .enumerate()
-                    .all(|(a, d)| (b.min_px_per_s[a]..=b.max_px_per_s[a]).contains(&(d / dt_s))),
-                _ => true,
-            };
-            if distance2 <= far * far && nearer && possible && !self.used[p.index as usize] {
-                best = Some((distance2, p.index));
-            }
-            looked_at < super::gating::MOST_LOOKED_AT
-        });
-        debug_assert!(best.is_none_or(|(_, i)| (i as usize) < scan.detections.len()));
-        best.map(|(_, i)| i as usize)
-    }
-
-    fn begin(&mut self, scan: &Scan, detection: usize, start: &Gaussian<4>, n_points: u32) {
-        let d = &scan.detections[detection];
-        let n = &self.table.noise[detection];
-        self.tracks.push(Track {
-            id: self.next_id,
-            belief: self.config.belief(start),
-            life: self.config.life.begin(n_points, scan.time.ns),
-            size: [d.extent.width_px, d.extent.height_px],
-            anchor: [d.position.x, d.position.y, n.xx.max(n.yy).sqrt()],
-        });
-        self.outcomes.push(Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() });
-        self.next_id += 1;
-    }
-
-    fn report(&mut self) {
-        self.states.clear();
-        for (t, o) in self.tracks.iter().zip(&self.outcomes) {
-            let kinematics = t.belief.kinematics();
-            let [width_px, height_px] = t.size;
-            self.states.push(TrackState {
-                id: TrackId(t.id),
-                status: match (t.life.confirmed, o.hit) {
-                    (false, _) => TrackStatus::Tentative,
-                    (true, true) => TrackStatus::Confirmed,
-                    (true, false) => TrackStatus::Coasting,
-                },
-                extent: Extent {
-                    left_px: kinematics.mean[0] - 0.5 * width_px,
-                    top_px: kinematics.mean[2] - 0.5 * height_px,
-                    width_px,
-                    height_px,
-                },
-                kinematics,
-                detection: o.detection,
-                innovation: o.innovation,
-                score: self.config.life.confidence(&t.life),
-            });
-        }
     }
 }
 
 impl Track {
     /// Takes in the box and place of a detection that is (most likely) its own.
-    pub(super) fn seen(&mut self, scan: &Scan, detection: u32, noise: &Noise) {
-        let d = &scan.detections[detection as usize];
+    #[inline]
+    pub(super) fn seen(&mut self, d: &Detection, noise: &Noise) {
         let new = [d.extent.width_px, d.extent.height_px];
         for a in 0..2 {
             self.size[a] += SIZE_GAIN * (new[a] - self.size[a]);
         }
         self.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
+    }
+
+    /// What is said of the track after a scan.
+    #[inline]
+    pub(super) fn state(&self, outcome: &Outcome, config: &TrackerConfig) -> TrackState {
+        let kinematics = self.belief.kinematics();
+        let [width_px, height_px] = self.size;
+        TrackState {
+            id: TrackId(self.id),
+            status: match (self.life.confirmed, outcome.hit) {
+                (false, _) => TrackStatus::Tentative,
+                (true, true) => TrackStatus::Confirmed,
+                (true, false) => TrackStatus::Coasting,
+            },
+            extent: Extent {
+                left_px: kinematics.mean[0] - 0.5 * width_px,
+                top_px: kinematics.mean[2] - 0.5 * height_px,
+                width_px,
+                height_px,
+            },
+            kinematics,
+            detection: outcome.detection,
+            innovation: outcome.innovation,
+            score: config.life.confidence(&self.life),
+        }
     }
 }
 
@@ -311,23 +257,16 @@ impl Tracking for Tracker {
             self.pace.note(dt_s);
         }
         self.last = Some(scan.time);
-        self.predict(dt_s, scan.time)?;
         self.table.sort(scan);
         self.used.clear();
         self.used.resize(scan.detections.len(), false);
-        self.outcomes.clear();
-        self.outcomes.resize(self.tracks.len(), Outcome::default());
-
-        let mut stage = std::mem::take(&mut self.confirmed_stage);
-        stage.run(self, scan, |t| t.life.confirmed);
-        self.confirmed_stage = stage;
-        let mut stage = std::mem::take(&mut self.tentative_stage);
-        stage.run(self, scan, |t| !t.life.confirmed);
-        self.tentative_stage = stage;
-
-        self.live_on(scan.time);
+        for stage in &mut self.stages {
+            stage.begin(scan.detections.len(), self.config.clutter_density_per_px2);
+        }
+        self.predict(dt_s, scan.time)?;
+        self.associate();
+        self.correct(scan);
         self.start(scan);
-        self.report();
         Ok(&self.states)
     }
 }

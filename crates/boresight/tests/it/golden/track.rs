@@ -116,7 +116,7 @@ fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
             x: p.mean.x,
             y: p.mean.y,
             cov: gating::Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
-            reach2: f64::INFINITY,
+            reach: f64::INFINITY,
         };
         let mut table = gating::ScanTable::default();
         table.read(&scan, 0.0).unwrap();
