@@ -103,6 +103,12 @@ where
     /// [`FilterError`] if the belief is not finite, not symmetric, or its covariance cannot be factored.
     fn start(model: M, belief: Gaussian<N, Self::Real>) -> Result<Self, FilterError>;
 
+    /// Returns the motion model.
+    fn model(&self) -> &M;
+
+    /// Returns the motion model to change it: the next predict uses it.
+    fn model_mut(&mut self) -> &mut M;
+
     /// Starts from a belief in position and velocity `[x, vx, y, vy]`; further states take the model's prior.
     /// # Errors
     /// As [`Start::start`].

@@ -40,11 +40,6 @@ impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
         self.form = form;
         self
     }
-
-    /// Returns the motion model.
-    pub fn model(&self) -> &M {
-        &self.model
-    }
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Kf<M, N, T> {
@@ -52,6 +47,14 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Kf<M, N, T> {
         check_belief(&belief)?;
         crate::linalg::ud_factorize(&belief.cov)?;
         Ok(Self { model, belief, form: CovarianceForm::Joseph })
+    }
+
+    fn model(&self) -> &M {
+        &self.model
+    }
+
+    fn model_mut(&mut self) -> &mut M {
+        &mut self.model
     }
 }
 

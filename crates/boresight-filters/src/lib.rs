@@ -10,6 +10,7 @@
 mod error;
 mod filter;
 mod gaussian;
+pub mod information;
 pub mod kf;
 pub mod linalg;
 pub mod linear;
@@ -17,11 +18,16 @@ pub mod mixture;
 pub mod model;
 pub mod pda;
 mod real;
+pub mod square_root;
+pub mod srif;
 pub mod ud;
 
 pub use error::FilterError;
 pub use filter::{Filter, GaussianFilter, Start, Tracked};
 pub use gaussian::{Gaussian, Measurement, Weighted};
+pub use information::Information;
 pub use kf::{CovarianceForm, Kf};
 pub use real::Real;
+pub use square_root::SquareRoot;
+pub use srif::Srif;
 pub use ud::Ud;

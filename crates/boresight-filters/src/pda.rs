@@ -34,8 +34,8 @@ pub struct Clutter<T = f64> {
 /// let clutter = Clutter { density: 0.02, detection_probability: 0.9, gate_probability: 0.99 };
 /// let mut p = [0.0; 2];
 /// let p0 = association_probabilities(&predicted, &z, &clutter, &mut p).unwrap();
-/// assert!((p0 - 0.018989909403364).abs() < 1e-12);
-/// assert!((p[0] - 0.63712686724844).abs() < 1e-12 && (p[1] - 0.3438832233482).abs() < 1e-12);
+/// assert!((p0 - 0.018989909403364_f64).abs() < 1e-12);
+/// assert!((p[0] - 0.63712686724844_f64).abs() < 1e-12 && (p[1] - 0.3438832233482).abs() < 1e-12);
 /// ```
 /// # Errors
 /// [`FilterError`] for probabilities outside their range, measurements that are not finite, or lengths that differ.

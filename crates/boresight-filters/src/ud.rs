@@ -118,11 +118,6 @@ impl<M: Model<N, T>, const N: usize, T: Real> Ud<M, N, T> {
         &self.factors
     }
 
-    /// Returns the motion model.
-    pub fn model(&self) -> &M {
-        &self.model
-    }
-
     #[inline(always)]
     fn accept(&mut self, mean: SVector<T, N>, factors: UdFactors<N, T>) -> Result<(), FilterError> {
         if !(all_finite(&mean) & all_finite(&factors.u) & all_finite(&factors.d)) {
@@ -138,6 +133,14 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
         Ok(Self { model, mean: belief.mean, factors: ud_factorize(&belief.cov)? })
+    }
+
+    fn model(&self) -> &M {
+        &self.model
+    }
+
+    fn model_mut(&mut self) -> &mut M {
+        &mut self.model
     }
 }
 

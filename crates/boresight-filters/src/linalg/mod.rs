@@ -1,14 +1,16 @@
 //! The small dense mathematics of the filters: fixed sizes, no heap, written so that the compiler can unroll it.
 
 mod cholesky;
+mod householder;
 mod pair;
 mod ud;
 
 pub use cholesky::Cholesky;
+pub use householder::{eliminate, fold_rows, lower_factor, triangularize};
 pub use pair::{Pair, invert_pair};
 pub use ud::{UdFactors, mwgs, ud_factorize};
 
-use crate::Real;
+use crate::{FilterError, Real};
 use nalgebra::SMatrix;
 
 /// Returns A B.
@@ -45,6 +47,41 @@ pub(crate) fn mul_transposed<T: Real, const R: usize, const K: usize, const C: u
         }
     }
     out
+}
+
+/// Returns A⁻¹ by elimination with row pivoting.
+pub(crate) fn invert<T: Real, const N: usize>(a: &SMatrix<T, N, N>) -> Result<SMatrix<T, N, N>, FilterError> {
+    let mut a = *a;
+    let mut inv = SMatrix::<T, N, N>::identity();
+    for j in 0..N {
+        let mut best = j;
+        for i in j + 1..N {
+            if a[(i, j)].abs() > a[(best, j)].abs() {
+                best = i;
+            }
+        }
+        a.swap_rows(j, best);
+        inv.swap_rows(j, best);
+        let f = T::one() / a[(j, j)];
+        if !(f.abs() <= T::MAX) {
+            return Err(FilterError::NotPositiveDefinite("the transition matrix"));
+        }
+        for c in 0..N {
+            a[(j, c)] *= f;
+            inv[(j, c)] *= f;
+        }
+        for i in 0..N {
+            if i != j {
+                let less = a[(i, j)];
+                for c in 0..N {
+                    let (u, v) = (a[(j, c)], inv[(j, c)]);
+                    a[(i, c)] -= less * u;
+                    inv[(i, c)] -= less * v;
+                }
+            }
+        }
+    }
+    Ok(inv)
 }
 
 /// Makes a matrix exactly symmetric by the mean of each pair.

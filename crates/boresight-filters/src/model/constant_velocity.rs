@@ -68,6 +68,11 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
     }
 
     #[inline]
+    fn inverse_transition(&self, dt: T, at: &SVector<T, 4>) -> Result<SMatrix<T, 4, 4>, FilterError> {
+        Ok(self.transition(-dt, at))
+    }
+
+    #[inline]
     fn process_noise(&self, dt: T) -> SMatrix<T, 4, 4> {
         let (a, b, c) = self.axis_noise(dt);
         let mut q = SMatrix::zeros();

@@ -14,6 +14,8 @@ impl<const N: usize, T: Real, M: Model<N, T>> Model<N, T> for Dense<M> {
     const POSITION: [usize; 2] = M::POSITION;
     const VELOCITY: Option<[usize; 2]> = M::VELOCITY;
 
+    const LINEAR: bool = M::LINEAR;
+
     #[inline]
     fn transition(&self, dt_s: T, at: &SVector<T, N>) -> SMatrix<T, N, N> {
         self.0.transition(dt_s, at)

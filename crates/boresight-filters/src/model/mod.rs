@@ -11,7 +11,7 @@ mod dense;
 pub use constant_velocity::ConstantVelocity;
 pub use dense::Dense;
 
-use crate::linalg::{mul, mul_transposed, symmetrize, ud_factorize};
+use crate::linalg::{invert, mul, mul_transposed, symmetrize, ud_factorize};
 use crate::{FilterError, Gaussian, Measurement, Real};
 use nalgebra::{SMatrix, SVector};
 
@@ -21,9 +21,19 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
     const POSITION: [usize; 2];
     /// Where the velocities of x and y stand in the state; `None` for a model without velocity.
     const VELOCITY: Option<[usize; 2]>;
+    /// Whether Phi is the same at every state.
+    const LINEAR: bool = true;
 
     /// Returns Phi for a step of `dt_s` seconds; a nonlinear model linearises at the state `at`.
     fn transition(&self, dt_s: T, at: &SVector<T, N>) -> SMatrix<T, N, N>;
+
+    /// Returns Phi⁻¹ of the same step; a model that knows it (often Phi(-dt)) saves the solving.
+    /// # Errors
+    /// [`FilterError::NotPositiveDefinite`] if Phi is singular.
+    #[inline]
+    fn inverse_transition(&self, dt_s: T, at: &SVector<T, N>) -> Result<SMatrix<T, N, N>, FilterError> {
+        invert(&self.transition(dt_s, at))
+    }
 
     /// Returns the process covariance Q of a step of `dt_s` seconds.
     fn process_noise(&self, dt_s: T) -> SMatrix<T, N, N>;

@@ -1,7 +1,7 @@
 //! Every form of the filter for one model and belief, behind the object-safe trait: the list the tests walk.
 
 use boresight_filters::model::{ConstantVelocity, Dense};
-use boresight_filters::{Filter, Gaussian, Kf, Start, Tracked, Ud};
+use boresight_filters::{Filter, Gaussian, Information, Kf, SquareRoot, Srif, Start, Tracked, Ud};
 
 /// Standard deviation of the acceleration in all tests of forms, px/s².
 pub const ACCELERATION_STD: f64 = 0.5;
@@ -12,6 +12,9 @@ pub fn forms(belief: &Gaussian<4>) -> Vec<(&'static str, Box<dyn Filter>)> {
     vec![
         ("kf", Box::new(Tracked(Kf::start(cv, *belief).unwrap()))),
         ("kf dense", Box::new(Tracked(Kf::start(Dense(cv), *belief).unwrap()))),
+        ("information", Box::new(Tracked(Information::start(cv, *belief).unwrap()))),
+        ("square-root", Box::new(Tracked(SquareRoot::start(cv, *belief).unwrap()))),
+        ("srif", Box::new(Tracked(Srif::start(cv, *belief).unwrap()))),
         ("ud", Box::new(Tracked(Ud::start(cv, *belief).unwrap()))),
     ]
 }

@@ -5,6 +5,7 @@
 
 mod linear;
 mod pda;
+mod srif;
 
 use nalgebra::{SMatrix, SVector};
 use serde_json::Value;
