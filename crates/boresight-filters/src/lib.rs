@@ -9,6 +9,8 @@
 
 mod error;
 mod filter;
+pub mod fuzzy;
+pub mod fuzzy_srif;
 mod gaussian;
 pub mod information;
 pub mod kf;
@@ -18,16 +20,19 @@ pub mod mixture;
 pub mod model;
 pub mod pda;
 mod real;
+pub mod robust;
 pub mod square_root;
 pub mod srif;
 pub mod ud;
 
 pub use error::FilterError;
 pub use filter::{Filter, GaussianFilter, Start, Tracked};
+pub use fuzzy_srif::FuzzySrif;
 pub use gaussian::{Gaussian, Measurement, Weighted};
 pub use information::Information;
 pub use kf::{CovarianceForm, Kf};
 pub use real::Real;
+pub use robust::{Fuzzy, Innovation, Robust};
 pub use square_root::SquareRoot;
 pub use srif::Srif;
 pub use ud::Ud;

@@ -79,7 +79,7 @@ pub fn eliminate<T: Real, const N: usize, const W: usize>(
     for j in 0..W {
         let tail = a.data.0[j];
         // The head is 1: the unit block stays a unit block to the right of its diagonal.
-        let Some((_, u0, beta)) = reflector(T::one(), &tail) else { continue };
+        let Some((_, _, beta)) = reflector(T::one(), &tail) else { continue };
         // Row j of the unit block is zero in every later column, so the dot products are over the tail alone.
         for c in j + 1..W {
             let mut dot = T::zero();
@@ -109,7 +109,6 @@ pub fn eliminate<T: Real, const N: usize, const W: usize>(
         for k in 0..N {
             y[k] += f * tail[k];
         }
-        let _ = u0;
     }
 }
 

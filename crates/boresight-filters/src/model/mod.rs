@@ -5,11 +5,24 @@
 //! or let the model move the covariance itself ([`Model::propagate`]), where its structure saves work.
 //! Symbols: x state N x 1; Phi N x N; Q N x N process covariance of one step; G N x W and q (W): Q = G diag(q) Gᵀ.
 
+mod axes;
+mod constant_acceleration;
 mod constant_velocity;
 mod dense;
+mod ornstein_uhlenbeck;
+mod random_walk;
+mod scaled;
+mod singer;
+mod turn;
 
+pub use constant_acceleration::ConstantAcceleration;
 pub use constant_velocity::ConstantVelocity;
 pub use dense::Dense;
+pub use ornstein_uhlenbeck::OrnsteinUhlenbeck;
+pub use random_walk::RandomWalk;
+pub use scaled::Scaled;
+pub use singer::Singer;
+pub use turn::{ConstantTurn, NearlyConstantTurn};
 
 use crate::linalg::{invert, mul, mul_transposed, symmetrize, ud_factorize};
 use crate::{FilterError, Gaussian, Measurement, Real};
