@@ -7,6 +7,8 @@
 // `!(x > 0)` is meant: NaN must take the refusing branch.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+pub mod ar1;
+pub mod displacement;
 mod error;
 mod filter;
 pub mod fuzzy;
@@ -16,6 +18,8 @@ pub mod information;
 pub mod kf;
 pub mod linalg;
 pub mod linear;
+pub mod lms;
+mod lms_filter;
 pub mod mixture;
 pub mod model;
 pub mod pda;
@@ -25,12 +29,16 @@ pub mod square_root;
 pub mod srif;
 pub mod ud;
 
+pub use ar1::Ar1;
+pub use displacement::Displacement;
 pub use error::FilterError;
 pub use filter::{Filter, GaussianFilter, Start, Tracked};
 pub use fuzzy_srif::FuzzySrif;
 pub use gaussian::{Gaussian, Measurement, Weighted};
 pub use information::Information;
 pub use kf::{CovarianceForm, Kf};
+pub use lms::LmsRule;
+pub use lms_filter::Lms;
 pub use real::Real;
 pub use robust::{Fuzzy, Innovation, Robust};
 pub use square_root::SquareRoot;

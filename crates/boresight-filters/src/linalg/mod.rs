@@ -3,11 +3,13 @@
 mod cholesky;
 mod householder;
 mod pair;
+mod spectral;
 mod ud;
 
 pub use cholesky::Cholesky;
 pub use householder::{eliminate, fold_rows, lower_factor, triangularize};
 pub use pair::{Pair, invert_pair};
+pub use spectral::spectral_norm;
 pub use ud::{UdFactors, mwgs, ud_factorize};
 
 use crate::{FilterError, Real};

@@ -3,6 +3,7 @@
 //! The folder is `BORESIGHT_GOLDEN`, by default `shared/spec/golden` beside the repository. A missing folder skips the
 //! tests and says so; a missing file in a folder that exists fails.
 
+mod adaptive;
 mod fuzzy;
 mod linear;
 mod pda;

@@ -1,0 +1,164 @@
+//! Scalar AR(1) recursion per coordinate: the next coordinate is α times this one, α learnt by least squares.
+//!
+//! Source: SPEC I.4 (D4 §3.5, corrected: E-I6, E-I7): K = P μ/(1 + P μ²), e = z - α μ, α += K e, P -= K μ P,
+//! prediction α z; α_0 = 1, P_0 = 1, μ the coordinate before. Closed form: least squares without forgetting.
+//! Differs from it: a tracker needs a covariance, which the paper does not give. The predicted variance returned for
+//! gating is the larger of the measurement variance r and the running mean square of the
+//! prediction error e (time constant 10 updates) less r, so that the gate follows the filter's own lag.
+//! The velocity reported is the last predicted step over its time, with variance 2 r/dt².
+//! Limits: depends on the origin of the coordinates; lags a steady motion by up to half a step for ever and a reversal
+//! for dozens of frames (SPEC I, behaviour); a step is one frame whatever its length. For comparison with the paper.
+
+use crate::filter::{check_dt, check_measurement};
+use crate::mixture::check_weighted;
+use crate::{Filter, FilterError, Gaussian, Measurement, Real, Weighted};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+/// The recursion of one coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ar1Axis<T = f64> {
+    /// Regression coefficient α.
+    pub alpha: T,
+    /// Its scaled variance P.
+    pub p: T,
+    /// The coordinate before (px).
+    pub last: T,
+}
+
+impl<T: Real> Ar1Axis<T> {
+    /// Starts at the first observation.
+    pub fn new(first: T) -> Self {
+        Self { alpha: T::one(), p: T::one(), last: first }
+    }
+
+    /// Takes an observation and returns the prediction for the next frame.
+    ///
+    /// The worked example W8 of the specification:
+    /// ```
+    /// let mut axis = boresight_filters::ar1::Ar1Axis::new(100.0);
+    /// assert!((axis.observe(104.0) - 108.1595840416_f64).abs() < 1e-9);
+    /// assert!((axis.observe(108.5) - 113.02409088726_f64).abs() < 1e-9);
+    /// assert!((axis.alpha - 1.0416966902051).abs() < 1e-12 && (axis.p - 4.8037661526615e-05).abs() < 1e-17);
+    /// ```
+    pub fn observe(&mut self, z: T) -> T {
+        let mu = self.last;
+        let gain = self.p * mu / (T::one() + self.p * mu * mu);
+        self.alpha += gain * (z - self.alpha * mu);
+        self.p -= gain * mu * self.p;
+        self.last = z;
+        self.alpha * z
+    }
+}
+
+/// AR(1) filter of two coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ar1 {
+    axes: [Ar1Axis; 2],
+    /// Predicted (or, before a predict, observed) position, px.
+    position: Vector2<f64>,
+    /// Mean square of the prediction error, px².
+    error2: Vector2<f64>,
+    /// Measurement variance of the last update, px².
+    r: Vector2<f64>,
+    step: Vector2<f64>,
+    last_dt_s: f64,
+    predicted: bool,
+}
+
+impl Ar1 {
+    /// Starts at a first measured position; `frame_s` is the expected time between frames (s), for the velocity.
+    /// # Errors
+    /// [`FilterError`] if the measurement is not usable or the time is not above 0.
+    pub fn new(first: &Measurement, frame_s: f64) -> Result<Self, FilterError> {
+        check_measurement(first)?;
+        if !(frame_s > 0.0 && frame_s <= f64::MAX) {
+            return Err(FilterError::OutOfRange("a frame time above 0 s"));
+        }
+        let r = Vector2::new(first.cov[(0, 0)], first.cov[(1, 1)]);
+        Ok(Self {
+            axes: [Ar1Axis::new(first.position[0]), Ar1Axis::new(first.position[1])],
+            position: first.position,
+            // One frame of unknown motion: nothing is known yet beyond the measurement itself.
+            error2: r * 4.0,
+            r,
+            step: Vector2::zeros(),
+            last_dt_s: frame_s,
+            predicted: false,
+        })
+    }
+
+    fn variance(&self) -> Vector2<f64> {
+        if self.predicted { self.r.sup(&(self.error2 - self.r)) } else { self.r }
+    }
+}
+
+impl Filter for Ar1 {
+    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
+        check_dt(dt_s)?;
+        if dt_s == 0.0 {
+            return Ok(());
+        }
+        let next = Vector2::new(self.axes[0].alpha * self.position[0], self.axes[1].alpha * self.position[1]);
+        if !next.iter().all(|v| v.abs() <= f64::MAX) {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        if self.predicted {
+            // A missed frame: the error of the last prediction is carried into this one.
+            self.error2 += self.r;
+        }
+        self.step = next - self.position;
+        self.position = next;
+        self.last_dt_s = dt_s;
+        self.predicted = true;
+        Ok(())
+    }
+
+    fn predicted(&self) -> Gaussian<2> {
+        Gaussian { mean: self.position, cov: Matrix2::from_diagonal(&self.variance()) }
+    }
+
+    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
+        let (sum, _) = check_weighted(hypotheses.iter().copied())?;
+        if sum == 0.0 {
+            return Ok(());
+        }
+        // The recursion takes one observation: the mean of the mixture, in which "none" stands for the prediction.
+        let mut z = self.position * (1.0 - sum).max(0.0);
+        let mut r = Vector2::zeros();
+        for h in hypotheses {
+            z += h.measurement.position * h.weight;
+            r += Vector2::new(h.measurement.cov[(0, 0)], h.measurement.cov[(1, 1)]) * (h.weight / sum);
+        }
+        let mut next = *self;
+        for i in 0..2 {
+            let e = z[i] - self.position[i];
+            // 1/10: mean over about ten updates.
+            next.error2[i] += (e * e - next.error2[i]) * 0.1;
+            next.axes[i].observe(z[i]);
+        }
+        next.position = z;
+        next.r = r;
+        next.predicted = false;
+        let finite = next.axes.iter().all(|a| a.alpha.abs() <= f64::MAX && a.p.abs() <= f64::MAX);
+        if !(finite && next.error2.iter().all(|v| *v <= f64::MAX)) {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        *self = next;
+        Ok(())
+    }
+
+    fn kinematics(&self) -> Gaussian<4> {
+        let v = self.variance();
+        let var_v = self.r * (2.0 / (self.last_dt_s * self.last_dt_s));
+        let velocity = if self.predicted {
+            self.step / self.last_dt_s
+        } else {
+            Vector2::new((self.axes[0].alpha - 1.0) * self.position[0], (self.axes[1].alpha - 1.0) * self.position[1])
+                / self.last_dt_s
+        };
+        Gaussian {
+            mean: Vector4::new(self.position[0], velocity[0], self.position[1], velocity[1]),
+            cov: Matrix4::from_diagonal(&Vector4::new(v[0], var_v[0], v[1], var_v[1])),
+        }
+    }
+}

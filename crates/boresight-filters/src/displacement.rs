@@ -1,0 +1,134 @@
+//! The [2 -1; 1 0] displacement model: the state is the coordinate now and at the frame before.
+//!
+//! Source: SPEC I.5 (D4 eqs 7-13, corrected: E-I2). s = (d(t), d(t-1)) per axis, Phi = [[2, -1], [1, 0]], H = [1 0],
+//! process noise diag(q, 0), then the Kalman update.
+//! Differs from it: for a step of another length than the last, Phi = [[1 + ρ, -ρ], [1, 0]] with ρ = dt/dt_last: the
+//! same straight-line extrapolation in real time; q is the variance per frame at any frame time.
+//! Symbols: `[x(t), x(t-1), y(t), y(t-1)]` (px); q px². Velocity = (d(t) - d(t-1))/dt_last.
+//! Limits: first step needs `frame_s`, the time between the two coordinates of the start.
+
+use crate::filter::{check_belief, check_dt};
+use crate::linear::{correct_linear, predict_linear};
+use crate::mixture::mixture_update;
+use crate::model::check_strength;
+use crate::real::all_finite;
+use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Weighted};
+use nalgebra::{SMatrix, SVector};
+
+/// Displacement-model filter of two axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Displacement<T: Real = f64> {
+    belief: Gaussian<4, T>,
+    noise: T,
+    last_dt: T,
+}
+
+impl<T: Real> Displacement<T> {
+    /// Starts from a belief in `[x(t), x(t-1), y(t), y(t-1)]`, `frame_s` apart; `noise` is q (px² a frame).
+    /// # Errors
+    /// [`FilterError`] if a value is not finite, the time is not above 0 or the covariance cannot be factored.
+    pub fn start(belief: Gaussian<4, T>, noise: T, frame_s: T) -> Result<Self, FilterError> {
+        check_belief(&belief)?;
+        crate::linalg::ud_factorize(&belief.cov)?;
+        check_strength(noise, "a process noise of at least 0 px²")?;
+        if !(frame_s > T::zero() && frame_s <= T::MAX) {
+            return Err(FilterError::OutOfRange("a frame time above 0 s"));
+        }
+        Ok(Self { belief, noise, last_dt: frame_s })
+    }
+
+    /// Starts from position and velocity `[x, vx, y, vy]`.
+    /// # Errors
+    /// As [`Displacement::start`].
+    pub fn from_kinematics(k: &Gaussian<4, T>, noise: T, frame_s: T) -> Result<Self, FilterError> {
+        let a = positions_from_velocities(frame_s);
+        let mut cov = a * k.cov * a.transpose();
+        crate::linalg::symmetrize(&mut cov);
+        Self::start(Gaussian { mean: a * k.mean, cov }, noise, frame_s)
+    }
+
+    fn accept(&mut self, next: Gaussian<4, T>) -> Result<(), FilterError> {
+        if !(all_finite(&next.mean) & all_finite(&next.cov)) {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        self.belief = next;
+        Ok(())
+    }
+}
+
+/// (p, v) → (p, p - v dt) per axis.
+fn positions_from_velocities<T: Real>(dt: T) -> SMatrix<T, 4, 4> {
+    let mut a = SMatrix::zeros();
+    for i in [0, 2] {
+        a[(i, i)] = T::one();
+        a[(i + 1, i)] = T::one();
+        a[(i + 1, i + 1)] = -dt;
+    }
+    a
+}
+
+impl<T: Real> GaussianFilter<4> for Displacement<T> {
+    type Real = T;
+
+    fn predict(&mut self, dt_s: T) -> Result<(), FilterError> {
+        check_dt(dt_s)?;
+        if dt_s == T::zero() {
+            return Ok(());
+        }
+        let ratio = dt_s / self.last_dt;
+        let (mut phi, mut q) = (SMatrix::zeros(), SMatrix::zeros());
+        for i in [0, 2] {
+            phi[(i, i)] = T::one() + ratio;
+            phi[(i, i + 1)] = -ratio;
+            phi[(i + 1, i)] = T::one();
+            q[(i, i)] = self.noise;
+        }
+        self.accept(predict_linear(&self.belief, &phi, &q))?;
+        self.last_dt = dt_s;
+        Ok(())
+    }
+
+    fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        crate::filter::check_measurement(m)?;
+        let mut h = SMatrix::<T, 2, 4>::zeros();
+        h[(0, 0)] = T::one();
+        h[(1, 2)] = T::one();
+        let innovation = m.position - self.predicted().mean;
+        self.accept(correct_linear(&self.belief, &h, &innovation, &m.cov)?.belief)
+    }
+
+    fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
+    where
+        I: Iterator<Item = Weighted<T>> + Clone,
+    {
+        self.accept(mixture_update(&self.belief, [0, 2], hypotheses)?)
+    }
+
+    fn belief(&self) -> Gaussian<4, T> {
+        self.belief
+    }
+
+    fn set_belief(&mut self, belief: &Gaussian<4, T>) -> Result<(), FilterError> {
+        check_belief(belief)?;
+        self.belief = *belief;
+        Ok(())
+    }
+
+    fn position_at(&self) -> [usize; 2] {
+        [0, 2]
+    }
+
+    fn kinematics(&self) -> Gaussian<4, T> {
+        let inv = T::one() / self.last_dt;
+        let mut a = SMatrix::<T, 4, 4>::zeros();
+        for i in [0, 2] {
+            a[(i, i)] = T::one();
+            a[(i + 1, i)] = inv;
+            a[(i + 1, i + 1)] = -inv;
+        }
+        let mut cov = a * self.belief.cov * a.transpose();
+        crate::linalg::symmetrize(&mut cov);
+        let mean: SVector<T, 4> = a * self.belief.mean;
+        Gaussian { mean, cov }
+    }
+}

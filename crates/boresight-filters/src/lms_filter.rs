@@ -1,0 +1,119 @@
+//! The LMS filter as trackers use it: two axes behind [`Filter`].
+//!
+//! Source: SPEC H; the mathematics is in [`crate::lms`]. Axes are independent, so the off-diagonal of a measurement's
+//! covariance is not used. Covariance for gating: the axis' own P after predict, P_pp of SPEC H.
+//! Several weighted hypotheses are taken as one measurement: their mean by weight, with variance r/Σw + spread, which
+//! is the plain update for one sure hypothesis and a weak one for doubtful ones.
+//! Limits: a missed scan leaves the second differences with a longer step, in real time.
+
+use crate::filter::{check_dt, check_measurement};
+use crate::lms::{LmsAxis, LmsRule};
+use crate::mixture::check_weighted;
+use crate::{Filter, FilterError, Gaussian, Measurement, Weighted};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+/// LMS filter of two axes with S = N + 3 states each: `Lms<5>` is the paper's window N = 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lms<const S: usize> {
+    axes: [LmsAxis<S>; 2],
+    since_s: f64,
+}
+
+impl<const S: usize> Lms<S> {
+    /// Starts from position and velocity; `acceleration_std` (px/s²) is how well the first acceleration is known.
+    /// # Errors
+    /// [`FilterError`] if a value is not finite or out of range, or S < 5.
+    pub fn from_kinematics(k: &Gaussian<4>, acceleration_std: f64, rule: LmsRule) -> Result<Self, FilterError> {
+        crate::filter::check_belief(k)?;
+        let axis = |i: usize| {
+            let var = [k.cov[(i, i)], k.cov[(i + 1, i + 1)]];
+            let mut a = LmsAxis::new(k.mean[i], k.mean[i + 1], var, acceleration_std * acceleration_std, rule)?;
+            a.remember(k.mean[i], 0.0);
+            Ok(a)
+        };
+        Ok(Self { axes: [axis(0)?, axis(2)?], since_s: 0.0 })
+    }
+
+    /// Starts from one measured position and a velocity known only by its standard deviation (px/s).
+    /// # Errors
+    /// As [`Lms::from_kinematics`].
+    pub fn from_point(
+        m: &Measurement,
+        velocity_std: f64,
+        acceleration_std: f64,
+        rule: LmsRule,
+    ) -> Result<Self, FilterError> {
+        Self::from_kinematics(&crate::model::kinematics_from_point(m, velocity_std)?, acceleration_std, rule)
+    }
+
+    /// Returns the two axes.
+    pub fn axes(&self) -> &[LmsAxis<S>; 2] {
+        &self.axes
+    }
+}
+
+impl<const S: usize> Filter for Lms<S> {
+    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
+        check_dt(dt_s)?;
+        if dt_s == 0.0 {
+            return Ok(());
+        }
+        let mut next = *self;
+        for axis in &mut next.axes {
+            axis.predict(dt_s)?;
+        }
+        next.since_s += dt_s;
+        *self = next;
+        Ok(())
+    }
+
+    fn predicted(&self) -> Gaussian<2> {
+        let [x, y] = &self.axes;
+        Gaussian {
+            mean: Vector2::new(x.state[0], y.state[0]),
+            cov: Matrix2::new(x.cov[(0, 0)], 0.0, 0.0, y.cov[(0, 0)]),
+        }
+    }
+
+    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
+        let (sum, _) = check_weighted(hypotheses.iter().copied())?;
+        if sum == 0.0 {
+            return Ok(());
+        }
+        if self.since_s == 0.0 {
+            // Second differences need time between the samples.
+            return Err(FilterError::OutOfRange("a predict of more than 0 s between updates of the LMS filter"));
+        }
+        let mut next = *self;
+        for (i, axis) in next.axes.iter_mut().enumerate() {
+            let mean = hypotheses.iter().map(|h| h.weight * h.measurement.position[i]).sum::<f64>() / sum;
+            let var = |h: &Weighted| {
+                let off = h.measurement.position[i] - mean;
+                h.weight * (h.measurement.cov[(i, i)] / sum + off * off)
+            };
+            let r = hypotheses.iter().map(var).sum::<f64>() / sum;
+            axis.correct(mean, r, self.since_s)?;
+        }
+        next.since_s = 0.0;
+        *self = next;
+        Ok(())
+    }
+
+    fn kinematics(&self) -> Gaussian<4> {
+        let [x, y] = &self.axes;
+        let mut cov = Matrix4::zeros();
+        for (at, axis) in [(0, x), (2, y)] {
+            for r in 0..2 {
+                for c in 0..2 {
+                    cov[(at + r, at + c)] = axis.cov[(r, c)];
+                }
+            }
+        }
+        Gaussian { mean: Vector4::new(x.state[0], x.state[1], y.state[0], y.state[1]), cov }
+    }
+
+    fn log_likelihood(&self, measurement: &Measurement) -> Result<f64, FilterError> {
+        check_measurement(measurement)?;
+        crate::filter::log_likelihood(&self.predicted(), measurement)
+    }
+}
