@@ -13,6 +13,7 @@ mod tiff_count;
 mod tiff_pages;
 pub mod tracks;
 mod y4m;
+pub mod video;
 
 pub use folder::ImageFiles;
 pub use gif_frames::GifFrames;

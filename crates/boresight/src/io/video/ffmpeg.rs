@@ -1,0 +1,423 @@
+//! Frames of anything that an `ffmpeg` program on the PATH can read, through a pipe, with their true times.
+//!
+//! The program decodes and converts nothing that need not be: it is asked for the nearest of the layouts read here, so
+//! that luma stays what the video holds, and for times in nanoseconds. It is started without a shell; its messages are
+//! drained on a thread of their own; it is killed when the source is dropped.
+//! Limits: how many frames there are is not known beforehand; a live stream that is silent for 30 s is given up.
+
+use super::ffmpeg_log::Log;
+use super::nut::{Format, Head, Nut};
+use super::yuv::to_u16;
+use crate::io::{Colour, OpenOptions, gray_of_rgb8};
+use crate::{
+    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
+};
+use std::ffi::OsStr;
+use std::io::{BufReader, Read};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::time::Duration;
+
+/// Frames read ahead of the caller.
+const AHEAD: usize = 4;
+/// How long a live source may be silent.
+const SILENCE: Duration = Duration::from_secs(30);
+/// Layouts whose first plane is luma, or that are RGB: every other one is converted to the nearest of these.
+const NATIVE: &str = "format=gray|gray10le|gray12le|gray14le|gray16le|yuv420p|yuvj420p|yuv422p|yuvj422p|yuv444p|\
+yuvj444p|yuv440p|yuvj440p|yuv411p|yuv410p|yuv420p10le|yuv422p10le|yuv444p10le|yuv420p12le|yuv422p12le|yuv444p12le|\
+yuv420p16le|yuv422p16le|yuv444p16le|rgb24";
+/// Layouts when colour is wanted.
+const COLOUR: &str = "format=gray|gray10le|gray12le|gray14le|gray16le|rgb24";
+
+/// What the reading thread reports.
+enum Message {
+    /// Shape of the frames to come.
+    Format {
+        width: usize,
+        height: usize,
+        kind: PixelKind,
+    },
+    Frame(Frame),
+    /// The pipe ended inside a frame, or held what it must not.
+    Broken(String),
+}
+
+/// How the bytes of a picture become pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Layout {
+    /// First plane, one byte a pixel.
+    Luma8,
+    /// First plane, two bytes a pixel.
+    Luma16,
+    /// RGB triplets, handed out as they are.
+    Rgb,
+    /// RGB triplets, handed out as grey.
+    RgbToGray,
+}
+
+/// The source.
+struct FfmpegSource {
+    info: SourceInfo,
+    warnings: Vec<String>,
+    messages: Option<Receiver<Message>>,
+    first: Option<Frame>,
+    spare: Sender<Pixels>,
+    child: Child,
+    log: Log,
+    live: bool,
+    n_read: u64,
+}
+
+impl Drop for FfmpegSource {
+    fn drop(&mut self) {
+        // It may have ended by itself; either way it must not outlive us or stay a zombie.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Opens `input` with the program `ffmpeg`.
+pub(super) fn open(program: &OsStr, input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    let source = match start(program, input, options, "-fps_mode")? {
+        Started::Source(source) => source,
+        // Programs before 5.1 know the same choice by an older name.
+        Started::OldProgram => match start(program, input, options, "-vsync")? {
+            Started::Source(source) => source,
+            Started::OldProgram => {
+                return Err(Error::new(ErrorKind::MissingTool, "the ffmpeg found is too old").at(input).hint(INSTALL));
+            }
+        },
+    };
+    Ok(source)
+}
+
+/// How to get the program.
+pub(super) const INSTALL: &str = "install ffmpeg: `apt install ffmpeg` (Debian, Ubuntu), `dnf install ffmpeg` (Fedora), \
+`brew install ffmpeg` (macOS), `winget install ffmpeg` (Windows); or convert the video to MP4 with H.264, which is read \
+without it";
+
+enum Started {
+    Source(Box<FfmpegSource>),
+    OldProgram,
+}
+
+fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str) -> Result<Started> {
+    let live = is_live(input);
+    let mut child = command(program, input, options, sync_option)?.spawn().map_err(|e| {
+        let missing = e.kind() == std::io::ErrorKind::NotFound;
+        let what = if missing {
+            "is read through the program ffmpeg, which is not installed (not on the PATH)"
+        } else {
+            "is read through the program ffmpeg, which cannot be started"
+        };
+        let error = Error::new(ErrorKind::MissingTool, what).at(input).hint(INSTALL);
+        if missing { error } else { error.because(e) }
+    })?;
+    let (Some(stdout), Some(stderr)) = (child.stdout.take(), child.stderr.take()) else {
+        return Err(Error::new(ErrorKind::MissingTool, "ffmpeg gave no pipe").at(input));
+    };
+    let log = Log::drain(stderr);
+    let (send, messages) = sync_channel(AHEAD);
+    let (spare, spare_out) = channel();
+    let (colour, max_pixels) = (options.colour, options.max_pixels);
+    let spawned = std::thread::Builder::new()
+        .name("boresight-ffmpeg".into())
+        .spawn(move || read_all(stdout, colour, max_pixels, &send, &spare_out));
+    let info = SourceInfo {
+        label: input.to_string(),
+        reader: "ffmpeg pipe".into(),
+        width: 0,
+        height: 0,
+        kind: PixelKind::Gray8,
+        n_frames: None,
+        rate_hz: None,
+        true_times: true,
+    };
+    let mut source = Box::new(FfmpegSource {
+        info,
+        warnings: Vec::new(),
+        messages: Some(messages),
+        first: None,
+        spare,
+        child,
+        log,
+        live,
+        n_read: 0,
+    });
+    spawned.map_err(|e| Error::new(ErrorKind::NotFound, "no thread can be started").because(e))?;
+    match source.receive()? {
+        Some(Message::Format { width, height, kind }) => {
+            (source.info.width, source.info.height, source.info.kind) = (width, height, kind);
+        }
+        Some(Message::Broken(why)) => {
+            return Err(source.failure(&why));
+        }
+        Some(Message::Frame(_)) | None => {
+            source.messages = None;
+            let _ = source.child.wait();
+            source.log.wait();
+            if source.log.has(&format!("'{}'", sync_option.trim_start_matches('-'))) {
+                return Ok(Started::OldProgram);
+            }
+            return Err(source.failure("no frames came"));
+        }
+    }
+    source.first = source.take()?;
+    if source.first.is_none() {
+        return Err(source.failure("no frames came"));
+    }
+    source.info.rate_hz = source.log.rate_hz();
+    if source.log.has("displaymatrix: rotation") {
+        let what = "the file asks for the picture to be turned for display; frames are given as they were recorded";
+        source.warnings.push(what.into());
+    }
+    Ok(Started::Source(source))
+}
+
+/// Whether an input never ends by itself.
+fn is_live(input: &str) -> bool {
+    input.starts_with("/dev/") || input.contains("://")
+}
+
+fn command(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str) -> Result<Command> {
+    let mut c = Command::new(program);
+    c.args(["-hide_banner", "-nostdin", "-nostats", "-loglevel", "repeat+level+info"]);
+    if input.starts_with("/dev/video") {
+        c.args(["-f", "v4l2"]);
+    } else if input.starts_with("rtsp://") || input.starts_with("rtsps://") {
+        // Over UDP lost packets become broken pictures.
+        c.args(["-rtsp_transport", "tcp"]);
+    }
+    if !is_live(input) {
+        // Times as they are in the file, not counted from its first frame or sound.
+        c.arg("-copyts");
+    }
+    c.arg("-noautorotate").arg("-i");
+    if is_live(input) {
+        c.arg(input);
+    } else {
+        let path = Path::new(input);
+        if !path.exists() {
+            return Err(Error::new(ErrorKind::NotFound, "no such file").at(input));
+        }
+        // The prefix keeps names with ':', '%' or a leading '-' from being read as something else.
+        let mut name = std::ffi::OsString::from("file:");
+        name.push(path);
+        c.arg(name);
+    }
+    let formats = if options.colour == Colour::Rgb { COLOUR } else { NATIVE };
+    c.args(["-map", "0:V:0", "-vf", formats, sync_option, "passthrough", "-enc_time_base", "1:1000000000"]);
+    c.args(["-c:v", "rawvideo", "-f", "nut", "-write_index", "0", "pipe:1"]);
+    c.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    Ok(c)
+}
+
+impl FfmpegSource {
+    /// Waits for the next message; `None` at the end.
+    fn receive(&mut self) -> Result<Option<Message>> {
+        let Some(messages) = &self.messages else { return Ok(None) };
+        if !self.live {
+            return Ok(messages.recv().ok());
+        }
+        match messages.recv_timeout(SILENCE) {
+            Ok(message) => Ok(Some(message)),
+            Err(RecvTimeoutError::Disconnected) => Ok(None),
+            Err(RecvTimeoutError::Timeout) => {
+                self.messages = None;
+                let _ = self.child.kill();
+                let what = format!("the stream has been silent for {} s", SILENCE.as_secs());
+                if self.n_read == 0 {
+                    return Err(Error::new(ErrorKind::NotFound, what).at(&self.info.label));
+                }
+                self.warnings.push(format!("{what}; it ends after {} frames", self.n_read));
+                Ok(None)
+            }
+        }
+    }
+
+    fn take(&mut self) -> Result<Option<Frame>> {
+        match self.receive()? {
+            Some(Message::Frame(frame)) => {
+                self.n_read += 1;
+                Ok(Some(frame))
+            }
+            Some(Message::Broken(why)) if self.n_read == 0 => Err(self.failure(&why)),
+            Some(Message::Broken(why)) => {
+                self.warnings.push(format!("the stream broke off after {} frames: {why}", self.n_read));
+                self.end();
+                Ok(None)
+            }
+            Some(Message::Format { .. }) | None => {
+                self.end();
+                Ok(None)
+            }
+        }
+    }
+
+    /// After the last frame: asks how it went.
+    fn end(&mut self) {
+        if self.messages.take().is_none() {
+            return;
+        }
+        let status = self.child.wait();
+        self.log.wait();
+        let (n, last) = self.log.errors();
+        let failed = status.map_or(true, |s| !s.success());
+        if n > 0 || failed {
+            let last = last.unwrap_or_else(|| "no reason given".into());
+            let what = if failed { "ffmpeg stopped early" } else { "parts of the video are damaged" };
+            self.warnings.push(format!("{what}: {n} messages, the last: {last}"));
+        }
+    }
+
+    /// The error for an input that gives no frame.
+    fn failure(&mut self, why: &str) -> Error {
+        self.messages = None;
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        self.log.wait();
+        self.log.failure(why).at(&self.info.label)
+    }
+}
+
+impl FrameSource for FfmpegSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        if let Some(frame) = self.first.take() {
+            return Ok(Some(frame));
+        }
+        self.take()
+    }
+
+    fn recycle(&mut self, frame: Frame) {
+        let _ = self.spare.send(frame.pixels);
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+}
+
+/// Reads the pipe to its end; returns when the caller is gone.
+fn read_all(pipe: ChildStdout, colour: Colour, max_pixels: u64, out: &SyncSender<Message>, spare: &Receiver<Pixels>) {
+    let mut nut = match Nut::open(BufReader::with_capacity(1 << 16, pipe)) {
+        Ok(nut) => nut,
+        // Nothing at all: the program itself says why.
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => return,
+        Err(e) => return drop(out.send(Message::Broken(e.to_string()))),
+    };
+    let (width, height, layout) = match shape(&nut.format, colour, max_pixels) {
+        Ok(shape) => shape,
+        Err(why) => return drop(out.send(Message::Broken(why))),
+    };
+    let kind = match layout {
+        Layout::Luma8 | Layout::RgbToGray => PixelKind::Gray8,
+        Layout::Luma16 => PixelKind::Gray16,
+        Layout::Rgb => PixelKind::Rgb8,
+    };
+    if out.send(Message::Format { width, height, kind }).is_err() {
+        return;
+    }
+    let mut scratch = Vec::new();
+    let mut index = 0;
+    loop {
+        let read = nut.next_head().and_then(|head| match head {
+            None => Ok(None),
+            Some(head) => {
+                let pixels =
+                    read_picture(&mut nut, head, (width, height), layout, spare.try_recv().ok(), &mut scratch)?;
+                Ok(Some((head.pts, pixels)))
+            }
+        });
+        let message = match read {
+            Ok(None) => return,
+            Ok(Some((pts, pixels))) => {
+                let (num, den) = nut.format.time_base;
+                let time = Timestamp::from_ticks(pts, num as i64, den as i64);
+                index += 1;
+                Message::Frame(Frame { index: FrameIndex(index - 1), time, pixels })
+            }
+            Err(e) => Message::Broken(e.to_string()),
+        };
+        let over = matches!(message, Message::Broken(_));
+        if out.send(message).is_err() || over {
+            return;
+        }
+    }
+}
+
+/// Size and layout, once they are known to be sane.
+fn shape(format: &Format, colour: Colour, max_pixels: u64) -> Result<(usize, usize, Layout), String> {
+    let (w, h) = (format.width, format.height);
+    if w == 0 || h == 0 || w.checked_mul(h).is_none_or(|n| n > max_pixels) {
+        return Err(format!("its header claims {w} x {h} pixels, at most {max_pixels} are accepted"));
+    }
+    let layout = match format.tag.as_slice() {
+        b"Y800" | b"I420" | b"Y42B" | b"444P" | b"440P" | b"Y41B" | b"YUV9" => Layout::Luma8,
+        [b'Y', b'1' | b'3', _, bits] if *bits > 8 => Layout::Luma16,
+        b"RGB\x18" if colour == Colour::Rgb => Layout::Rgb,
+        b"RGB\x18" => Layout::RgbToGray,
+        other => return Err(format!("ffmpeg gives pixels of the unknown kind '{}'", other.escape_ascii())),
+    };
+    let size = |n: u64| usize::try_from(n).map_err(|e| e.to_string());
+    Ok((size(w)?, size(h)?, layout))
+}
+
+fn read_picture<R: Read>(
+    nut: &mut Nut<R>,
+    head: Head,
+    (width, height): (usize, usize),
+    layout: Layout,
+    spare: Option<Pixels>,
+    scratch: &mut Vec<u8>,
+) -> std::io::Result<Pixels> {
+    let n = width * height;
+    let need = match layout {
+        Layout::Luma8 => n,
+        Layout::Luma16 => 2 * n,
+        Layout::Rgb | Layout::RgbToGray => 3 * n,
+    };
+    let wrong = |what: &str| std::io::Error::new(std::io::ErrorKind::InvalidData, what.to_string());
+    if head.size < need as u64 || head.size > need as u64 * 3 + 4096 {
+        return Err(wrong("a picture changes its size"));
+    }
+    let pixels = match (layout, spare) {
+        (Layout::Luma8, spare) => {
+            let mut gray = if let Some(Pixels::Gray8(i)) = spare { i.into_vec() } else { Vec::new() };
+            gray.resize(n, 0);
+            nut.reader.read_exact(&mut gray)?;
+            Image::from_vec(width, height, gray).map(Pixels::Gray8)
+        }
+        (layout, spare) => {
+            scratch.resize(need, 0);
+            nut.reader.read_exact(scratch)?;
+            let triplets = scratch.as_chunks::<3>().0;
+            match (layout, spare) {
+                (Layout::Rgb, spare) => {
+                    let mut rgb = if let Some(Pixels::Rgb8(i)) = spare { i.into_vec() } else { Vec::new() };
+                    rgb.clear();
+                    rgb.extend_from_slice(triplets);
+                    Image::from_vec(width, height, rgb).map(Pixels::Rgb8)
+                }
+                (Layout::Luma16, spare) => {
+                    let mut gray = if let Some(Pixels::Gray16(i)) = spare { i.into_vec() } else { Vec::new() };
+                    to_u16(scratch, &mut gray);
+                    Image::from_vec(width, height, gray).map(Pixels::Gray16)
+                }
+                _ => {
+                    let gray = triplets.iter().map(|&p| gray_of_rgb8(p)).collect();
+                    Image::from_vec(width, height, gray).map(Pixels::Gray8)
+                }
+            }
+        }
+    };
+    let rest = head.size - need as u64;
+    if std::io::copy(&mut nut.reader.by_ref().take(rest), &mut std::io::sink())? < rest {
+        return Err(std::io::ErrorKind::UnexpectedEof.into());
+    }
+    pixels.ok_or_else(|| wrong("a picture changes its size"))
+}

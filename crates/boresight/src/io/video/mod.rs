@@ -1,0 +1,42 @@
+//! Video in and out: H.264 in MP4 in process, everything else through an `ffmpeg` program, MP4 written.
+
+mod ffmpeg;
+mod ffmpeg_log;
+mod h264;
+mod mp4;
+mod mp4_source;
+mod nut;
+mod reorder;
+mod yuv;
+
+use super::OpenOptions;
+use crate::{Error, ErrorKind, FrameSource, Result};
+use std::ffi::OsStr;
+use std::path::Path;
+
+/// The program that reads what is not read in process.
+const FFMPEG: &str = "ffmpeg";
+
+/// Opens an MP4 or MOV file: H.264 in process with the file's own times, anything else in it through `ffmpeg`.
+/// # Errors
+/// [`ErrorKind::NotFound`] or [`ErrorKind::Damaged`] for the file, [`ErrorKind::MissingTool`] if
+/// its video is not H.264 (or 4:4:4 or lossless) and there is no `ffmpeg`.
+pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    match mp4_source::open(path, options)? {
+        mp4_source::Opened::Source(source) => Ok(Box::new(source)),
+        mp4_source::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), &path.to_string_lossy(), options) {
+            Err(e) if e.kind() == ErrorKind::MissingTool => Err(Error::new(e.kind(), why.to_string()).hint(format!(
+                "such a video is read through the program ffmpeg, which is not installed; {}",
+                ffmpeg::INSTALL
+            ))),
+            other => other,
+        },
+    }
+}
+
+/// Opens anything that the program `ffmpeg` reads: a file, an address (`rtsp://`, `http://`), a camera (`/dev/video0`).
+/// # Errors
+/// [`ErrorKind::MissingTool`] if there is no `ffmpeg` on the PATH, else what it says of the input.
+pub fn open_ffmpeg(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    ffmpeg::open(OsStr::new(FFMPEG), input, options)
+}
