@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
         let opened = if args.pipe {
             boresight::io::video::open_ffmpeg(&file.to_string_lossy(), &options)
         } else {
-            boresight::io::video::open_mp4(file, &options)
+            boresight::io::open(&file.to_string_lossy(), &options)
         };
         let ours = opened.map_err(anyhow::Error::from).and_then(|mut s| {
             let rows = our_rows(s.as_mut())?;

@@ -12,8 +12,8 @@ pub mod tables;
 mod tiff_count;
 mod tiff_pages;
 pub mod tracks;
-mod y4m;
 pub mod video;
+mod y4m;
 
 pub use folder::ImageFiles;
 pub use gif_frames::GifFrames;

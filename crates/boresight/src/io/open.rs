@@ -1,12 +1,12 @@
 //! Opens any input by what it is: a folder, a glob, a numbered pattern, a file (told by content), standard input.
 
-use super::OpenOptions;
 use super::folder::ImageFiles;
 use super::gif_frames::GifFrames;
 use super::natural::natural_order;
 use super::raw::RawFrames;
 use super::sniff::{self, Format, sniff};
 use super::y4m::Y4m;
+use super::{OpenOptions, video};
 use crate::{Error, ErrorKind, FrameSource, Result};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -26,7 +26,7 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
         return open_stdin(options);
     }
     if input.contains("://") || input.starts_with("/dev/video") {
-        return open_other(input, options);
+        return video::open_ffmpeg(input, options);
     }
     let path = Path::new(input);
     if path.is_dir() {
@@ -65,7 +65,8 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
         format if format.is_image() && format != Format::Apng => {
             Ok(Box::new(ImageFiles::open(input, vec![path.to_path_buf()], options)?))
         }
-        _ => open_other(input, options),
+        Format::Mp4 => video::open_mp4(path, options),
+        _ => video::open_ffmpeg(input, options),
     }
 }
 
@@ -87,10 +88,6 @@ fn open_stdin(options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
             .at(LABEL)
             .hint("pipe video in with: ffmpeg -i INPUT -f yuv4mpegpipe - | boresight track -; raw frames need their size and type")),
     }
-}
-
-fn open_other(input: &str, _options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    Err(Error::new(ErrorKind::Unsupported, "this kind of video is not read yet").at(input))
 }
 
 /// The image files of a folder in natural order; hidden files and other kinds are passed over.

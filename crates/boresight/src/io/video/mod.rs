@@ -23,7 +23,7 @@ const FFMPEG: &str = "ffmpeg";
 /// its video is not H.264 (or 4:4:4 or lossless) and there is no `ffmpeg`.
 pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     match mp4_source::open(path, options)? {
-        mp4_source::Opened::Source(source) => Ok(Box::new(source)),
+        mp4_source::Opened::Source(source) => Ok(source),
         mp4_source::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), &path.to_string_lossy(), options) {
             Err(e) if e.kind() == ErrorKind::MissingTool => Err(Error::new(e.kind(), why.to_string()).hint(format!(
                 "such a video is read through the program ffmpeg, which is not installed; {}",

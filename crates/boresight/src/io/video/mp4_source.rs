@@ -47,7 +47,7 @@ pub(super) struct Mp4Source {
 /// What [`open`] found.
 pub(super) enum Opened {
     /// Frames.
-    Source(Mp4Source),
+    Source(Box<Mp4Source>),
     /// A kind of video that another decoder must read, and why.
     Other(Error),
 }
@@ -108,14 +108,14 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Opened> {
         rate_hz,
         true_times: true,
     };
-    Ok(Opened::Source(Mp4Source {
+    Ok(Opened::Source(Box::new(Mp4Source {
         info,
         warnings,
         first: Some(first),
         frames: Some(frame_out),
         spare: spare_in,
         n_frames,
-    }))
+    })))
 }
 
 /// Place of each step among the shown pictures in the order of their times; steps that are not shown have none.
