@@ -3,6 +3,7 @@
 //! Every struct checks itself with `validate(at)`, where `at` is the path of the key (`detector`), so that errors name the
 //! line a user wrote.
 
+use super::spatial::SpatialConfig;
 use super::threshold::ThresholdConfig;
 use crate::{Error, ErrorKind, Result};
 use schemars::JsonSchema;
@@ -12,6 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DetectorConfig {
+    /// Smoothing before the threshold; centroids are taken from the smoothed frame too.
+    pub filter: SpatialConfig,
     /// Which pixels belong to targets.
     pub threshold: ThresholdConfig,
     /// How pixels are joined to clusters, and which clusters are kept.
@@ -141,6 +144,7 @@ impl DetectorConfig {
     /// # Errors
     /// The first parameter out of its range.
     pub fn validate(&self, at: &str) -> Result<()> {
+        self.filter.validate(&format!("{at}.filter"))?;
         self.threshold.validate(&format!("{at}.threshold"))?;
         self.cluster.validate(&format!("{at}.cluster"))?;
         self.centroid.validate(&format!("{at}.centroid"))?;

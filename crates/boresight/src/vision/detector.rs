@@ -6,10 +6,12 @@ use super::config::{DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
+use super::spatial::{SpatialConfig, SpatialFilter};
 use super::threshold::band::{band_bits, words};
 use super::threshold::grid::BackgroundGrid;
 use super::threshold::local::LocalThreshold;
 use super::threshold::otsu::otsu_level;
+use super::threshold::spot::SpotDetector;
 use super::threshold::{LevelConfig, Side, ThresholdConfig};
 use super::{Detector, region::Region};
 use crate::{Detection, Error, ErrorKind, Extent, Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo};
@@ -22,7 +24,7 @@ const DEFAULT_CELL_PX: u32 = 32;
 /// A parameter out of its range.
 pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Detector>> {
     config.validate("detector")?;
-    Ok(Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)))
+    Ok(Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)?))
 }
 
 struct ThresholdDetector {
@@ -39,17 +41,50 @@ struct ThresholdDetector {
     dark: Clusterer,
     samples: Vec<f32>,
     isolated: IsolatedDetector,
+    spots: Option<SpotDetector>,
+    /// One per pixel type, so that a frame keeps its type; `None` if nothing is to be smoothed.
+    filter8: Option<Smoother<u8>>,
+    filter16: Option<Smoother<u16>>,
+    filter32: Option<Smoother<f32>>,
+}
+
+/// A spatial filter and its result.
+struct Smoother<T: Pixel> {
+    filter: SpatialFilter<T>,
+    out: Image<T>,
+}
+
+impl<T: Pixel> Smoother<T> {
+    fn new(config: SpatialConfig) -> Result<Option<Self>> {
+        if config == SpatialConfig::None {
+            return Ok(None);
+        }
+        Ok(Some(Self { filter: SpatialFilter::new(config)?, out: Image::default() }))
+    }
+
+    fn apply(&mut self, image: &Image<T>) -> &Image<T> {
+        self.filter.apply(image, &mut self.out);
+        &self.out
+    }
 }
 
 impl ThresholdDetector {
-    fn new(config: DetectorConfig, size: (usize, usize), kind: PixelKind) -> Self {
+    fn new(config: DetectorConfig, size: (usize, usize), kind: PixelKind) -> Result<Self> {
         let cell = match &config.threshold {
             ThresholdConfig::Local(c) => c.cell_px,
             _ => DEFAULT_CELL_PX,
         };
-        Self {
+        let spots = match &config.threshold {
+            ThresholdConfig::Spot(c) => Some(SpotDetector::new(c)),
+            _ => None,
+        };
+        Ok(Self {
             size,
             kind,
+            spots,
+            filter8: Smoother::new(config.filter)?,
+            filter16: Smoother::new(config.filter)?,
+            filter32: Smoother::new(config.filter)?,
             grey: Image::default(),
             grid: BackgroundGrid::new(cell as usize),
             local: LocalThreshold::default(),
@@ -59,7 +94,7 @@ impl ThresholdDetector {
             samples: Vec::new(),
             isolated: IsolatedDetector::default(),
             config,
-        }
+        })
     }
 
     /// Whether positions are weighed by the distance from the background.
@@ -71,14 +106,38 @@ impl ThresholdDetector {
                 ThresholdConfig::Band(_) => false,
                 ThresholdConfig::Level(LevelConfig { side, .. }) => *side == Side::Dark,
                 ThresholdConfig::Otsu(c) => c.side == Side::Dark,
-                ThresholdConfig::Local(_) | ThresholdConfig::Isolated(_) => true,
+                ThresholdConfig::Local(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Isolated(_) => true,
             },
         }
     }
 
-    fn run<T: Pixel>(&mut self, image: &Image<T>, scan: &mut Scan) {
+    /// Variance of one pixel at intensity 0, counts², and its growth with intensity.
+    fn pixel_noise<T: Pixel>(&mut self, image: &Image<T>) -> (f64, f64) {
+        match &self.config.noise {
+            NoiseConfig::Given(g) => (g.read_counts * g.read_counts, g.gain),
+            NoiseConfig::Estimated => (noise_level(image, &mut self.samples).powi(2), 0.0),
+        }
+    }
+
+    fn run8(&mut self, image: &Image<u8>, scan: &mut Scan) {
+        let noise = self.pixel_noise(image);
+        let mut filter = self.filter8.take();
+        self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
+        self.filter8 = filter;
+    }
+
+    /// `noise` is that of the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same sum over
+    /// the pixels before smoothing, whose noise is white.
+    fn run<T: Pixel>(&mut self, image: &Image<T>, (variance, gain): (f64, f64), scan: &mut Scan) {
         if let ThresholdConfig::Isolated(c) = &self.config.threshold {
             self.isolated.run(image, &self.config, c, scan);
+            keep_strongest(&mut scan.detections, self.config.max_detections);
+            return;
+        }
+        if let Some(spots) = &mut self.spots {
+            spots.detect(image, (variance, gain), &mut scan.detections);
+            let extra = nalgebra::Matrix2::identity() * self.config.centroid.extra_sd_px.powi(2);
+            scan.detections.iter_mut().for_each(|d| d.cov += extra);
             keep_strongest(&mut scan.detections, self.config.max_detections);
             return;
         }
@@ -100,8 +159,8 @@ impl ThresholdDetector {
                     one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
                 }
             }
-            // Ran above: its rows are swept once a level.
-            ThresholdConfig::Isolated(_) => {}
+            // Ran above: they have no rows of bits of their own.
+            ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) => {}
             ThresholdConfig::Local(c) => {
                 for y in 0..image.height() {
                     let row = image.row(y);
@@ -116,10 +175,6 @@ impl ThresholdDetector {
                 }
             }
         }
-        let (variance, gain) = match &self.config.noise {
-            NoiseConfig::Given(g) => (g.read_counts * g.read_counts, g.gain),
-            NoiseConfig::Estimated => (noise_level(image, &mut self.samples).powi(2), 0.0),
-        };
         for (clusters, dark) in [(&self.bright, false), (&self.dark, true)] {
             let (min, max) = self.config.cluster.area_limits();
             for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
@@ -230,17 +285,29 @@ impl Detector for ThresholdDetector {
             .hint("all frames of a sequence must have one size and one pixel type"));
         }
         match &frame.pixels {
-            Pixels::Gray8(image) => self.run(image, scan),
-            Pixels::Gray16(image) => self.run(image, scan),
-            Pixels::GrayF32(image) => self.run(image, scan),
+            Pixels::Gray8(image) => self.run8(image, scan),
+            Pixels::Gray16(image) => {
+                let noise = self.pixel_noise(image);
+                let mut filter = self.filter16.take();
+                self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
+                self.filter16 = filter;
+            }
+            Pixels::GrayF32(image) => {
+                let noise = self.pixel_noise(image);
+                let mut filter = self.filter32.take();
+                self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
+                self.filter32 = filter;
+            }
             Pixels::Rgb8(image) => {
                 let mut grey = std::mem::take(&mut self.grey);
-                grey.reset(width, height, 0);
+                if (grey.width(), grey.height()) != (width, height) {
+                    grey.reset(width, height, 0);
+                }
                 for (g, &[r, green, b]) in grey.as_mut_slice().iter_mut().zip(image.as_slice()) {
                     // SPEC I.1.
                     *g = ((9798 * u32::from(r) + 19235 * u32::from(green) + 3735 * u32::from(b) + 16384) >> 15) as u8;
                 }
-                self.run(&grey, scan);
+                self.run8(&grey, scan);
                 self.grey = grey;
             }
         }

@@ -1,7 +1,9 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
+use super::spatial::SpatialPixel;
+
 /// A grey pixel.
-pub trait Pixel: Copy + Default + PartialOrd + Send + Sync + 'static {
+pub trait Pixel: SpatialPixel + PartialOrd {
     /// Distance between neighbouring values, counts; 0 for a float.
     const STEP: f32;
     /// The value, counts.

@@ -4,6 +4,7 @@ pub mod band;
 pub mod grid;
 pub mod local;
 pub mod otsu;
+pub mod spot;
 
 use super::config::wrong;
 use super::isolated::IsolatedConfig;
@@ -25,6 +26,8 @@ pub enum ThresholdConfig {
     Local(LocalConfig),
     /// Closed blobs of any size that stand clear of the ring around them.
     Isolated(IsolatedConfig),
+    /// Small targets by their contrast to what surrounds them: one detection for each peak, no clusters.
+    Spot(SpotConfig),
 }
 
 impl Default for ThresholdConfig {
@@ -126,6 +129,50 @@ impl Default for LocalConfig {
     }
 }
 
+/// Small targets by their local contrast.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct SpotConfig {
+    /// Diameter of the target with its soft edge, px, 2..=255. Larger finds larger targets and joins neighbours.
+    pub size_px: f64,
+    /// Distance of the response from its local median in robust standard deviations, above 0.
+    pub k: f64,
+    /// Which contrast is looked for.
+    pub polarity: Polarity,
+    /// Least response, counts, 0...: keeps a quiet background from calling every step a target.
+    pub min_contrast: f64,
+    /// Side of the surroundings in units of `size-px`, 1..=10. 1 suits crowded frames, 2 or more dim single targets.
+    pub surround: f64,
+    /// Side of the smoothing box, px, 1...; a quarter of `size-px` if absent. Raise it with the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smooth_px: Option<f64>,
+}
+
+impl Default for SpotConfig {
+    fn default() -> Self {
+        Self { size_px: 7.0, k: 6.0, polarity: Polarity::Bright, min_contrast: 2.0, surround: 1.5, smooth_px: None }
+    }
+}
+
+impl SpotConfig {
+    fn validate(&self, at: &str) -> Result<()> {
+        let check = |key: &str, v: f64, low: f64, high: f64, hint: &str| {
+            if (low..=high).contains(&v) {
+                return Ok(());
+            }
+            Err(wrong(at, key, v, &format!("{low} to {high}"), hint))
+        };
+        check("size-px", self.size_px, 2.0, 255.0, "the diameter of the target with its soft edge")?;
+        check("k", self.k, f64::MIN_POSITIVE, 1e6, "6 is a common start; lower finds dimmer targets")?;
+        check("min-contrast", self.min_contrast, 0.0, 1e9, "0 leaves the deviation alone to decide")?;
+        check("surround", self.surround, 1.0, 10.0, "1.5 is a common start")?;
+        if let Some(smooth_px) = self.smooth_px {
+            check("smooth-px", smooth_px, 1.0, 255.0, "leave it out for a quarter of size-px")?;
+        }
+        Ok(())
+    }
+}
+
 impl ThresholdConfig {
     /// Checks every parameter; `at` is the path of this table.
     /// # Errors
@@ -156,6 +203,7 @@ impl ThresholdConfig {
             }
             Self::Otsu(_) => {}
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
+            Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
             Self::Local(c) => {
                 if !(c.k > 0.0 && c.k.is_finite()) {
                     return Err(wrong(

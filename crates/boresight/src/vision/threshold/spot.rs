@@ -1,0 +1,423 @@
+//! Spot detector: small targets by their local contrast, one detection for each peak of a centre-minus-surround filter.
+//!
+//! Response D = S - B: S the frame smoothed by a box applied twice (close to a Gaussian of the optics), B the mean of a wider
+//! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
+//! on a grid) above its surroundings. Position: centroid of the positive part of D in a disc of radius size/2 that is moved until
+//! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
+//! edge, so that positions are not drawn to whole pixels; of two positions closer than size/2 the stronger stays.
+//! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
+//! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
+//! enlarges it to 1/(1-q). The model ends where negative D is clipped: for peaks of a few deviations the truth is
+//! somewhat larger. Pixels without a value (NaN) take their left neighbour's.
+//! Symbols: σ noise of one pixel (counts); p position in the disc (px).
+
+use super::grid::BackgroundGrid;
+use super::{Side, SpotConfig};
+use crate::vision::pixel::Pixel;
+use crate::{Detection, Extent, Image};
+use nalgebra::{Matrix2, Vector2};
+
+/// A spot.
+#[derive(Clone, Debug)]
+struct Spot {
+    position: Vector2<f64>,
+    /// Σ of the positive response in the disc, counts.
+    mass: f64,
+    /// How far the disc's centroid moves when the disc moves by 1 px: the response cut off at its edge.
+    pull: f64,
+    score: f32,
+    peak: (usize, usize),
+}
+
+/// A spot of one sign as a detection, before the signs are compared.
+#[derive(Clone, Debug)]
+struct Found {
+    detection: Detection,
+    response: f32,
+    peak: (usize, usize),
+    sign: f32,
+}
+
+/// The spot detector with the memory it keeps between frames.
+#[derive(Clone, Debug)]
+pub struct SpotDetector {
+    config: SpotConfig,
+    /// Odd sides of the smoothing and of the surrounding box, px.
+    smooth: usize,
+    surround: usize,
+    radius: usize,
+    /// Offsets inside the disc, row by row.
+    disc: Vec<(i32, i32)>,
+    /// Σ_j (K * p_x)_j², px².
+    noise_gain: f64,
+    frame: Image<f32>,
+    smoothed: Image<f32>,
+    response: Image<f32>,
+    boxes: BoxMean,
+    grid: BackgroundGrid,
+    level: Vec<f32>,
+    spots: Vec<Spot>,
+    found: Vec<Found>,
+}
+
+fn odd(v: f64) -> usize {
+    // A cast saturates; sizes were checked by the configuration.
+    (v.round().max(1.0) as usize) | 1
+}
+
+impl SpotDetector {
+    /// Builds the detector for a checked configuration.
+    pub fn new(config: &SpotConfig) -> Self {
+        let smooth = odd(config.smooth_px.unwrap_or(config.size_px / 4.0).max(1.0));
+        let surround = odd(config.size_px * config.surround).max(smooth + 2);
+        let radius = ((config.size_px / 2.0).floor() as usize).max(1);
+        let r = radius as i32;
+        let disc: Vec<(i32, i32)> = (-r - 1..=r + 1)
+            .flat_map(|y| (-r - 1..=r + 1).map(move |x| (x, y)))
+            .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
+            .collect();
+        let cell = (4.0 * config.size_px).max(32.0) as usize;
+        let noise_gain = noise_gain(&disc, radius, smooth, surround);
+        Self {
+            config: config.clone(),
+            smooth,
+            surround,
+            radius,
+            disc,
+            noise_gain,
+            frame: Image::default(),
+            smoothed: Image::default(),
+            response: Image::default(),
+            boxes: BoxMean::default(),
+            grid: BackgroundGrid::new(cell),
+            level: Vec::new(),
+            spots: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+
+    /// Appends the spots of a frame in raster order of their peaks; `noise` is the variance of one pixel at intensity 0,
+    /// counts², and its growth with intensity, counts.
+    pub fn detect<T: Pixel>(&mut self, image: &Image<T>, noise: (f64, f64), out: &mut Vec<Detection>) {
+        if image.as_slice().is_empty() {
+            return;
+        }
+        self.fill_response(image);
+        for side in [Side::Bright, Side::Dark] {
+            if !self.config.polarity.has(side) {
+                continue;
+            }
+            let sign = if side == Side::Bright { 1.0 } else { -1.0 };
+            if side == Side::Dark {
+                self.response.as_mut_slice().iter_mut().for_each(|v| *v = -*v);
+            }
+            self.grid.refresh(&self.response);
+            self.find_peaks();
+            self.drop_doubles();
+            let mut found = std::mem::take(&mut self.found);
+            found.extend(self.spots.iter().map(|s| Found {
+                detection: self.detection(s, noise, sign),
+                response: self.response.row(s.peak.1)[s.peak.0],
+                peak: s.peak,
+                sign,
+            }));
+            self.found = found;
+        }
+        self.found.sort_by_key(|f| (f.peak.1, f.peak.0));
+        let kept = (0..self.found.len()).filter(|&i| !self.is_side_lobe(i));
+        out.extend(kept.map(|i| self.found[i].detection.clone()));
+        self.found.clear();
+    }
+
+    /// Whether a spot is but the rim of a stronger one of the other sign: the filter answers with an opposite ring.
+    fn is_side_lobe(&self, i: usize) -> bool {
+        let this = &self.found[i];
+        let reach = self.surround / 2 + self.radius + self.smooth;
+        let near = |f: &Found| {
+            f.peak.0.abs_diff(this.peak.0) <= reach && f.sign != this.sign && f.response > 2.0 * this.response
+        };
+        let rows = |f: &&Found| f.peak.1.abs_diff(this.peak.1) <= reach;
+        self.found[..i].iter().rev().take_while(rows).any(near) || self.found[i..].iter().take_while(rows).any(near)
+    }
+
+    fn fill_response<T: Pixel>(&mut self, image: &Image<T>) {
+        let (w, h) = (image.width(), image.height());
+        for work in [&mut self.frame, &mut self.smoothed, &mut self.response] {
+            if (work.width(), work.height()) != (w, h) {
+                work.reset(w, h, 0.0);
+            }
+        }
+        let mut last = 0.0;
+        for (f, p) in self.frame.as_mut_slice().iter_mut().zip(image.as_slice()) {
+            let v = p.value_f32();
+            if v.is_finite() {
+                last = v;
+            }
+            *f = last;
+        }
+        self.boxes.run(&self.frame, self.smooth, &mut self.response);
+        self.boxes.run(&self.response, self.smooth, &mut self.smoothed);
+        self.boxes.run(&self.frame, self.surround, &mut self.response);
+        for (r, s) in self.response.as_mut_slice().iter_mut().zip(self.smoothed.as_slice()) {
+            *r = s - *r;
+        }
+    }
+
+    fn find_peaks(&mut self) {
+        self.spots.clear();
+        let (w, h) = (self.response.width(), self.response.height());
+        for y in 0..h {
+            self.grid.level_row(y, self.config.k as f32, self.config.min_contrast as f32, 1.0, &mut self.level);
+            for x in 0..w {
+                let v = self.response.row(y)[x];
+                if v >= self.level[x] && v > 0.0 && self.is_peak(x, y, v) {
+                    let spot = self.centre(x, y, v);
+                    self.spots.push(spot);
+                }
+            }
+        }
+    }
+
+    /// Whether no pixel of the disc around (x, y) is larger; of equals the first in raster order is the peak.
+    fn is_peak(&self, x: usize, y: usize, v: f32) -> bool {
+        self.disc.iter().all(|&(dx, dy)| {
+            let other = self.at(x as i64 + i64::from(dx), y as i64 + i64::from(dy));
+            other.is_none_or(|o| o < v || (o == v && (dy, dx) >= (0, 0)))
+        })
+    }
+
+    fn at(&self, x: i64, y: i64) -> Option<f32> {
+        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        self.response.get(x, y)
+    }
+
+    /// The centroid of the positive response in the disc, the disc moved until it is centred on it.
+    fn centre(&self, x: usize, y: usize, v: f32) -> Spot {
+        let (w, h) = (self.response.width() as f64, self.response.height() as f64);
+        let mut c = Vector2::new(x as f64, y as f64);
+        let (mut mass, mut pull) = (0.0, 0.0);
+        for _ in 0..30 {
+            let (mut sum, mut moment, mut edge) = (0.0f64, Vector2::zeros(), 0.0);
+            let (cx, cy) = (c.x.round(), c.y.round());
+            for &(dx, dy) in &self.disc {
+                let Some(d) = self.at(cx as i64 + i64::from(dx), cy as i64 + i64::from(dy)) else { continue };
+                let p = Vector2::new(cx + f64::from(dx), cy + f64::from(dy)) - c;
+                let r = p.norm();
+                // A soft edge one pixel wide: what enters and leaves as the disc moves does so steadily.
+                let window = (self.radius as f64 + 0.5 - r).clamp(0.0, 1.0);
+                let d = f64::from(d.max(0.0));
+                sum += window * d;
+                moment += p * (window * d);
+                if window > 0.0 && window < 1.0 {
+                    edge += 0.5 * d * r;
+                }
+            }
+            if sum <= 0.0 {
+                break;
+            }
+            (mass, pull) = (sum, edge / sum);
+            let step = moment / sum;
+            let next = c + step;
+            if !(0.0..=w - 1.0).contains(&next.x) || !(0.0..=h - 1.0).contains(&next.y) {
+                break;
+            }
+            c = next;
+            if step.norm() < 1e-3 {
+                break;
+            }
+        }
+        let (median, deviation) = self.grid.at(x as f64, y as f64);
+        // A response without spread (an empty frame but for the target) is as sure as f32 can say.
+        let score = ((f64::from(v) - median) / deviation.max(1e-6)).min(1e9) as f32;
+        Spot { position: c, mass, pull, score, peak: (x, y) }
+    }
+
+    /// Of spots closer than size / 2 the strongest stays.
+    fn drop_doubles(&mut self) {
+        let reach2 = (self.config.size_px / 2.0).powi(2);
+        let mut keep = vec![true; self.spots.len()];
+        // Spots come in raster order of their peaks, and no position is further from its peak than the disc moves.
+        let window = self.radius + 10;
+        for i in 0..self.spots.len() {
+            for j in i + 1..self.spots.len() {
+                let (a, b) = (&self.spots[i], &self.spots[j]);
+                if b.peak.1 > a.peak.1 + 2 * window {
+                    break;
+                }
+                if (a.position - b.position).norm_squared() < reach2 {
+                    keep[if b.mass > a.mass { i } else { j }] = false;
+                }
+            }
+        }
+        let mut i = 0;
+        self.spots.retain(|_| {
+            i += 1;
+            keep[i - 1]
+        });
+    }
+
+    fn detection(&self, spot: &Spot, (variance, gain): (f64, f64), sign: f32) -> Detection {
+        let (cx, cy) = (spot.position.x.round() as i64, spot.position.y.round() as i64);
+        let top = self.at(spot.peak.0 as i64, spot.peak.1 as i64).unwrap_or(0.0);
+        // The pixels above half the peak, for the size.
+        let (mut area, mut low, mut high) = (0, (cx, cy), (cx, cy));
+        let mut peak = f32::NEG_INFINITY;
+        for &(dx, dy) in &self.disc {
+            let (x, y) = (cx + i64::from(dx), cy + i64::from(dy));
+            if self.at(x, y).is_some_and(|v| v >= 0.5 * top) {
+                area += 1;
+                low = (low.0.min(x), low.1.min(y));
+                high = (high.0.max(x), high.1.max(y));
+                peak = peak.max(sign * self.frame.get(x as usize, y as usize).unwrap_or(0.0));
+            }
+        }
+        // Rounding and clipping leave a little even without noise.
+        let level = self.frame.get(spot.peak.0, spot.peak.1).unwrap_or(0.0).max(0.0);
+        let variance = variance + gain * f64::from(level);
+        let sd2 = variance * self.noise_gain / (spot.mass * (1.0 - spot.pull.min(0.7))).powi(2) + 1e-4;
+        Detection {
+            position: spot.position,
+            cov: Matrix2::identity() * sd2,
+            extent: Extent {
+                left_px: low.0 as f64 - 0.5,
+                top_px: low.1 as f64 - 0.5,
+                width_px: (high.0 - low.0 + 1) as f64,
+                height_px: (high.1 - low.1 + 1) as f64,
+            },
+            area_px: area.max(1),
+            peak: if peak.is_finite() { sign * peak } else { top },
+            sum: spot.mass,
+            score: spot.score,
+            class: None,
+        }
+    }
+}
+
+/// Σ_j (K * p_x)_j² over all pixels j that the disc's weights see.
+fn noise_gain(disc: &[(i32, i32)], radius: usize, smooth: usize, surround: usize) -> f64 {
+    let reach = radius + 1 + (smooth - 1).max(surround / 2) + 1;
+    let n = 2 * reach + 1;
+    let mut weight = Image::filled(n, n, 0.0f32);
+    for &(dx, dy) in disc {
+        let (x, y) = (reach as i64 + i64::from(dx), reach as i64 + i64::from(dy));
+        let window = (radius as f64 + 0.5 - f64::from(dx * dx + dy * dy).sqrt()).clamp(0.0, 1.0);
+        weight.row_mut(y as usize)[x as usize] = dx as f32 * window as f32;
+    }
+    // The kernel is symmetric, so filtering the weights is the transposed filter.
+    let mut boxes = BoxMean::default();
+    let (mut a, mut b, mut c) = (Image::default(), Image::default(), Image::default());
+    boxes.run(&weight, smooth, &mut a);
+    boxes.run(&a, smooth, &mut b);
+    boxes.run(&weight, surround, &mut c);
+    b.as_slice().iter().zip(c.as_slice()).map(|(s, m)| f64::from(s - m).powi(2)).sum()
+}
+
+/// Mean over a square box, the edge pixel repeated outside; cost independent of the box's size.
+#[derive(Clone, Debug, Default)]
+struct BoxMean {
+    columns: Vec<f64>,
+    prefix: Vec<f64>,
+}
+
+impl BoxMean {
+    fn run(&mut self, src: &Image<f32>, side: usize, dst: &mut Image<f32>) {
+        let (w, h, r) = (src.width(), src.height(), side / 2);
+        if (dst.width(), dst.height()) != (w, h) {
+            dst.reset(w, h, 0.0);
+        }
+        if w == 0 || h == 0 {
+            return;
+        }
+        let scale = 1.0 / (side * side) as f64;
+        self.columns.clear();
+        self.columns.resize(w, 0.0);
+        for k in 0..side {
+            // Row k - r of the first window.
+            add_row(&mut self.columns, src.row(k.saturating_sub(r).min(h - 1)), 1.0);
+        }
+        for y in 0..h {
+            self.prefix.clear();
+            let mut sum = 0.0;
+            self.prefix.push(sum);
+            let padded = std::iter::repeat_n(self.columns[0], r)
+                .chain(self.columns.iter().copied())
+                .chain(std::iter::repeat_n(self.columns[w - 1], r));
+            self.prefix.extend(padded.map(|c| {
+                sum += c;
+                sum
+            }));
+            for ((d, left), right) in dst.row_mut(y).iter_mut().zip(&self.prefix).zip(&self.prefix[side..]) {
+                *d = ((right - left) * scale) as f32;
+            }
+            add_row(&mut self.columns, src.row((y + 1 + r).min(h - 1)), 1.0);
+            add_row(&mut self.columns, src.row(y.saturating_sub(r)), -1.0);
+        }
+    }
+}
+
+fn add_row(columns: &mut [f64], row: &[f32], sign: f64) {
+    for (c, v) in columns.iter_mut().zip(row) {
+        *c += sign * f64::from(*v);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spot_image(x0: f64, y0: f64, amplitude: f64) -> Image<f32> {
+        let mut image = Image::filled(64, 48, 50.0f32);
+        for y in 0..48 {
+            for x in 0..64 {
+                let d2 = (x as f64 - x0).powi(2) + (y as f64 - y0).powi(2);
+                image.row_mut(y)[x] += (amplitude * (-d2 / (2.0 * 1.5 * 1.5)).exp()) as f32;
+            }
+        }
+        image
+    }
+
+    #[test]
+    fn a_spot_is_found_at_its_sub_pixel_position_bright_or_dark() {
+        for (amplitude, polarity) in [(80.0, super::super::Polarity::Bright), (-40.0, super::super::Polarity::Both)] {
+            let config = SpotConfig { size_px: 7.0, polarity, ..Default::default() };
+            let mut found = Vec::new();
+            SpotDetector::new(&config).detect(&spot_image(30.3, 20.6, amplitude), (1.0, 0.0), &mut found);
+            assert_eq!(found.len(), 1, "{amplitude}");
+            let d = found[0].position - Vector2::new(30.3, 20.6);
+            assert!(d.norm() < 0.05, "{d}");
+            assert!((f64::from(found[0].peak) - 50.0).signum() == amplitude.signum());
+        }
+    }
+
+    #[test]
+    fn the_box_mean_is_the_plain_mean_with_repeated_edges() {
+        let src = Image::from_vec(4, 3, (0..12).map(|v| (v * v) as f32).collect()).unwrap();
+        let mut dst = Image::default();
+        for side in [1, 3, 5, 9] {
+            BoxMean::default().run(&src, side, &mut dst);
+            let r = (side / 2) as i64;
+            for y in 0..3i64 {
+                for x in 0..4i64 {
+                    let mut sum = 0.0;
+                    for dy in -r..=r {
+                        for dx in -r..=r {
+                            sum += f64::from(src.row((y + dy).clamp(0, 2) as usize)[(x + dx).clamp(0, 3) as usize]);
+                        }
+                    }
+                    let mean = sum / (side * side) as f64;
+                    assert!((f64::from(dst.row(y as usize)[x as usize]) - mean).abs() < 1e-5, "{side} {x} {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_frame_or_one_without_values_has_no_spots() {
+        let mut found = Vec::new();
+        for image in [Image::filled(40, 40, 7.0f32), Image::filled(40, 40, f32::NAN), Image::filled(1, 1, 3.0)] {
+            SpotDetector::new(&SpotConfig::default()).detect(&image, (1.0, 0.0), &mut found);
+        }
+        SpotDetector::new(&SpotConfig::default()).detect(&Image::<u8>::filled(0, 0, 0), (1.0, 0.0), &mut found);
+        assert!(found.is_empty());
+    }
+}
