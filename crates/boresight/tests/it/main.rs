@@ -4,3 +4,4 @@ mod golden;
 mod metrics;
 mod rooms;
 mod tables;
+mod vision_real;
