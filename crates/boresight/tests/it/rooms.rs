@@ -16,7 +16,7 @@ const ARROWS: [(&str, &[&str]); 9] = [
     ("sim", &[]),
     ("io", &[]),
     ("draw", &["io"]),
-    ("report", &["draw", "metrics"]),
+    ("report", &["draw", "io", "metrics"]),
 ];
 
 fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {

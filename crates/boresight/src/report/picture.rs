@@ -1,0 +1,98 @@
+//! The frame behind the trajectories: grey, stretched between its 0.5 % and 99.5 % levels, at most 1024 px wide, as PNG.
+
+use super::text::base64;
+use crate::{Frame, Pixels};
+
+/// Wider frames are averaged down.
+const MAX_WIDTH: usize = 1024;
+
+/// A small grey picture of a frame.
+#[derive(Clone, Debug)]
+pub(super) struct Picture {
+    /// The frame's number.
+    pub frame: u64,
+    /// The frame's own size, px.
+    pub width: usize,
+    pub height: usize,
+    small_width: usize,
+    small_height: usize,
+    gray: Vec<u8>,
+}
+
+impl Picture {
+    pub fn of_frame(frame: &Frame) -> Self {
+        let (width, height) = (frame.pixels.width(), frame.pixels.height());
+        // At least as coarse as needed for the height too, so that no picture grows without bound.
+        let block = width.div_ceil(MAX_WIDTH).max(height.div_ceil(MAX_WIDTH)).max(1);
+        let (small_width, small_height) = (width.div_ceil(block), height.div_ceil(block));
+        let value: Box<dyn Fn(usize, usize) -> f32> = match &frame.pixels {
+            Pixels::Gray8(i) => Box::new(move |x, y| f32::from(i.row(y)[x])),
+            Pixels::Gray16(i) => Box::new(move |x, y| f32::from(i.row(y)[x])),
+            Pixels::GrayF32(i) => Box::new(move |x, y| i.row(y)[x]),
+            Pixels::Rgb8(i) => Box::new(move |x, y| {
+                let [r, g, b] = i.row(y)[x].map(f32::from);
+                0.299 * r + 0.587 * g + 0.114 * b // BT.601
+            }),
+        };
+        let mut means = Vec::with_capacity(small_width * small_height);
+        for by in 0..small_height {
+            for bx in 0..small_width {
+                let (mut sum, mut n) = (0.0f64, 0u32);
+                for y in by * block..((by + 1) * block).min(height) {
+                    for x in bx * block..((bx + 1) * block).min(width) {
+                        let v = value(x, y);
+                        if v.is_finite() {
+                            sum += f64::from(v);
+                            n += 1;
+                        }
+                    }
+                }
+                means.push(if n > 0 { (sum / f64::from(n)) as f32 } else { f32::NAN });
+            }
+        }
+        let mut sorted: Vec<f32> = means.iter().copied().filter(|v| v.is_finite()).collect();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let level =
+            |share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
+        let (low, high) = (level(0.005), level(0.995));
+        let scale = if high > low { 255.0 / (high - low) } else { 0.0 };
+        // A flat picture is drawn in mid grey; `as` saturates and turns NaN into 0.
+        let gray = means.iter().map(|v| if scale > 0.0 { ((v - low) * scale).round() as u8 } else { 128 }).collect();
+        Self { frame: frame.index.0, width, height, small_width, small_height, gray }
+    }
+
+    /// The picture as a `data:` address; `None` if it cannot be coded (it has no pixels).
+    pub fn data_url(&self) -> Option<String> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(
+            &mut bytes,
+            u32::try_from(self.small_width).ok()?,
+            u32::try_from(self.small_height).ok()?,
+        );
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
+        let mut writer = encoder.write_header().ok()?;
+        writer.write_image_data(&self.gray).ok()?;
+        writer.finish().ok()?;
+        Some(format!("data:image/png;base64,{}", base64(&bytes)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameIndex, Image, Timestamp};
+
+    #[test]
+    fn wide_frames_are_averaged_and_stretched() {
+        let mut image = Image::filled(2048, 2, 1000u16);
+        image.row_mut(0)[..1024].fill(3000);
+        image.row_mut(1)[..1024].fill(3000);
+        let frame = Frame { index: FrameIndex(7), time: Timestamp::default(), pixels: Pixels::Gray16(image) };
+        let picture = Picture::of_frame(&frame);
+        assert_eq!((picture.small_width, picture.small_height, picture.width), (1024, 1, 2048));
+        assert_eq!((picture.gray[0], picture.gray[1023]), (255, 0));
+        assert!(picture.data_url().unwrap().starts_with("data:image/png;base64,iVBORw0KGgo"));
+    }
+}
