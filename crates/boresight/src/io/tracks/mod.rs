@@ -1,6 +1,184 @@
 //! Tables of tracks in the formats of the field: MOTChallenge, KITTI, CSV with named columns, Cell Tracking Challenge.
+//!
+//! [`read`] finds the format by the look of the file; [`write`] says what the target cannot hold.
 
+pub mod ctc;
+pub mod kitti;
 pub mod lines;
 pub mod mot;
+pub mod named;
 
 pub use lines::{BadRows, ReadOptions};
+pub use named::Dialect;
+
+use crate::{Error, ErrorKind, Result, TrackTable};
+use std::io::{Read, Write};
+use std::path::Path;
+
+/// A format of tracks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// MOTChallenge result: the last columns are -1.
+    Mot,
+    /// MOTChallenge truth: with class and visibility.
+    MotTruth,
+    /// KITTI tracking labels.
+    Kitti,
+    /// CSV with named columns.
+    Named(Dialect),
+    /// Cell Tracking Challenge folder.
+    Ctc,
+}
+
+impl Format {
+    /// The format's name, as the command takes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mot => "mot",
+            Self::MotTruth => "mot-truth",
+            Self::Kitti => "kitti",
+            Self::Named(Dialect::Plain) => "csv",
+            Self::Named(Dialect::Trackpy) => "trackpy",
+            Self::Named(Dialect::TrackMate) => "trackmate",
+            Self::Named(Dialect::Btrack) => "btrack",
+            Self::Named(Dialect::Ultrack) => "ultrack",
+            Self::Ctc => "ctc",
+        }
+    }
+
+    /// All formats.
+    pub const ALL: [Self; 9] = [
+        Self::Mot,
+        Self::MotTruth,
+        Self::Kitti,
+        Self::Named(Dialect::Plain),
+        Self::Named(Dialect::Trackpy),
+        Self::Named(Dialect::TrackMate),
+        Self::Named(Dialect::Btrack),
+        Self::Named(Dialect::Ultrack),
+        Self::Ctc,
+    ];
+}
+
+/// A table as read.
+#[derive(Clone, Debug)]
+pub struct TrackFile {
+    /// The table.
+    pub table: TrackTable,
+    /// Its format.
+    pub format: Format,
+    /// Rows that were left out.
+    pub bad: BadRows,
+}
+
+/// Finds the format of a file or folder by its look.
+/// # Errors
+/// A path that is not there; a look that is none of the formats'.
+pub fn sniff(path: &Path) -> Result<Format> {
+    if path.is_dir() {
+        return if ctc::is_ctc(path) {
+            Ok(Format::Ctc)
+        } else {
+            Err(Error::new(ErrorKind::Unsupported, "is a folder without man_track.txt or res_track.txt")
+                .at(path.display())
+                .hint("name the table itself, or write {seq} where the names of the sequences stand"))
+        };
+    }
+    let mut file = std::fs::File::open(path)
+        .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be opened").at(path.display()).because(e))?;
+    let mut head = vec![0; 4096];
+    let n = file.read(&mut head).unwrap_or(0);
+    let line = head[..n].split(|&b| b == b'\n').find(|l| !l.trim_ascii().is_empty()).unwrap_or(b"").trim_ascii();
+    if line.is_empty() {
+        // An empty table: a tracker that found nothing.
+        return Ok(Format::Mot);
+    }
+    if named::is_header(line) {
+        return Ok(Format::Named(Dialect::Plain));
+    }
+    let mut fields = lines::Fields::new(line, None);
+    let third = (fields.field(), fields.field(), fields.field()).2;
+    if third.is_some_and(|t| t.first().is_some_and(u8::is_ascii_alphabetic)) {
+        return Ok(Format::Kitti);
+    }
+    if line.iter().any(u8::is_ascii_digit) && !line.iter().any(|b| b.is_ascii_alphabetic() && !b"eEnNaA".contains(b)) {
+        return Ok(Format::Mot);
+    }
+    let shown: String = String::from_utf8_lossy(line).chars().take(60).collect();
+    Err(Error::new(ErrorKind::Unsupported, format!("begins with \"{shown}\": no table of tracks known here"))
+        .at(path.display())
+        .hint("known are MOTChallenge, KITTI, CSV with named columns (frame, track_id, x, y ..) and Cell Tracking Challenge folders"))
+}
+
+/// Reads a table in a given format, or in that of its look.
+/// # Errors
+/// As the format's reader.
+pub fn read(path: &Path, format: Option<Format>, options: ReadOptions, tentative: bool) -> Result<TrackFile> {
+    let format = match format {
+        Some(f) => f,
+        None => sniff(path)?,
+    };
+    let (table, bad) = match format {
+        Format::Mot | Format::MotTruth => mot::read(path, options)?,
+        Format::Kitti => kitti::read(path, options)?,
+        Format::Named(_) => named::read(path, options, tentative)?,
+        Format::Ctc => (ctc::CtcFolder::open(path)?.table(path.display().to_string())?, BadRows::default()),
+    };
+    Ok(TrackFile { table, format, bad })
+}
+
+/// Writes a table; the names of what the format cannot hold are returned.
+/// # Errors
+/// A format that is not written (label images cannot be made of boxes); what the writer fails with.
+pub fn write(table: &TrackTable, format: Format, out: &mut impl Write) -> Result<Vec<String>> {
+    match format {
+        Format::Mot | Format::MotTruth => {
+            let mut dropped: Vec<String> = table.extra.iter().map(|e| e.0.clone()).collect();
+            if format == Format::Mot && table.class != crate::tracks::Column::Constant(1) {
+                dropped.push("class".into());
+            }
+            if format == Format::Mot && table.visibility != crate::tracks::Column::Constant(1.0) {
+                dropped.push("visibility".into());
+            }
+            if !table.ignore.is_empty() {
+                dropped.push("regions that do not count".into());
+            }
+            mot::write(table, format == Format::MotTruth, out)?;
+            Ok(dropped)
+        }
+        Format::Kitti => kitti::write(table, out),
+        Format::Named(dialect) => {
+            let mut dropped = named::write(table, dialect, out)?;
+            if !table.ignore.is_empty() {
+                dropped.push("regions that do not count".into());
+            }
+            Ok(dropped)
+        }
+        Format::Ctc => {
+            let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
+            for l in ctc::lineages_of(table) {
+                writeln!(out, "{} {} {} {}", l.label, l.begin, l.end, l.parent).map_err(failed)?;
+            }
+            Ok(vec!["positions (label images are not made of boxes; only the table of lineages is written)".into()])
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_known_by_their_look() {
+        let f = tempfile::NamedTempFile::new().unwrap();
+        let look = |text: &str| {
+            std::fs::write(f.path(), text).unwrap();
+            sniff(f.path())
+        };
+        assert_eq!(look("1,2,3,4,5,6,1,-1,-1,-1\n").unwrap(), Format::Mot);
+        assert_eq!(look("0 1 Car 0 0 0 1 2 3 4\n").unwrap(), Format::Kitti);
+        assert_eq!(look("frame,particle,x,y\n").unwrap(), Format::Named(Dialect::Plain));
+        assert_eq!(look("").unwrap(), Format::Mot);
+        assert!(look("<html>hello</html>").unwrap_err().to_string().contains("no table of tracks known here"));
+    }
+}

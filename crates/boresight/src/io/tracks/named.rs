@@ -1,0 +1,321 @@
+//! CSV with named columns: boresight's own tracks.csv, trackpy, TrackMate, btrack, ultrack, and whatever names its columns.
+//!
+//! The header decides: each column has a meaning by its name (upper or lower case), the rest is kept as text where asked.
+//! TrackMate writes three more header lines and leaves TRACK_ID empty for spots outside of tracks: both are passed over.
+//! Frames count from 0, the centre of the top-left pixel is (0, 0); rows have a centre, and a box if width and height
+//! are there. Limits: comma, semicolon or tab; no quoted separators inside of used columns.
+
+use super::lines::{BadRows, Fields, ReadOptions, each_line, number, separator};
+use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
+use std::io::Write;
+use std::path::Path;
+
+/// What a column means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Meaning {
+    Frame,
+    Id,
+    X,
+    Y,
+    Left,
+    Top,
+    Width,
+    Height,
+    Score,
+    Class,
+    Status,
+    Other,
+}
+
+/// The names of each meaning, best first: `ID` is a track's number in btrack but a spot's in TrackMate.
+const NAMES: [(Meaning, &[&str]); 11] = [
+    (Meaning::Frame, &["frame", "t", "frame_index"]),
+    (Meaning::Id, &["track_id", "particle", "trackid", "id", "track"]),
+    (Meaning::X, &["x_px", "position_x", "x", "cx"]),
+    (Meaning::Y, &["y_px", "position_y", "y", "cy"]),
+    (Meaning::Left, &["left_px", "bb_left", "left", "xmin", "x_min", "x1"]),
+    (Meaning::Top, &["top_px", "bb_top", "top", "ymin", "y_min", "y1"]),
+    (Meaning::Width, &["width_px", "bb_width", "width", "w"]),
+    (Meaning::Height, &["height_px", "bb_height", "height", "h"]),
+    (Meaning::Score, &["score", "confidence", "conf", "quality"]),
+    (Meaning::Class, &["class", "class_id"]),
+    (Meaning::Status, &["status"]),
+];
+
+/// The programs whose tables of points are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dialect {
+    /// boresight's names: frame, track_id, x_px, y_px, width_px, height_px, score.
+    Plain,
+    /// trackpy: frame, particle, x, y.
+    Trackpy,
+    /// TrackMate's spot table: TRACK_ID, QUALITY, POSITION_X, POSITION_Y, FRAME.
+    TrackMate,
+    /// btrack: ID, t, y, x.
+    Btrack,
+    /// ultrack: track_id, t, y, x.
+    Ultrack,
+}
+
+struct Header {
+    meanings: Vec<Meaning>,
+    names: Vec<String>,
+    trackmate: bool,
+}
+
+fn header(line: &[u8], comma: Option<u8>) -> Result<Header> {
+    let mut names = Vec::new();
+    let mut fields = Fields::new(line, comma);
+    while let Some(f) = fields.field() {
+        names.push(String::from_utf8_lossy(f).trim_matches('"').to_string());
+    }
+    let lower: Vec<String> = names.iter().map(|n| n.to_ascii_lowercase()).collect();
+    let mut meanings = vec![Meaning::Other; names.len()];
+    for (meaning, known) in NAMES {
+        if let Some(k) = known.iter().find_map(|n| lower.iter().position(|l| l == n))
+            && meanings[k] == Meaning::Other
+        {
+            meanings[k] = meaning;
+        }
+    }
+    let has = |m| meanings.contains(&m);
+    let place = has(Meaning::X) && has(Meaning::Y) || has(Meaning::Left) && has(Meaning::Top);
+    if !(has(Meaning::Frame) && has(Meaning::Id) && place) {
+        return Err(Error::new(
+            ErrorKind::Unsupported,
+            format!("columns {}: expected a frame, a track number and a position among them", names.join(", ")),
+        )
+        .at("line 1")
+        .hint("for instance: frame,track_id,x,y or frame,track_id,left,top,width,height"));
+    }
+    let trackmate = lower.iter().any(|n| n == "position_x");
+    Ok(Header { meanings, names, trackmate })
+}
+
+/// Whether a first line is a header of this kind.
+pub fn is_header(line: &[u8]) -> bool {
+    header(line, separator(line)).is_ok()
+}
+
+/// Reads a table; `tentative` keeps rows whose status is tentative.
+/// # Errors
+/// A missing file, a header without frame, id and position, a malformed row unless such rows are skipped.
+pub fn read(path: &Path, options: ReadOptions, tentative: bool) -> Result<(TrackTable, BadRows)> {
+    let mut table = TrackTableBuilder::new(path.display().to_string(), PixelOrigin::Centre0);
+    let (mut bad, mut head, mut comma, mut boxes) = (BadRows::default(), None::<Header>, None, false);
+    let mut kept: Vec<usize> = Vec::new();
+    each_line(path, |line_number, line| {
+        let Some(head) = &head else {
+            comma = separator(line);
+            let h = header(line, comma).map_err(|e| e.at(path.display()))?;
+            if options.keep_extra {
+                kept =
+                    (0..h.names.len()).filter(|&k| matches!(h.meanings[k], Meaning::Other | Meaning::Status)).collect();
+                kept.iter().for_each(|&k| table.add_extra(h.names[k].as_str()));
+            }
+            boxes = h.meanings.contains(&Meaning::Width) && h.meanings.contains(&Meaning::Height);
+            head = Some(h);
+            return Ok(());
+        };
+        let mut extra = Vec::new();
+        match row(head, Fields::new(line, comma), line_number, tentative, &kept, &mut extra) {
+            Ok(None) => Ok(()),
+            Ok(Some(r)) => match table.push(&r) {
+                Ok(()) => {
+                    extra.iter().enumerate().for_each(|(k, v)| table.push_extra(k, v));
+                    Ok(())
+                }
+                Err(e) => bad.note(options, e.at(format!("{} line {line_number}", path.display()))),
+            },
+            Err(e) => bad.note(options, e.at(format!("{} line {line_number}", path.display()))),
+        }
+    })?;
+    if head.is_none() {
+        return Err(Error::new(ErrorKind::Damaged, "is empty: expected a header with column names").at(path.display()));
+    }
+    if !boxes {
+        table.points();
+    }
+    let mut t = table.finish(0)?;
+    if boxes && t.boxes.iter().all(|b| b[2] == 0.0 && b[3] == 0.0) {
+        t.is_points = true;
+    }
+    Ok((t, bad))
+}
+
+fn row(
+    head: &Header,
+    mut fields: Fields<'_>,
+    line: u64,
+    tentative: bool,
+    kept: &[usize],
+    extra: &mut Vec<String>,
+) -> Result<Option<TrackRow>> {
+    let mut r = TrackRow::default();
+    let (mut x, mut y, mut left, mut top) = (None, None, None, None);
+    for (k, &meaning) in head.meanings.iter().enumerate() {
+        match meaning {
+            Meaning::Frame | Meaning::Id => {
+                let mut peek = fields;
+                let text = peek.field().unwrap_or(b"");
+                if head.trackmate && number(text).is_none() && (line <= 4 || matches!(text, b"" | b"None" | b"null")) {
+                    return Ok(None);
+                }
+                if meaning == Meaning::Id {
+                    r.id = fields.integer("a track number")?;
+                } else {
+                    let f = fields.integer("a frame number")?;
+                    r.frame = u32::try_from(f).map_err(|_| {
+                        Error::new(ErrorKind::Damaged, format!("frame {f}: expected a number from 0"))
+                            .at(&head.names[k])
+                    })?;
+                }
+            }
+            Meaning::X => x = Some(fields.number("a position x")?),
+            Meaning::Y => y = Some(fields.number("a position y")?),
+            Meaning::Left => left = Some(fields.number("a left edge")?),
+            Meaning::Top => top = Some(fields.number("a top edge")?),
+            Meaning::Width => r.bbox[2] = fields.optional("a width")?.unwrap_or(0.0),
+            Meaning::Height => r.bbox[3] = fields.optional("a height")?.unwrap_or(0.0),
+            Meaning::Score => r.score = fields.optional("a score")?.unwrap_or(1.0),
+            Meaning::Class => r.class = fields.optional("a class number")?.unwrap_or(1.0) as i32,
+            Meaning::Status | Meaning::Other => {
+                let text = fields.field().unwrap_or(b"");
+                if meaning == Meaning::Status && !tentative && text == b"tentative" {
+                    return Ok(None);
+                }
+                if kept.contains(&k) {
+                    extra.push(String::from_utf8_lossy(text).into_owned());
+                }
+            }
+        }
+    }
+    r.bbox[0] = left.or(x.map(|x| x - r.bbox[2] / 2.0)).unwrap_or(0.0);
+    r.bbox[1] = top.or(y.map(|y| y - r.bbox[3] / 2.0)).unwrap_or(0.0);
+    Ok(Some(r))
+}
+
+/// Writes a table; the names of what the dialect cannot hold are returned.
+/// # Errors
+/// What the writer fails with.
+pub fn write(table: &TrackTable, dialect: Dialect, out: &mut impl Write) -> Result<Vec<String>> {
+    let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
+    let points_only = dialect != Dialect::Plain;
+    let mut dropped = Vec::new();
+    let scored = !matches!(table.score, crate::tracks::Column::Constant(_));
+    if points_only && !table.is_points {
+        dropped.push("width, height".to_string());
+    }
+    if scored && !matches!(dialect, Dialect::Plain | Dialect::TrackMate) {
+        dropped.push("score".to_string());
+    }
+    let extra: &[(String, Vec<String>)] = if dialect == Dialect::TrackMate {
+        dropped.extend(table.extra.iter().map(|e| e.0.clone()));
+        &[]
+    } else {
+        &table.extra
+    };
+    let mut head = match dialect {
+        Dialect::Plain if table.is_points => "frame,track_id,x_px,y_px,score,class".to_string(),
+        Dialect::Plain => "frame,track_id,x_px,y_px,width_px,height_px,score,class".to_string(),
+        Dialect::Trackpy => "frame,particle,x,y".to_string(),
+        Dialect::TrackMate => "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME".to_string(),
+        Dialect::Btrack => "ID,t,y,x".to_string(),
+        Dialect::Ultrack => "track_id,t,y,x".to_string(),
+    };
+    if !matches!(dialect, Dialect::Plain) && !matches!(table.class, crate::tracks::Column::Constant(_)) {
+        dropped.push("class".to_string());
+    }
+    for (name, _) in extra {
+        head.push(',');
+        head.push_str(name);
+    }
+    writeln!(out, "{head}").map_err(failed)?;
+    if dialect == Dialect::TrackMate {
+        writeln!(out, "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame").map_err(failed)?;
+        writeln!(out, "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame").map_err(failed)?;
+        writeln!(out, ",,,(quality),(pixel),(pixel),(pixel),(frame),").map_err(failed)?;
+    }
+    for frame in 0..table.n_frames() {
+        for r in table.rows(frame) {
+            let e = table.extent(r);
+            let (x, y) = (e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0);
+            let (id, score) = (table.ids[table.tracks[r] as usize], table.score.get(r));
+            match dialect {
+                Dialect::Plain if table.is_points => write!(out, "{frame},{id},{x},{y},{score},{}", table.class.get(r)),
+                Dialect::Plain => {
+                    write!(out, "{frame},{id},{x},{y},{},{},{score},{}", e.width_px, e.height_px, table.class.get(r))
+                }
+                Dialect::Trackpy => write!(out, "{frame},{id},{x},{y}"),
+                Dialect::TrackMate => write!(out, "ID{r},{r},{id},{score},{x},{y},0,{frame},{frame}"),
+                Dialect::Btrack | Dialect::Ultrack => write!(out, "{id},{frame},{y},{x}"),
+            }
+            .map_err(failed)?;
+            for (_, values) in extra {
+                write!(out, ",{}", values.get(r).map_or("", String::as_str)).map_err(failed)?;
+            }
+            writeln!(out).map_err(failed)?;
+        }
+    }
+    Ok(dropped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str, options: ReadOptions) -> Result<(TrackTable, BadRows)> {
+        let f = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(f.path(), text).unwrap();
+        read(f.path(), options, false)
+    }
+
+    #[test]
+    fn the_tables_of_four_programs_give_the_same_points() {
+        let trackpy = "frame,particle,x,y,mass\n0,3,1.5,2.5,9\n2,3,4,5,9\n";
+        let btrack = "ID,t,y,x\n3.0,0.0,2.5,1.5\n3.0,2.0,5,4\n";
+        let ultrack = "track_id,t,z,y,x\n3,0,0,2.5,1.5\n3,2,0,5,4\n";
+        let trackmate = "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,FRAME\nLabel,Spot ID,Track ID,Quality,X,Y,Frame\n\
+Label,Spot ID,Track ID,Quality,X,Y,Frame\n,,,(quality),(pixel),(pixel),\nID1,1,3,1,1.5,2.5,0\nID2,2,,1,9,9,0\nID3,3,3,1,4,5,2\n";
+        for text in [trackpy, btrack, ultrack, trackmate] {
+            let (t, _) = read_text(text, ReadOptions::default()).unwrap();
+            assert_eq!(t.ids, [3], "{text}");
+            assert_eq!(t.boxes, [[1.5, 2.5, 0.0, 0.0], [4.0, 5.0, 0.0, 0.0]], "{text}");
+            assert!(t.is_points && t.n_frames() == 3);
+        }
+    }
+
+    #[test]
+    fn boresights_own_table_gives_boxes_around_the_state_and_leaves_tentative_rows() {
+        let text = "frame,time_s,track_id,status,x_px,y_px,width_px,height_px\n4,0.1,1,confirmed,10,20,4,6\n4,0.1,2,tentative,0,0,1,1\n";
+        let (t, _) = read_text(text, ReadOptions { keep_extra: true, ..ReadOptions::default() }).unwrap();
+        assert_eq!((t.boxes.as_slice(), t.n_frames()), ([[8.0, 17.0, 4.0, 6.0]].as_slice(), 5));
+        assert_eq!(t.extra[0], ("time_s".to_string(), vec!["0.1".to_string()]));
+    }
+
+    #[test]
+    fn every_dialect_reads_back_what_it_wrote() {
+        let (t, _) = read_text(
+            "frame,track_id,x,y,width,height,score\n0,1,5,6,2,4,0.5\n1,1,6,6,2,4,0.25\n",
+            ReadOptions::default(),
+        )
+        .unwrap();
+        for d in [Dialect::Plain, Dialect::Trackpy, Dialect::TrackMate, Dialect::Btrack, Dialect::Ultrack] {
+            let mut out = Vec::new();
+            let dropped = write(&t, d, &mut out).unwrap();
+            let (u, _) = read_text(std::str::from_utf8(&out).unwrap(), ReadOptions::default()).unwrap();
+            let centre = |t: &TrackTable, r| {
+                let e = t.extent(r);
+                (e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0)
+            };
+            assert_eq!((centre(&t, 0), centre(&t, 1)), (centre(&u, 0), centre(&u, 1)), "{d:?}");
+            assert_eq!(dropped.is_empty(), d == Dialect::Plain, "{d:?} {dropped:?}");
+        }
+    }
+
+    #[test]
+    fn a_header_without_a_position_is_refused_by_name() {
+        let e = read_text("frame,track_id,mass\n0,1,2\n", ReadOptions::default()).unwrap_err().to_string();
+        assert!(e.contains("frame, track_id, mass: expected a frame, a track number and a position"), "{e}");
+    }
+}
