@@ -6,6 +6,7 @@
 mod sim;
 mod spatial;
 mod track;
+mod track_metrics;
 mod vision;
 
 use serde_json::Value;
