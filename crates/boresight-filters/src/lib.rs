@@ -8,12 +8,15 @@
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 pub mod ar1;
+pub mod converted;
 pub mod displacement;
+pub mod ekf;
 mod error;
 mod filter;
 pub mod fuzzy;
 pub mod fuzzy_srif;
 mod gaussian;
+pub mod imm;
 pub mod information;
 pub mod kf;
 pub mod linalg;
@@ -25,9 +28,11 @@ pub mod model;
 pub mod pda;
 mod real;
 pub mod robust;
+pub mod sensor;
 pub mod square_root;
 pub mod srif;
 pub mod ud;
+pub mod ukf;
 
 pub use ar1::Ar1;
 pub use displacement::Displacement;
@@ -35,6 +40,7 @@ pub use error::FilterError;
 pub use filter::{Filter, GaussianFilter, Start, Tracked};
 pub use fuzzy_srif::FuzzySrif;
 pub use gaussian::{Gaussian, Measurement, Weighted};
+pub use imm::Imm;
 pub use information::Information;
 pub use kf::{CovarianceForm, Kf};
 pub use lms::LmsRule;
@@ -44,3 +50,4 @@ pub use robust::{Fuzzy, Innovation, Robust};
 pub use square_root::SquareRoot;
 pub use srif::Srif;
 pub use ud::Ud;
+pub use ukf::Ukf;

@@ -1,0 +1,171 @@
+//! Unscented Kalman filter: nonlinear motion and sensors through 2N + 1 sigma points, no Jacobians.
+//!
+//! Source: S. J. Julier, J. K. Uhlmann, "Unscented filtering and nonlinear estimation", Proc. IEEE 92(3), 2004; scaled
+//! weights as in E. A. Wan, R. van der Merwe, 2000 with α = 1, β = 0, κ chosen by the caller (default 3 - N, at least 0).
+//! Symbols: χ_i = x ± column i of sqrt((N + κ) P), L Lᵀ = P by Cholesky; w_0 = κ/(N + κ), w_i = 1/(2(N + κ)).
+//! Differs from it: κ is kept at 0 or above, so no weight is negative and covariances stay positive semi-definite.
+//! Linear models and position measurements give the Kalman answer. Cost: 2N + 1 motions, N³ for each root and product.
+
+use crate::filter::{check_belief, check_dt, check_measurement};
+use crate::linalg::{Cholesky, symmetrize};
+use crate::linear::LinearUpdate;
+use crate::mixture::mixture_update;
+use crate::model::Model;
+use crate::real::all_finite;
+use crate::sensor::{Position, Sensor};
+use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start, Weighted};
+use nalgebra::{Matrix2, SMatrix, SVector};
+
+/// Unscented Kalman filter of a model with N states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ukf<M, const N: usize, T: Real = f64> {
+    model: M,
+    belief: Gaussian<N, T>,
+    kappa: T,
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> Ukf<M, N, T> {
+    /// Returns the filter with another spread κ of the sigma points.
+    /// # Errors
+    /// [`FilterError::OutOfRange`] if it is negative or not finite.
+    pub fn with_kappa(mut self, kappa: T) -> Result<Self, FilterError> {
+        if !(kappa >= T::zero() && kappa <= T::MAX) {
+            return Err(FilterError::OutOfRange("a spread kappa of at least 0"));
+        }
+        self.kappa = kappa;
+        Ok(self)
+    }
+
+    /// Returns centre, columns of sqrt((N + κ) P), centre weight and side weight.
+    fn spread(&self) -> Result<(SMatrix<T, N, N>, T, T), FilterError> {
+        let n = T::of(N as f64) + self.kappa;
+        let l = Cholesky::semi_definite(&self.belief.cov, "the state covariance")?.l;
+        Ok((l * n.sqrt(), self.kappa / n, T::of(0.5) / n))
+    }
+
+    /// Corrects by a nonlinear sensor.
+    /// # Errors
+    /// [`FilterError`] for NaN, infinity or a singular innovation; the state is then unchanged.
+    pub fn correct_by<S: Sensor<N, K, T>, const K: usize>(
+        &mut self,
+        sensor: &S,
+        z: &SVector<T, K>,
+        r: &SMatrix<T, K, K>,
+    ) -> Result<LinearUpdate<N, K, T>, FilterError> {
+        if !(all_finite(z) & all_finite(r)) {
+            return Err(FilterError::NotFinite("the measurement"));
+        }
+        let (l, w0, w) = self.spread()?;
+        let x = self.belief.mean;
+        let h0 = sensor.measure(&x);
+        // Differences to the centre's measurement: angles are averaged on the near side of it.
+        let side = |i: usize, sign: T| sensor.residual(&sensor.measure(&(x + l.column(i) * sign)), &h0);
+        let mut mean = SVector::<T, K>::zeros();
+        for i in 0..N {
+            mean += (side(i, T::one()) + side(i, -T::one())) * w;
+        }
+        let mut s = *r + mean * mean.transpose() * w0;
+        let mut cross = SMatrix::<T, N, K>::zeros();
+        for i in 0..N {
+            for sign in [T::one(), -T::one()] {
+                let d = side(i, sign) - mean;
+                s += d * d.transpose() * w;
+                cross += l.column(i) * d.transpose() * (w * sign);
+            }
+        }
+        symmetrize(&mut s);
+        let chol = Cholesky::new(&s, "the innovation covariance")?;
+        let gain = chol.solve(&cross.transpose()).transpose();
+        let innovation = sensor.residual(z, &(h0 + mean));
+        let mut cov = self.belief.cov - gain * s * gain.transpose();
+        symmetrize(&mut cov);
+        let belief = Gaussian { mean: x + gain * innovation, cov };
+        let white = chol.whiten(&innovation);
+        self.accept(belief)?;
+        Ok(LinearUpdate { belief, innovation, innovation_cov: s, gain, distance2: white.dot(&white) })
+    }
+
+    fn accept(&mut self, next: Gaussian<N, T>) -> Result<(), FilterError> {
+        if !(all_finite(&next.mean) & all_finite(&next.cov)) {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        // The next step needs a root.
+        Cholesky::semi_definite(&next.cov, "the state covariance")?;
+        self.belief = next;
+        Ok(())
+    }
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ukf<M, N, T> {
+    fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
+        check_belief(&belief)?;
+        Cholesky::semi_definite(&belief.cov, "the state covariance")?;
+        Ok(Self { model, belief, kappa: (T::of(3.0) - T::of(N as f64)).max(T::zero()) })
+    }
+    fn model(&self) -> &M {
+        &self.model
+    }
+    fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ukf<M, N, T> {
+    type Real = T;
+
+    fn predict(&mut self, dt_s: T) -> Result<(), FilterError> {
+        check_dt(dt_s)?;
+        if dt_s == T::zero() {
+            return Ok(());
+        }
+        let (l, w0, w) = self.spread()?;
+        let x = self.belief.mean;
+        let centre = self.model.moved(dt_s, &x);
+        let side = |i: usize, sign: T| self.model.moved(dt_s, &(x + l.column(i) * sign));
+        let mut mean = centre * w0;
+        for i in 0..N {
+            mean += (side(i, T::one()) + side(i, -T::one())) * w;
+        }
+        let d = centre - mean;
+        let mut cov = self.model.process_noise(dt_s) + d * d.transpose() * w0;
+        for i in 0..N {
+            for sign in [T::one(), -T::one()] {
+                let d = side(i, sign) - mean;
+                cov += d * d.transpose() * w;
+            }
+        }
+        symmetrize(&mut cov);
+        self.accept(Gaussian { mean, cov })
+    }
+
+    fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        check_measurement(m)?;
+        let r: Matrix2<T> = m.cov;
+        self.correct_by(&Position { position_at: M::POSITION }, &m.position, &r).map(|_| ())
+    }
+
+    fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
+    where
+        I: Iterator<Item = Weighted<T>> + Clone,
+    {
+        let next = mixture_update(&self.belief, M::POSITION, hypotheses)?;
+        self.accept(next)
+    }
+
+    fn belief(&self) -> Gaussian<N, T> {
+        self.belief
+    }
+
+    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
+        check_belief(belief)?;
+        self.accept(*belief)
+    }
+
+    fn position_at(&self) -> [usize; 2] {
+        M::POSITION
+    }
+
+    fn kinematics(&self) -> Gaussian<4, T> {
+        self.model.kinematics(&self.belief)
+    }
+}
