@@ -7,7 +7,10 @@
 // `!(x > 0)` is meant: NaN must take the refusing branch.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+pub mod adaptive;
 pub mod ar1;
+pub mod bounds;
+pub mod consistency;
 pub mod converted;
 pub mod displacement;
 pub mod ekf;
@@ -29,11 +32,13 @@ pub mod pda;
 mod real;
 pub mod robust;
 pub mod sensor;
+pub mod smooth;
 pub mod square_root;
 pub mod srif;
 pub mod ud;
 pub mod ukf;
 
+pub use adaptive::{Adaptive, AdaptiveConfig, Memory};
 pub use ar1::Ar1;
 pub use displacement::Displacement;
 pub use error::FilterError;

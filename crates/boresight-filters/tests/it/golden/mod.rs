@@ -4,6 +4,7 @@
 //! tests and says so; a missing file in a folder that exists fails.
 
 mod adaptive;
+mod bounds;
 mod fuzzy;
 mod linear;
 mod pda;
