@@ -14,6 +14,7 @@ pub mod io;
 pub mod metrics;
 pub mod record;
 pub mod report;
+pub mod reproduce;
 pub mod sim;
 pub mod time;
 pub mod track;

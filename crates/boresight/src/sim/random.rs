@@ -38,6 +38,8 @@ pub enum Purpose {
     Radar = 8,
     /// Anything of a scenario's own (start states, biases).
     Scenario = 9,
+    /// White noise of the pixels of rectangular targets in a frame.
+    TargetPixels = 10,
 }
 
 /// The seed of a scene: a number given by the user and the number of the Monte Carlo run.
@@ -143,9 +145,9 @@ pub struct LevelNoise {
 }
 
 impl LevelNoise {
-    /// The noise of frame `frame` of a scene.
-    pub fn new(seed: Seed, frame: u64) -> Self {
-        let mut rng = seed.stream(Purpose::Pixels, frame);
+    /// The noise of frame `frame` of a scene, for one purpose.
+    pub fn new(seed: Seed, purpose: Purpose, frame: u64) -> Self {
+        let mut rng = seed.stream(purpose, frame);
         let mut state = [[0; LANES]; 4];
         for row in &mut state {
             for s in row {
@@ -241,7 +243,7 @@ mod tests {
             let mut counts = [0u64; 256];
             let mut buffer = vec![0u8; 64 * 64];
             for frame in 0..500 {
-                LevelNoise::new(Seed::new(7), frame).fill(&table, &mut buffer);
+                LevelNoise::new(Seed::new(7), Purpose::Pixels, frame).fill(&table, &mut buffer);
                 for &g in &buffer {
                     counts[usize::from(g)] += 1;
                 }
@@ -257,7 +259,7 @@ mod tests {
         let n = 1 << 16;
         let draw = |frame| {
             let mut b = vec![0u8; n];
-            LevelNoise::new(Seed::new(3), frame).fill(&table, &mut b);
+            LevelNoise::new(Seed::new(3), Purpose::Pixels, frame).fill(&table, &mut b);
             b.iter().map(|g| (f64::from(*g) - 128.0) / 20.0).collect::<Vec<_>>()
         };
         let (a, b) = (draw(0), draw(1));
@@ -286,7 +288,7 @@ mod tests {
     #[test]
     fn no_spread_gives_one_level() {
         let mut b = [0u8; 33];
-        LevelNoise::new(Seed::new(1), 0).fill(&LevelTable::normal(50.0, 0.0), &mut b);
+        LevelNoise::new(Seed::new(1), Purpose::Pixels, 0).fill(&LevelTable::normal(50.0, 0.0), &mut b);
         assert_eq!(b, [50; 33]);
     }
 }

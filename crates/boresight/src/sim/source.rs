@@ -24,6 +24,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct SceneSource {
     config: SceneConfig,
     seed: Seed,
+    target_seed: Seed,
     info: SourceInfo,
     next: u64,
     movers: Vec<Option<Mover>>,
@@ -77,7 +78,16 @@ impl SceneSource {
             true_times: true,
         };
         let movers = vec![None; config.targets.len()];
-        Ok(Self { config, seed, info, next: 0, movers, truth: Vec::new(), spare: None, way })
+        Ok(Self { config, seed, target_seed: seed, info, next: 0, movers, truth: Vec::new(), spare: None, way })
+    }
+
+    /// Draws the pixels of rectangular targets from another seed: a second sensor that sees the same background noise.
+    ///
+    /// For the papers' scenes (rectangles on white noise, 8 bits, ideal sensor); others are drawn from the one seed.
+    #[must_use]
+    pub fn with_target_seed(mut self, seed: Seed) -> Self {
+        self.target_seed = seed;
+        self
     }
 
     /// The truth of the frame handed out last: every target in the picture, in the scene's order.
@@ -237,8 +247,8 @@ impl FrameSource for SceneSource {
                         Some(Pixels::Gray8(i)) if i.width() == w && i.height() == h => i,
                         _ => Image::filled(w, h, 0u8),
                     };
-                    let mut noise = LevelNoise::new(self.seed, k);
-                    noise.fill(background, image.as_mut_slice());
+                    LevelNoise::new(self.seed, Purpose::Pixels, k).fill(background, image.as_mut_slice());
+                    let mut noise = LevelNoise::new(self.target_seed, Purpose::TargetPixels, k);
                     for (i, s, growth) in &present {
                         let Shape::Rectangle(r) = &self.config.targets[*i].shape else { continue };
                         let [nx, ny] = grown(r.size_px, *growth);

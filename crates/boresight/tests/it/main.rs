@@ -2,6 +2,7 @@
 
 mod golden;
 mod metrics;
+mod reproduce;
 mod rooms;
 mod tables;
 mod vision_real;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LEAVES: [&str; 8] = ["image", "frame", "detection", "record", "tracks", "view", "error", "time"];
 
 /// room -> rooms it may use besides the leaves and itself.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("vision", &[]),
     ("associate", &[]),
     ("track", &["associate"]),
@@ -16,6 +16,7 @@ const ARROWS: [(&str, &[&str]); 9] = [
     ("sim", &[]),
     ("io", &[]),
     ("draw", &["io"]),
+    ("reproduce", &["sim", "vision", "associate", "track", "fuse", "metrics"]),
     ("report", &["draw", "io", "metrics"]),
 ];
 

@@ -3,6 +3,7 @@
 
 #![allow(dead_code)] // until every room reads its vectors
 
+mod fuse;
 mod sim;
 mod spatial;
 mod track;

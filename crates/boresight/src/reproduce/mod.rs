@@ -1,0 +1,41 @@
+//! The papers' tables and figures at one command: Monte Carlo of their scenes with our parts, side by side with the print.
+//!
+//! [`ITEMS`] lists what can be reproduced; each item gives sections (a table under one reading, with a sentence that says what
+//! it means) and figures. Runs are spread over all cores and gathered in order: the same seed gives the same numbers.
+
+pub mod follow;
+pub mod initiation;
+pub mod item;
+pub mod printed;
+pub mod scene_study;
+pub mod score;
+mod sensor_fusion;
+pub mod study;
+mod tracking;
+
+pub use item::{Figure, Item, Line, Output, Row, Section};
+pub use study::Options;
+
+/// Everything that can be reproduced, in the papers' order.
+pub const ITEMS: &[Item] = &[
+    Item {
+        name: "ctudf-1",
+        what: "D0 Table 1: CTUDF for five target noises",
+        studies: 5,
+        make: tracking::ctudf_table_1,
+    },
+    Item { name: "nnkf-4.1", what: "D1 Table 4.1: NNKF on data set I", studies: 1, make: tracking::nnkf_table_41 },
+    Item { name: "nnkf-4.2", what: "D1 Table 4.2: NNKF on data set II", studies: 1, make: tracking::nnkf_table_42 },
+    Item {
+        name: "fusion-4.3",
+        what: "D1 Table 4.3: track fusion without loss",
+        studies: 2,
+        make: sensor_fusion::table_43,
+    },
+    Item {
+        name: "fusion-4.4",
+        what: "D1 Table 4.4: track fusion with loss",
+        studies: 2,
+        make: sensor_fusion::table_44,
+    },
+];
