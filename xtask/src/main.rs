@@ -1,9 +1,12 @@
 //! Repository chores: `cargo xtask <NAME>`.
 
+mod ir_exam;
 mod video_check;
 
 use clap::{Parser, Subcommand};
+use std::path::PathBuf;
 
+/// Repository chores: exams on public data, benchmarks, generated references.
 #[derive(Parser)]
 struct Cli {
     #[command(subcommand)]
@@ -12,12 +15,21 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Chore {
+    /// Track the public infrared clips with no options and score the tracks.
+    IrExam(ir_exam::Args),
     /// Compare decoded video with ffmpeg's frames, live.
     VideoCheck(video_check::Args),
 }
 
+/// The folder of the real data: `BORESIGHT_TEST_DATA`, by default `../shared/data` beside the repository.
+fn test_data() -> PathBuf {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
+    std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from)
+}
+
 fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
+        Chore::IrExam(args) => ir_exam::exam(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }
 }

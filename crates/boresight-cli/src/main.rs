@@ -2,9 +2,7 @@
 
 mod commands;
 mod exit;
-#[allow(dead_code)] // used by simulate
 mod frame_writer;
-#[allow(dead_code)] // used by the commands that follow
 mod progress;
 
 use clap::{Parser, Subcommand};
@@ -20,6 +18,10 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Track what moves in a video, an image sequence or a table of detections.
+    Track(commands::track::Args),
+    /// Simulate a scene: frames and their truth.
+    Simulate(commands::simulate::Args),
     /// Write completions for a shell, or the manual page.
     Completions(commands::completions::Args),
 }
@@ -27,6 +29,8 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match cli.command {
+        Command::Track(args) => commands::track::run(args),
+        Command::Simulate(args) => commands::simulate::run(args),
         Command::Completions(args) => commands::completions::run::<Cli>(&args),
     };
     outcome.unwrap_or_else(|error| exit::report(&error))

@@ -50,4 +50,6 @@ pub struct Scan {
     pub time: Timestamp,
     /// The detections, in the detector's order.
     pub detections: Vec<Detection>,
+    /// How far the background moved in the image since the scan before (camera motion), px; `None` if it was not looked at.
+    pub camera_shift_px: Option<Vector2<f64>>,
 }

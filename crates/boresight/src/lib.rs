@@ -4,6 +4,8 @@
 //! turns detections into tracks, [`metrics`] says how good they are. `ARCHITECTURE.md` holds the map and the rules.
 
 pub mod associate;
+pub mod auto;
+pub mod config;
 pub mod detection;
 pub mod draw;
 pub mod error;
@@ -12,6 +14,7 @@ pub mod fuse;
 pub mod image;
 pub mod io;
 pub mod metrics;
+pub mod pipeline;
 pub mod record;
 pub mod report;
 pub mod reproduce;
@@ -22,6 +25,7 @@ pub mod tracks;
 pub mod view;
 pub mod vision;
 
+pub use config::Config;
 pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};

@@ -1,8 +1,9 @@
 //! One file a command: its arguments and what it does.
 
 pub mod completions;
-#[allow(dead_code)] // until the command line names it
+mod run_options;
 pub mod simulate;
+pub mod track;
 
 use std::io::Write;
 

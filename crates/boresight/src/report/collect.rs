@@ -314,6 +314,7 @@ mod tests {
             index: FrameIndex(frame),
             time: Timestamp::from_ns(frame as i64 * 40_000_000),
             detections: Vec::new(),
+            ..Scan::default()
         };
         seen.put(&View { frame: None, scan: &scan, tracks });
     }

@@ -2,6 +2,7 @@
 
 use super::birth::BirthConfig;
 use super::life::LifeConfig;
+use super::proof::ProofConfig;
 use crate::associate::AssociatorConfig;
 use crate::{Error, ErrorKind, Result};
 use boresight_filters::{Filter, Gaussian};
@@ -35,6 +36,8 @@ pub struct TrackerConfig {
     pub life: LifeConfig,
     /// How tracks start.
     pub birth: BirthConfig,
+    /// What a new track must show, beside its life's rule, before it is reported as confirmed.
+    pub proof: ProofConfig,
     /// A confirmed track without detections is kept this long, s, 0 or more.
     pub coast_s: f64,
     /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
@@ -59,6 +62,7 @@ impl Default for TrackerConfig {
             associator: AssociatorConfig::default(),
             life: LifeConfig::default(),
             birth: BirthConfig::default(),
+            proof: ProofConfig::default(),
             coast_s: 0.5,
             coast_scans: 5,
             max_tracks: 250_000,
@@ -145,6 +149,7 @@ impl TrackerConfig {
         self.associator.validate(&format!("{at}.associator"))?;
         self.life.validate(&format!("{at}.life"))?;
         self.birth.validate(&format!("{at}.birth"))?;
+        self.proof.validate(&format!("{at}.proof"))?;
         not_negative(at, "coast-s", self.coast_s, "0.5 bridges half a second without detections")?;
         let whole = |ok: bool, key: &str, value: u32| {
             check(ok, at, key, value, "a whole number of 1 or more", "leave it out for the default")

@@ -10,6 +10,8 @@ pub mod cv;
 pub mod gating;
 pub mod life;
 mod pace;
+mod proof;
+pub mod stabilised;
 mod stage;
 mod starts;
 pub mod tracker;
@@ -17,6 +19,7 @@ pub mod tracker;
 pub use birth::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
 pub use config::{FilterConfig, TrackFilter, TrackerConfig};
 pub use life::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+pub use proof::ProofConfig;
 pub use tracker::Tracker;
 
 use crate::{Result, Scan, TrackState};
@@ -33,5 +36,5 @@ pub trait Tracking: Send {
 /// # Errors
 /// A value of the configuration outside its range.
 pub fn build(config: &TrackerConfig) -> Result<Box<dyn Tracking>> {
-    Ok(Box::new(Tracker::new(config)?))
+    Ok(Box::new(stabilised::Stabilised::new(Box::new(Tracker::new(config)?))))
 }

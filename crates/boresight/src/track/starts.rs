@@ -8,6 +8,7 @@
 use super::birth::{BirthConfig, from_one_point, from_two_points};
 use super::config::TrackerConfig;
 use super::gating::{MOST_LOOKED_AT, Noise, normalised_square};
+use super::proof::Proof;
 use super::tracker::{Outcome, Track, Tracker};
 use crate::Scan;
 use boresight_filters::{Filter, Measurement, Weighted};
@@ -43,7 +44,7 @@ impl Tracker {
         let prior = self.config.birth.velocity_prior();
         if let BirthConfig::OnePoint(_) = self.config.birth {
             for j in 0..scan.detections.len() {
-                if !self.used[j] && self.has_room() {
+                if !self.used[j] && self.has_room() && self.config.proof.may_start(scan.detections[j].score) {
                     self.begin(scan, j, None, prior, 0.0);
                 }
             }
@@ -65,7 +66,7 @@ impl Tracker {
         self.left_over = left_over;
         self.left_over.clear();
         for (j, d) in scan.detections.iter().enumerate() {
-            if !self.used[j] {
+            if !self.used[j] && self.config.proof.may_start(d.score) {
                 self.left_over.push(LeftOver { position: d.position, noise: self.table.noise(j as u32) });
             }
         }
@@ -114,12 +115,13 @@ impl Tracker {
             }
         };
         let n_points = if first.is_some() { 2 } else { 1 };
-        let track = Track {
+        let mut track = Track {
             id: self.next_id,
             belief,
             life: config.life.begin(n_points, scan.time.ns, config.clutter_density_per_px2, ratio),
             size: [d.extent.width_px, d.extent.height_px],
             anchor: [d.position.x, d.position.y, n.xx.max(n.yy).sqrt()],
+            proof: Proof::begin([d.position.x, d.position.y], d.score),
         };
         let outcome = Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() };
         self.states.push(track.state(&outcome, config));

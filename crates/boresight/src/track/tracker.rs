@@ -15,6 +15,7 @@ use super::correct::Scratch;
 use super::gating::{Noise, Predicted, ScanTable};
 use super::life::{Evidence, Life, Verdict};
 use super::pace::Pace;
+use super::proof::Proof;
 use super::stage::Stage;
 use super::starts::LeftOver;
 use crate::associate::AssociatorConfig;
@@ -33,6 +34,8 @@ pub(super) struct Track {
     pub size: [f64; 2],
     /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
     pub anchor: [f64; 3],
+    /// What it has shown beside its life's rule.
+    pub proof: Proof,
 }
 
 /// What one scan brought a track.
@@ -205,16 +208,18 @@ impl Track {
             self.size[a] += SIZE_GAIN * (new[a] - self.size[a]);
         }
         self.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
+        self.proof.seen(d.score);
     }
 
     /// What is said of the track after a scan.
     #[inline]
-    pub(super) fn state(&self, outcome: &Outcome, config: &TrackerConfig) -> TrackState {
+    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig) -> TrackState {
         let kinematics = self.belief.kinematics();
+        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], outcome.hit);
         let [width_px, height_px] = self.size;
         TrackState {
             id: TrackId(self.id),
-            status: match (self.life.confirmed, outcome.hit) {
+            status: match (self.life.confirmed && proven, outcome.hit) {
                 (false, _) => TrackStatus::Tentative,
                 (true, true) => TrackStatus::Confirmed,
                 (true, false) => TrackStatus::Coasting,

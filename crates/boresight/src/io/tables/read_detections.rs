@@ -144,9 +144,14 @@ fn scans_of(table: &Table, seen: Vec<Seen>) -> Result<Vec<Scan>> {
                 scans.extend((next..one.frame).map(|f| Scan {
                     index: FrameIndex(f),
                     time: NO_TIME,
-                    detections: Vec::new(),
+                    ..Scan::default()
                 }));
-                scans.push(Scan { index: FrameIndex(one.frame), time, detections: vec![one.detection] });
+                scans.push(Scan {
+                    index: FrameIndex(one.frame),
+                    time,
+                    detections: vec![one.detection],
+                    ..Scan::default()
+                });
             }
         }
     }
@@ -473,7 +478,7 @@ mod tests {
                 .into_iter()
                 .enumerate()
                 .map(|(i, detections)| {
-                    Scan { index: FrameIndex(i as u64), time: Timestamp::from_ns(i as i64 * step), detections }
+                    Scan { index: FrameIndex(i as u64), time: Timestamp::from_ns(i as i64 * step), detections, ..Scan::default() }
                 })
                 .collect();
             for scan in &scans {

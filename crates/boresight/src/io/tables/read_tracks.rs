@@ -200,7 +200,7 @@ mod tests {
 
     fn put_all(mut sink: Box<dyn Sink>) {
         for frame in frames() {
-            let scan = Scan { index: frame.index, time: frame.time, detections: Vec::new() };
+            let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
             sink.put(&View { frame: None, scan: &scan, tracks: &frame.tracks }).unwrap();
         }
         sink.finish().unwrap();

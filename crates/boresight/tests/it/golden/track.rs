@@ -57,6 +57,7 @@ fn the_tracker_keeps_the_golden_tracks() {
                 index: FrameIndex(k as u64),
                 time: Timestamp::from_secs_f64(k as f64 * dt),
                 detections: rows(points).iter().map(|p| detection(p[0], p[1], Matrix2::identity() * r)).collect(),
+                ..Scan::default()
             };
             let states = tracker.step(&scan).unwrap();
             let expected = case["outputs"][k].as_array().unwrap();

@@ -1,0 +1,147 @@
+//! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
+
+use anyhow::Context;
+use boresight::auto::{self, Replay};
+use boresight::pipeline::{Input, Summary};
+use boresight::{Config, Error, ErrorKind, vision};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames looked at by the automatic choice.
+const PROBE_FRAMES: usize = 48;
+
+/// Where frames come from and how they are treated.
+#[derive(Debug, clap::Args)]
+pub struct InputArgs {
+    /// A video, a folder or glob of images, an image stack, `-` for YUV4MPEG2 on standard input, a stream's address, a camera
+    /// (/dev/video0), or a table of detections (.csv, .txt).
+    #[arg(value_name = "INPUT")]
+    pub input: String,
+    /// Configuration file; without it everything is chosen by looking at the first frames.
+    #[arg(short, long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Change one key of the configuration, chosen or given: `tracker.coast-s=1`. Can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub sets: Vec<String>,
+    /// Filter of the tracks; `boresight config --list filters` explains each.
+    #[arg(long, value_name = "NAME")]
+    pub filter: Option<String>,
+    /// Rate of inputs without times of their own, frames/s.
+    #[arg(long, value_name = "HZ")]
+    pub rate_hz: Option<f64>,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// What is to be run.
+pub struct Plan {
+    /// The input with its detector, if it has one.
+    pub input: Input,
+    /// The configuration.
+    pub config: Config,
+    /// Why it is what it is.
+    pub reasons: Vec<String>,
+    /// What is known of the source.
+    pub info: Option<boresight::SourceInfo>,
+    n_scans: Option<u64>,
+}
+
+impl Plan {
+    /// Number of frames, if known.
+    pub fn total(&self) -> Option<u64> {
+        self.n_scans.or_else(|| self.info.as_ref().and_then(|i| i.n_frames))
+    }
+}
+
+/// Opens the input and settles the configuration.
+pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
+    let given = args.config.as_deref().map(Config::from_file).transpose()?;
+    let mut base = given.clone().unwrap_or_default();
+    if let Some(rate) = args.rate_hz {
+        base = base.with(&format!("input.rate-hz={rate}"))?;
+    }
+    let source = boresight::io::open(&args.input, &base.input.open_options())?;
+    let info = source.info().clone();
+    let mut source: Box<dyn boresight::FrameSource> = source;
+    let (mut config, reasons) = match &given {
+        Some(_) => (base, vec!["Configuration as given.".to_string()]),
+        None => {
+            let mut replay = Replay::new(source, PROBE_FRAMES);
+            let choice = auto::choose(replay.ahead(), &info, &base)?;
+            source = Box::new(replay);
+            (choice.config, choice.reasons)
+        }
+    };
+    if let Some(filter) = &args.filter {
+        config = config.with(&format!("tracker.filter.{filter}={{}}"))?;
+    }
+    for set in &args.sets {
+        config = config.with(set)?;
+    }
+    let detector = vision::build(&config.detector, &info)?;
+    Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })
+}
+
+/// INPUT's name beside the working directory, with an ending.
+pub fn default_folder(input: &str, ending: &str) -> PathBuf {
+    let name = Path::new(input)
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .filter(|s| !s.is_empty() && *s != "-")
+        .unwrap_or("boresight");
+    let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+    PathBuf::from(format!("{name}.{ending}"))
+}
+
+/// Makes the results' folder.
+pub fn make_folder(dir: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(dir).map_err(|e| {
+        Error::new(ErrorKind::Output, "the folder for the results cannot be made").at(dir.display()).because(e)
+    })?;
+    Ok(())
+}
+
+/// Writes the configuration with its reasons as comments.
+pub fn write_config(dir: &Path, plan: &Plan) -> anyhow::Result<()> {
+    let mut text =
+        String::from("# The configuration of this run; `--config` with this file gives the identical result.\n");
+    for reason in &plan.reasons {
+        text.push_str(&format!("# {}\n", reason.replace('\n', " ")));
+    }
+    text.push('\n');
+    text.push_str(&plan.config.to_toml()?);
+    let path = dir.join("config.toml");
+    std::fs::write(&path, text)
+        .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
+    Ok(())
+}
+
+/// A flag that Ctrl-C and a polite kill raise; the second signal ends the process at once.
+pub fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+    })
+    .context("no handler for Ctrl-C could be set")?;
+    Ok(stop)
+}
+
+/// Whether the run goes on.
+pub fn go_on(stop: &AtomicBool) -> ControlFlow<()> {
+    if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+/// The exit code of a run, and the error that broke it off.
+pub fn outcome(summary: &Summary, broken: Option<Error>) -> anyhow::Result<ExitCode> {
+    if let Some(e) = broken {
+        return Err(e.hint(format!("the {} frames before it are in the results", summary.frames)).into());
+    }
+    Ok(if summary.interrupted { ExitCode::from(130) } else { ExitCode::SUCCESS })
+}

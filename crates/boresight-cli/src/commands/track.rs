@@ -1,0 +1,111 @@
+//! `boresight track`: frames (or detections) in, tracks out.
+
+use super::run_options::{self, InputArgs, Plan};
+use crate::progress;
+use boresight::pipeline::{self, Input, Summary};
+use boresight::{Sink, track};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const EXAMPLES: &str = "Examples:
+  boresight track flight.mp4
+      chooses everything by itself; writes tracks.csv, detections.csv, mot.txt, annotated.mp4, report.html and config.toml to flight.tracks/
+  boresight track frames/ -o out --rate-hz 100
+      a folder of images (also 16 bit), 100 frames/s
+  boresight track flight.mp4 --config flight.tracks/config.toml
+      the identical result again
+  boresight track flight.mp4 --set tracker.gate-probability=0.999 --filter ud
+      one parameter changed, another filter
+  boresight track detections.csv --rate-hz 30
+      tracks from detections made elsewhere (also MOTChallenge det.txt)
+  boresight track rtsp://camera/stream --no-video
+      anything an installed ffmpeg can read; end it with Ctrl-C";
+
+/// Arguments of `boresight track`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Folder for the results; INPUT's name with `.tracks` if absent.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Write no annotated video.
+    #[arg(long)]
+    no_video: bool,
+    /// Write no report.
+    #[arg(long)]
+    no_report: bool,
+    /// Also write the annotated frames as PNG files to DIR/frames.
+    #[arg(long)]
+    png: bool,
+    /// Also write every frame's tracks as JSON lines to DIR/tracks.jsonl.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let plan = run_options::plan(&args.input)?;
+    let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
+    run_options::make_folder(&dir)?;
+    let tracking = track::build(&plan.config.tracker)?;
+    let sinks = sinks(&args, &plan, &dir)?;
+    run_options::write_config(&dir, &plan)?;
+    let quiet = args.input.quiet;
+    if !quiet {
+        for reason in &plan.reasons {
+            eprintln!("  {reason}");
+        }
+    }
+    let bar = progress::bar(plan.total(), "frames");
+    let stop = run_options::stop_on_signal()?;
+    let started = std::time::Instant::now();
+    let (summary, broken) = pipeline::run(plan.input, Some(tracking), sinks, &mut |n| {
+        bar.set_position(n);
+        run_options::go_on(&stop)
+    })?;
+    bar.finish_and_clear();
+    if !quiet {
+        print_summary(&summary, started.elapsed().as_secs_f64(), &dir);
+    }
+    run_options::outcome(&summary, broken)
+}
+
+fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Vec<Box<dyn Sink>>> {
+    use boresight::io::{DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+    let mut sinks: Vec<Box<dyn Sink>> = vec![
+        Box::new(TracksCsv::create(dir.join("tracks.csv"))?),
+        Box::new(DetectionsCsv::create(dir.join("detections.csv"))?),
+        Box::new(MotWriter::create(dir.join("mot.txt"))?),
+    ];
+    if args.json {
+        sinks.push(Box::new(JsonLines::create(dir.join("tracks.jsonl"))?));
+    }
+    let _ = (plan, matches!(plan.input, Input::Frames(..)));
+    Ok(sinks)
+}
+
+/// The summary on the terminal.
+fn print_summary(s: &Summary, wall_s: f64, dir: &std::path::Path) {
+    let per_frame = |d: std::time::Duration| 1e3 * d.as_secs_f64() / s.frames.max(1) as f64;
+    eprintln!(
+        "{} frames ({:.1} s), {} detections, {} confirmed tracks (at most {} at once)",
+        s.frames, s.duration_s, s.detections, s.confirmed_tracks, s.most_at_once
+    );
+    if let Some((nis, n)) = s.mean_nis {
+        eprintln!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");
+    }
+    eprintln!(
+        "{:.1} frames/s; a frame took {:.2} ms to read, {:.2} to detect, {:.2} to track, {:.2} to write",
+        s.frames as f64 / wall_s.max(1e-9),
+        per_frame(s.times.read),
+        per_frame(s.times.detect),
+        per_frame(s.times.track),
+        per_frame(s.times.write)
+    );
+    for w in &s.warnings {
+        eprintln!("warning: {w}");
+    }
+    eprintln!("results: {}", dir.display());
+}

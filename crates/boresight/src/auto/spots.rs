@@ -1,0 +1,119 @@
+//! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
+
+use crate::track::TrackerConfig;
+use crate::vision::config::DetectorConfig;
+use crate::vision::isolated::IsolatedConfig;
+use crate::vision::threshold::{Polarity, ThresholdConfig};
+use crate::vision::{self};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
+
+/// A score from which a blob is surely a thing and not noise.
+const SURE: f64 = 8.0;
+/// Frames looked at; they are spread over those given.
+const LOOKS: usize = 12;
+
+/// What was seen of one polarity.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Side {
+    /// Sure blobs a frame.
+    pub per_frame: f64,
+    /// Their mean score.
+    pub mean_score: f64,
+    /// Median and 95 % point of the longer side of their boxes, px.
+    pub side_px: [f64; 2],
+}
+
+/// What was seen of both polarities.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// Targets brighter than their surroundings.
+    pub bright: Side,
+    /// Targets darker than their surroundings.
+    pub dark: Side,
+}
+
+/// Looks for isolated blobs in the frames.
+pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
+    let side = |polarity: Polarity| -> Result<Side> {
+        let isolated = IsolatedConfig { polarity, min_score: SURE, max_side_px: max_side(info), ..Default::default() };
+        let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..Default::default() };
+        config.cluster.min_area_px = Some(3);
+        let mut detector = vision::build(&config, info)?;
+        let mut scan = Scan::default();
+        let (mut n, mut sum, mut sides, mut looks) = (0usize, 0.0, Vec::new(), 0usize);
+        for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+            detector.detect(frame, &mut scan)?;
+            looks += 1;
+            n += scan.detections.len();
+            for d in &scan.detections {
+                sum += f64::from(d.score).min(100.0);
+                sides.push(d.extent.width_px.max(d.extent.height_px));
+            }
+        }
+        sides.sort_by(f64::total_cmp);
+        let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
+        Ok(Side {
+            per_frame: n as f64 / looks.max(1) as f64,
+            mean_score: sum / n.max(1) as f64,
+            side_px: [at(0.5), at(0.95)],
+        })
+    };
+    Ok(Evidence { bright: side(Polarity::Bright)?, dark: side(Polarity::Dark)? })
+}
+
+/// The longest side looked for: a quarter of the frame's shorter side.
+fn max_side(info: &SourceInfo) -> u32 {
+    (info.width.min(info.height) / 4).clamp(8, 4096) as u32
+}
+
+/// Writes detector and tracker for isolated targets.
+pub fn configure(
+    evidence: &Evidence,
+    info: &SourceInfo,
+    interval_s: f64,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
+    let weight = |s: &Side| s.per_frame * s.mean_score;
+    let (bright, dark) = (weight(&evidence.bright), weight(&evidence.dark));
+    let polarity = if dark > 2.0 * bright { Polarity::Dark } else { Polarity::Bright };
+    let seen = if polarity == Polarity::Dark { &evidence.dark } else { &evidence.bright };
+    reasons.push(format!(
+        "Isolated {} targets: {:.1} bright (mean score {:.0}) and {:.1} dark ones (mean score {:.0}) a frame stand clear of their \
+         surroundings; median side {:.0} px.",
+        if polarity == Polarity::Dark { "dark" } else { "bright" },
+        evidence.bright.per_frame,
+        evidence.bright.mean_score,
+        evidence.dark.per_frame,
+        evidence.dark.mean_score,
+        seen.side_px[0]
+    ));
+    config.detector = DetectorConfig {
+        threshold: ThresholdConfig::Isolated(IsolatedConfig {
+            polarity,
+            min_score: 2.5,
+            max_side_px: max_side(info),
+            ..Default::default()
+        }),
+        max_detections: Some(5000),
+        ..Default::default()
+    };
+    config.detector.cluster.min_area_px = Some(3);
+    let tracker = &mut config.tracker;
+    *tracker = TrackerConfig::default();
+    tracker.acceleration_std_px_per_s2 = round(0.1 / (interval_s * interval_s));
+    tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
+    tracker.proof.start_score = 6.0;
+    tracker.proof.sure_score = 9.0;
+    tracker.proof.travel_px = 2.5;
+    reasons.push(format!(
+        "Tracks start from scores of {} or more, and are believed when their mean score reaches {} or they have travelled {} px.",
+        tracker.proof.start_score, tracker.proof.sure_score, tracker.proof.travel_px
+    ));
+}
+
+/// Three significant digits: what a person would write.
+fn round(v: f64) -> f64 {
+    let scale = 10f64.powf(v.abs().log10().floor() - 2.0);
+    (v / scale).round() * scale
+}

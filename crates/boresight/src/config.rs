@@ -1,0 +1,259 @@
+//! The whole configuration of a run, as it stands in a file: input, detector, tracker.
+//!
+//! Enums are externally tagged (`[tracker.associator.global-nearest]`), unknown keys are refused with their line. Errors name
+//! the key, its value, what was expected and a mend.
+
+use crate::io::{Colour, OpenOptions, RawFormat, RawType};
+use crate::track::TrackerConfig;
+use crate::vision::DetectorConfig;
+use crate::{Error, ErrorKind, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Everything that decides what a run gives.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Config {
+    /// How frames are read.
+    pub input: InputConfig,
+    /// How frames become detections.
+    pub detector: DetectorConfig,
+    /// How detections become tracks.
+    pub tracker: TrackerConfig,
+}
+
+/// How frames are read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct InputConfig {
+    /// Which pixels are wanted: `native` (grey of video, colour of stills), `gray` or `rgb`.
+    pub colour: ColourConfig,
+    /// Rate of sequences that carry no times, frames/s, above 0.
+    pub rate_hz: f64,
+    /// Largest accepted frame, pixels, above 0; what claims more is refused before memory is taken.
+    pub max_pixels: u64,
+    /// Layout of headerless frames; needed for raw input only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raw: Option<RawConfig>,
+}
+
+/// Which pixels are wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ColourConfig {
+    /// What the file holds; of video its luma.
+    #[default]
+    Native,
+    /// Grey always.
+    Gray,
+    /// RGB where there is colour.
+    Rgb,
+}
+
+/// Layout of headerless frames.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct RawConfig {
+    /// Width, px, above 0.
+    pub width: usize,
+    /// Height, px, above 0.
+    pub height: usize,
+    /// Type of a pixel.
+    pub pixel: RawPixel,
+}
+
+/// Type of a pixel of headerless frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawPixel {
+    /// 8-bit grey.
+    U8,
+    /// 16-bit grey, least significant byte first.
+    U16Le,
+    /// 16-bit grey, most significant byte first.
+    U16Be,
+    /// 32-bit float grey, least significant byte first.
+    F32Le,
+    /// 8-bit RGB, interleaved.
+    Rgb8,
+}
+
+impl Default for InputConfig {
+    fn default() -> Self {
+        let o = OpenOptions::default();
+        Self { colour: ColourConfig::Native, rate_hz: o.rate_hz, max_pixels: o.max_pixels, raw: None }
+    }
+}
+
+impl InputConfig {
+    /// What [`crate::io::open`] takes.
+    pub fn open_options(&self) -> OpenOptions {
+        OpenOptions {
+            colour: match self.colour {
+                ColourConfig::Native => Colour::Native,
+                ColourConfig::Gray => Colour::Gray,
+                ColourConfig::Rgb => Colour::Rgb,
+            },
+            raw: self.raw.as_ref().map(|r| RawFormat {
+                width: r.width,
+                height: r.height,
+                pixel: match r.pixel {
+                    RawPixel::U8 => RawType::U8,
+                    RawPixel::U16Le => RawType::U16Le,
+                    RawPixel::U16Be => RawType::U16Be,
+                    RawPixel::F32Le => RawType::F32Le,
+                    RawPixel::Rgb8 => RawType::Rgb8,
+                },
+            }),
+            rate_hz: self.rate_hz,
+            max_pixels: self.max_pixels,
+        }
+    }
+
+    fn validate(&self, at: &str) -> Result<()> {
+        if !(self.rate_hz > 0.0 && self.rate_hz.is_finite()) {
+            return Err(Error::new(ErrorKind::Config, "expected a rate above 0 frames/s")
+                .at(format!("{at}.rate-hz = {}", self.rate_hz))
+                .hint("25 is the rate of sequences without times"));
+        }
+        if self.max_pixels == 0 {
+            return Err(Error::new(ErrorKind::Config, "expected a number of pixels above 0")
+                .at(format!("{at}.max-pixels = 0"))
+                .hint("leave it out for 268 million"));
+        }
+        if let Some(r) = &self.raw
+            && (r.width == 0 || r.height == 0)
+        {
+            return Err(Error::new(ErrorKind::Config, "expected a width and a height above 0")
+                .at(format!("{at}.raw = {} x {}", r.width, r.height))
+                .hint("raw frames have no header: their size must be given"));
+        }
+        Ok(())
+    }
+}
+
+impl Config {
+    /// Reads a configuration from TOML text; `name` stands in errors (a file's name).
+    /// # Errors
+    /// A key that is unknown, of the wrong type or out of its range, with its line.
+    pub fn from_toml(text: &str, name: &str) -> Result<Self> {
+        let config: Self = toml::from_str(text).map_err(|e| {
+            Error::new(ErrorKind::Config, e.to_string().trim_end().to_string()).at(name).hint(
+                "`boresight config` prints every key with its default, `boresight config --explain KEY` what it means",
+            )
+        })?;
+        config.validate().map_err(|e| e.at(name))?;
+        Ok(config)
+    }
+
+    /// Reads a configuration file.
+    /// # Errors
+    /// A file that cannot be read, and what [`Config::from_toml`] refuses.
+    pub fn from_file(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            Error::new(ErrorKind::NotFound, "the configuration cannot be read").at(path.display()).because(e)
+        })?;
+        Self::from_toml(&text, &path.display().to_string())
+    }
+
+    /// Checks every value.
+    /// # Errors
+    /// The first value out of its range.
+    pub fn validate(&self) -> Result<()> {
+        self.input.validate("input")?;
+        self.detector.validate("detector")?;
+        self.tracker.validate("tracker")
+    }
+
+    /// Writes the configuration as TOML; reading it back gives the same configuration.
+    /// # Errors
+    /// Never for a valid configuration.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self).map_err(|e| Error::new(ErrorKind::Config, "cannot be written as TOML").because(e))
+    }
+
+    /// Returns the configuration with one key changed: `tracker.gate-probability=0.95`.
+    /// # Errors
+    /// A text without `=`, an unknown key, a value of the wrong type or out of its range.
+    pub fn with(&self, assignment: &str) -> Result<Self> {
+        let bad = |what: &str| {
+            Error::new(ErrorKind::Config, what.to_string())
+                .at(format!("--set {assignment}"))
+                .hint("for example --set tracker.gate-probability=0.95 or --set tracker.associator.nearest={}")
+        };
+        let (key, value) = assignment.split_once('=').ok_or_else(|| bad("expected KEY=VALUE"))?;
+        // A bare word is a string, so that enums need no quotes.
+        let parsed: toml::Table = toml::from_str(&format!("v = {value}"))
+            .or_else(|_| toml::from_str(&format!("v = {:?}", value.trim())))
+            .map_err(|_| bad("the value is not TOML"))?;
+        let value = parsed.get("v").cloned().ok_or_else(|| bad("the value is empty"))?;
+        let mut tree = toml::Value::try_from(self).map_err(|e| bad(&e.to_string()))?;
+        set(&mut tree, key.trim(), value).ok_or_else(|| bad("no such table"))?;
+        let text = toml::to_string(&tree).map_err(|e| bad(&e.to_string()))?;
+        Self::from_toml(&text, &format!("--set {assignment}"))
+    }
+}
+
+/// Keys whose table holds exactly one entry, the chosen variant of an enum: setting a variant replaces the old one.
+const CHOICES: [&str; 6] = ["threshold", "associator", "life", "birth", "filter", "noise"];
+
+fn set(tree: &mut toml::Value, key: &str, value: toml::Value) -> Option<()> {
+    let parts: Vec<&str> = key.split('.').collect();
+    let (last, path) = parts.split_last()?;
+    let mut at = tree;
+    for (i, part) in path.iter().enumerate() {
+        let choice = i > 0 && CHOICES.contains(&path[i - 1]);
+        if choice && at.get(part).is_none() {
+            *at = toml::Value::Table(toml::Table::new());
+        }
+        if !at.is_table() {
+            *at = toml::Value::Table(toml::Table::new());
+        }
+        at = at.as_table_mut()?.entry(part.to_string()).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+    }
+    if path.last().is_some_and(|p| CHOICES.contains(p)) && at.get(last).is_none() {
+        *at = toml::Value::Table(toml::Table::new());
+    }
+    if !at.is_table() {
+        *at = toml::Value::Table(toml::Table::new());
+    }
+    at.as_table_mut()?.insert((*last).to_string(), value);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_survives_a_round_trip() {
+        let config = Config::default();
+        assert_eq!(Config::from_toml(&config.to_toml().unwrap(), "x").unwrap(), config);
+    }
+
+    #[test]
+    fn a_misspelt_key_is_named_with_its_line() {
+        let e = Config::from_toml("[tracker]\ngate_probability = 0.9\n", "my.toml").unwrap_err().to_string();
+        assert!(e.starts_with("my.toml: ") && e.contains("line 2") && e.contains("gate-probability"), "{e}");
+    }
+
+    #[test]
+    fn a_value_out_of_range_says_what_was_expected() {
+        let e = Config::from_toml("[tracker]\ngate-probability = 1.2\n", "my.toml").unwrap_err().to_string();
+        assert!(e.contains("tracker.gate-probability = 1.2: expected a probability in (0, 1)"), "{e}");
+    }
+
+    #[test]
+    fn one_key_can_be_set_and_a_choice_replaced() {
+        let config = Config::default().with("tracker.gate-probability=0.5").unwrap();
+        assert_eq!(config.tracker.gate_probability, 0.5);
+        let config = config.with("detector.threshold.band.low=3").unwrap();
+        assert!(config.to_toml().unwrap().contains("[detector.threshold.band]"), "{}", config.to_toml().unwrap());
+        let config = config.with("tracker.associator.nearest={}").unwrap();
+        assert!(!config.to_toml().unwrap().contains("global-nearest"));
+        assert!(config.with("tracker.gate-probability=2").is_err());
+        assert!(config.with("tracker.nonsense=2").is_err());
+        assert!(config.with("nonsense").is_err());
+    }
+}

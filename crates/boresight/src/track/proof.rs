@@ -1,0 +1,102 @@
+//! Proof: what a track must show, beside its life's rule, before it is reported as confirmed.
+//!
+//! Source: our own. Clutter in real scenes persists: a lamp post or a hole in a tree passes every M-of-N. Two things tell a target
+//! from it: it stands out more clearly (the detector's score), or it moves. A track is proven once the mean score of its
+//! detections reaches `sure-score`, or once it has travelled `travel-px` from where it began; until then it is tentative for
+//! everyone outside, while it is associated and kept like a confirmed one.
+//! Symbols: score, the detector's own scale; travel distance of the estimate from the first one (px).
+//! Limits: travel is measured in the tracker's coordinates: steadied ones (`stabilised.rs`) where the camera's motion is known, else the
+//! image's, where clutter travels with a panning camera.
+
+use super::config::not_negative;
+use crate::Result;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a new track must show before it is reported as confirmed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ProofConfig {
+    /// Least score of a detection that starts a track, 0 or more; weaker ones only continue tracks.
+    pub start_score: f64,
+    /// Mean score of a track's detections that proves it without travel, 0 or more (needed only if `travel-px` is above 0).
+    pub sure_score: f64,
+    /// Distance from its start that proves a track, px, 0 or more; 0 asks for no proof.
+    pub travel_px: f64,
+}
+
+impl ProofConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        not_negative(at, "start-score", self.start_score, "0 lets every detection start a track")?;
+        not_negative(at, "sure-score", self.sure_score, "0 proves every track at once")?;
+        not_negative(at, "travel-px", self.travel_px, "0 asks for no proof")
+    }
+
+    /// Whether a detection of this score may start a track.
+    #[inline]
+    pub fn may_start(&self, score: f32) -> bool {
+        f64::from(score) >= self.start_score
+    }
+}
+
+/// What a track has shown so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Proof {
+    start: [f64; 2],
+    score_sum: f64,
+    hits: u32,
+    proven: bool,
+}
+
+impl Proof {
+    /// Begins at a position (px) with the first detection's score.
+    pub fn begin(position: [f64; 2], score: f32) -> Self {
+        Self { start: position, score_sum: f64::from(score), hits: 1, proven: false }
+    }
+
+    /// Takes the score of a detection of the track in.
+    #[inline]
+    pub fn seen(&mut self, score: f32) {
+        self.score_sum += f64::from(score);
+        self.hits = self.hits.saturating_add(1);
+    }
+
+    /// Whether the track is proven; `position` is the estimate (px) after a scan with (`hit`) or without a detection.
+    #[inline]
+    pub fn holds(&mut self, config: &ProofConfig, position: [f64; 2], hit: bool) -> bool {
+        if !self.proven && (hit || config.travel_px <= 0.0) {
+            let travel = (position[0] - self.start[0]).hypot(position[1] - self.start[1]);
+            self.proven = travel >= config.travel_px || self.score_sum >= config.sure_score * f64::from(self.hits);
+        }
+        self.proven
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clear_target_is_proven_at_once_and_a_dim_one_by_moving() {
+        let config = ProofConfig { start_score: 5.0, sure_score: 9.0, travel_px: 3.0 };
+        let mut clear = Proof::begin([10.0, 10.0], 12.0);
+        clear.seen(11.0);
+        assert!(clear.holds(&config, [10.0, 10.0], true));
+        let mut dim = Proof::begin([10.0, 10.0], 6.0);
+        dim.seen(6.0);
+        assert!(!dim.holds(&config, [11.0, 10.0], true));
+        assert!(!dim.holds(&config, [13.5, 10.0], false), "a prediction proves nothing");
+        assert!(dim.holds(&config, [13.5, 10.0], true));
+        assert!(dim.holds(&config, [10.0, 10.0], true), "a proof is kept");
+        assert!(config.may_start(5.0) && !config.may_start(4.9));
+    }
+
+    #[test]
+    fn without_demands_every_track_is_proven() {
+        let config = ProofConfig::default();
+        assert!(Proof::begin([0.0, 0.0], 0.0).holds(&config, [0.0, 0.0], false));
+    }
+}
