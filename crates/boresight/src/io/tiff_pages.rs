@@ -2,11 +2,13 @@
 //!
 //! 8 and 16 bit grey and 32-bit float stay what they are. Signed and 32-bit integers, half and double floats become
 //! 32-bit float (exact for 16 bits and half; a warning says so for the others). Separate colour planes are joined.
-//! Reduced-size pages (previews, NewSubfileType bit 0) are passed over. Not read: 12-bit packed samples, zstd.
+//! Reduced-size pages (previews, NewSubfileType bit 0) are passed over. Where zero stands for white, samples are turned
+//! round so that bright is large. Palettes and 10, 12 and 14 bit samples: see `tiff_packed`. Not read: zstd, WebP.
 
 use super::Colour;
 use super::pixels::{Samples, check_size};
 use super::still::{damaged, guarded};
+use super::tiff_packed;
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -23,7 +25,7 @@ pub(crate) struct TiffPages<R: Read + Seek> {
     notes: Vec<String>,
 }
 
-fn failed(e: TiffError) -> Error {
+pub(super) fn failed(e: TiffError) -> Error {
     match e {
         TiffError::UnsupportedError(what) => {
             Error::new(ErrorKind::Unsupported, format!("a kind of TIFF that is not read: {what}"))
@@ -78,16 +80,18 @@ impl<R: Read + Seek> TiffPages<R> {
     fn read_page(&mut self) -> Result<Pixels> {
         let (w, h) = self.decoder.dimensions().map_err(failed)?;
         let (width, height) = check_size(w.into(), h.into(), self.max_pixels)?;
+        if let Some(pixels) = tiff_packed::read(&mut self.decoder, self.colour, self.max_pixels)? {
+            return Ok(pixels);
+        }
         let colour_type = self.decoder.colortype().map_err(failed)?;
         let mut buffer = DecodingResult::U8(Vec::new());
         let layout = self.decoder.read_image_to_buffer(&mut buffer).map_err(failed)?;
-        let (channels, palette) = match colour_type {
-            ColorType::Gray(_) => (1, false),
-            ColorType::GrayA(_) => (2, false),
-            ColorType::RGB(_) | ColorType::YCbCr(_) => (3, false),
-            ColorType::RGBA(_) => (4, false),
-            ColorType::Palette(_) => (1, true),
-            ColorType::Multiband { num_samples, .. } => (usize::from(num_samples), false),
+        let channels = match colour_type {
+            ColorType::Gray(_) => 1,
+            ColorType::GrayA(_) => 2,
+            ColorType::RGB(_) | ColorType::YCbCr(_) => 3,
+            ColorType::RGBA(_) => 4,
+            ColorType::Multiband { num_samples, .. } => usize::from(num_samples),
             other => {
                 return Err(Error::new(ErrorKind::Unsupported, format!("TIFF colours {other:?} are not read"))
                     .hint("convert the images to grey or RGB"));
@@ -102,9 +106,6 @@ impl<R: Read + Seek> TiffPages<R> {
         if matches!(colour_type, ColorType::Multiband { .. }) && channels > 1 {
             return Err(Error::new(ErrorKind::Unsupported, format!("{channels} unnamed channels in a pixel"))
                 .hint("write the channel to be tracked as grey pages"));
-        }
-        if palette {
-            return self.expand_palette(width, height, buffer);
         }
         let expect = width * height * channels;
         let depth = colour_type.bit_depth();
@@ -157,27 +158,6 @@ impl<R: Read + Seek> TiffPages<R> {
                     .hint("convert the images to 16 bits or to float"));
             }
         })
-    }
-
-    /// Palettes have 16 bits a channel and three tables one behind the other.
-    fn expand_palette(&mut self, width: usize, height: usize, buffer: DecodingResult) -> Result<Pixels> {
-        let depth = self.decoder.colortype().map_err(failed)?.bit_depth();
-        let DecodingResult::U8(packed) = buffer else {
-            return Err(Error::new(ErrorKind::Unsupported, "palettes of more than 8 bits are not read"));
-        };
-        let table = self.decoder.get_tag_u16_vec(Tag::ColorMap).map_err(failed)?;
-        let n = table.len() / 3;
-        let indices = if depth < 8 { unpack_raw(&packed, width, height, 1, depth)? } else { packed };
-        let mut data = Vec::with_capacity(width * height * 3);
-        for index in indices {
-            let i = usize::from(index);
-            let entry = |k: usize| table.get(k * n + i).map(|v| (v >> 8) as u8);
-            match (entry(0), entry(1), entry(2)) {
-                (Some(r), Some(g), Some(b)) if i < n => data.extend([r, g, b]),
-                _ => return Err(damaged("not a whole TIFF", format!("a pixel names colour {i} of a palette of {n}"))),
-            }
-        }
-        Samples { width, height, channels: 3, data }.into_pixels(self.colour)
     }
 
     fn note(&mut self, text: &str) {

@@ -1,6 +1,7 @@
 //! Integration tests: one binary, a module per matter.
 
 mod golden;
+mod images;
 mod metrics;
 mod reproduce;
 mod rooms;
