@@ -3,11 +3,15 @@
 mod ffmpeg;
 mod ffmpeg_log;
 mod h264;
+mod i420;
 mod mp4;
 mod mp4_source;
+mod mp4_writer;
 mod nut;
 mod reorder;
 mod yuv;
+
+pub use mp4_writer::{MAX_SIZE, Mp4Options, Mp4Writer};
 
 use super::OpenOptions;
 use crate::{Error, ErrorKind, FrameSource, Result};

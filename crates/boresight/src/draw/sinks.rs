@@ -1,0 +1,185 @@
+//! Sinks that make pictures of views: an annotated video, a folder of PNG files.
+
+use super::annotate::{Annotator, DrawOptions};
+use super::canvas::Rgb;
+use crate::io::tables::AtomicFile;
+use crate::io::video::{MAX_SIZE, Mp4Options, Mp4Writer};
+use crate::{Error, ErrorKind, Image, Result, Sink, View};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes `annotated.mp4`: every frame with what was found in it.
+///
+/// The file is created with the first frame, has its name only when whole, and is removed if the sink is dropped
+/// unfinished. Pictures beyond the encoder's size are halved as often as needed.
+pub struct AnnotatedVideo {
+    path: PathBuf,
+    annotator: Annotator,
+    options: Mp4Options,
+    writer: Option<Mp4Writer>,
+    large: Image<Rgb>,
+}
+
+impl AnnotatedVideo {
+    /// Will write to `path`.
+    /// # Errors
+    /// [`ErrorKind::Config`] if an option is out of range.
+    pub fn create(path: impl Into<PathBuf>, draw: DrawOptions, options: Mp4Options) -> Result<Self> {
+        let (path, annotator) = (path.into(), Annotator::new(draw)?);
+        Ok(Self { path, annotator, options, writer: None, large: Image::default() })
+    }
+}
+
+impl Sink for AnnotatedVideo {
+    fn put(&mut self, view: &View<'_>) -> Result<()> {
+        let mut picture = self.writer.as_ref().and_then(Mp4Writer::spare).unwrap_or_default();
+        self.annotator.draw(view, &mut picture)?;
+        let shrink = shrink_for(picture.width(), picture.height());
+        if shrink > 1 {
+            std::mem::swap(&mut picture, &mut self.large);
+            halve(&self.large, shrink, &mut picture);
+        }
+        if self.writer.is_none() {
+            self.writer = Some(Mp4Writer::create(&self.path, picture.width(), picture.height(), self.options)?);
+        }
+        match &mut self.writer {
+            Some(writer) => writer.write(picture, view.scan.time),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.writer.map_or(Ok(()), Mp4Writer::finish)
+    }
+}
+
+/// By how much a picture must be made smaller for the encoder.
+fn shrink_for(width: usize, height: usize) -> usize {
+    let (long, short) = (width.max(height), width.min(height));
+    long.div_ceil(MAX_SIZE.0).max(short.div_ceil(MAX_SIZE.1)).max(1)
+}
+
+/// Takes the mean of `n` x `n` blocks.
+fn halve(large: &Image<Rgb>, n: usize, out: &mut Image<Rgb>) {
+    let (w, h) = (large.width() / n, large.height() / n);
+    out.reset(w, h, [0; 3]);
+    for y in 0..h {
+        for (x, o) in out.row_mut(y).iter_mut().enumerate() {
+            let mut sum = [0u32; 3];
+            for row in 0..n {
+                for p in &large.row(y * n + row)[x * n..(x + 1) * n] {
+                    sum.iter_mut().zip(p).for_each(|(s, v)| *s += u32::from(*v));
+                }
+            }
+            *o = sum.map(|s| (s / (n * n) as u32) as u8);
+        }
+    }
+}
+
+/// Writes a folder of PNG files, `frame_000000.png` and so on, numbered as the frames are.
+///
+/// Every file appears whole; those of an earlier run are overwritten one by one.
+pub struct PngFolder {
+    folder: PathBuf,
+    annotator: Annotator,
+    picture: Image<Rgb>,
+}
+
+impl PngFolder {
+    /// Makes the folder.
+    /// # Errors
+    /// [`ErrorKind::Output`] if it cannot be made, [`ErrorKind::Config`] if an option is out of range.
+    pub fn create(folder: impl Into<PathBuf>, draw: DrawOptions) -> Result<Self> {
+        let folder = folder.into();
+        std::fs::create_dir_all(&folder)
+            .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(folder.display()).because(e))?;
+        Ok(Self { folder, annotator: Annotator::new(draw)?, picture: Image::default() })
+    }
+}
+
+impl Sink for PngFolder {
+    fn put(&mut self, view: &View<'_>) -> Result<()> {
+        self.annotator.draw(view, &mut self.picture)?;
+        let path = self.folder.join(format!("frame_{:06}.png", view.scan.index.0));
+        write_png(&path, &self.picture)
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes one RGB picture as PNG; the file appears whole.
+/// # Errors
+/// [`ErrorKind::Output`] if it cannot be written.
+pub fn write_png(path: &Path, picture: &Image<Rgb>) -> Result<()> {
+    let failed = |e: String| Error::new(ErrorKind::Output, format!("cannot be written: {e}")).at(path.display());
+    let side = |n: usize| u32::try_from(n).map_err(|e| failed(e.to_string()));
+    let mut file = AtomicFile::create(path)?;
+    let mut encoder =
+        png::Encoder::new(std::io::BufWriter::new(&mut file), side(picture.width())?, side(picture.height())?);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().map_err(|e| failed(e.to_string()))?;
+    writer.write_image_data(picture.as_slice().as_flattened()).map_err(|e| failed(e.to_string()))?;
+    writer.finish().map_err(|e| failed(e.to_string()))?;
+    file.flush().map_err(|e| failed(e.to_string()))?;
+    file.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Frame, FrameIndex, Pixels, Scan, Timestamp};
+
+    fn frame(k: u64) -> Frame {
+        let pixels = Pixels::Gray8(Image::filled(64, 48, 60));
+        Frame { index: FrameIndex(k), time: Timestamp::from_ns(k as i64 * 40_000_000), pixels }
+    }
+
+    #[test]
+    fn a_video_of_three_views_has_three_frames_at_a_legible_size() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("annotated.mp4");
+        let mut sink = Box::new(AnnotatedVideo::create(&path, DrawOptions::default(), Mp4Options::default()).unwrap());
+        for k in 0..3 {
+            let frame = frame(k);
+            let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
+            sink.put(&View { frame: Some(&frame), scan: &scan, tracks: &[] }).unwrap();
+            assert!(!path.exists(), "the name appears with the whole file");
+        }
+        sink.finish().unwrap();
+        let mut source = crate::io::video::open_mp4(&path, &crate::io::OpenOptions::default()).unwrap();
+        assert_eq!((source.info().width, source.info().height, source.info().n_frames), (512, 384, Some(3)));
+        source.next_frame().unwrap();
+        assert_eq!(source.next_frame().unwrap().unwrap().time.ns, 40_000_000);
+    }
+
+    #[test]
+    fn png_files_carry_the_frames_numbers() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut sink = Box::new(PngFolder::create(dir.path().join("png"), DrawOptions::default()).unwrap());
+        let frame = frame(7);
+        let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
+        sink.put(&View { frame: Some(&frame), scan: &scan, tracks: &[] }).unwrap();
+        sink.finish().unwrap();
+        assert!(dir.path().join("png/frame_000007.png").exists());
+    }
+
+    #[test]
+    fn views_without_frames_are_refused_with_a_way_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut sink = PngFolder::create(dir.path(), DrawOptions::default()).unwrap();
+        let err = sink.put(&View { frame: None, scan: &Scan::default(), tracks: &[] }).unwrap_err();
+        assert!(err.to_string().contains("hint: give the frames"), "{err}");
+    }
+
+    #[test]
+    fn pictures_beyond_the_encoder_are_made_smaller_by_a_whole_number() {
+        assert_eq!((shrink_for(3840, 2160), shrink_for(8192, 8192), shrink_for(100, 4000)), (1, 4, 2));
+        let mut out = Image::default();
+        halve(&Image::from_vec(2, 2, vec![[0; 3], [4; 3], [8; 3], [12; 3]]).unwrap(), 2, &mut out);
+        assert_eq!(out.as_slice(), [[6; 3]]);
+    }
+}
