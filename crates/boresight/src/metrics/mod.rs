@@ -10,6 +10,7 @@ pub mod consistency;
 pub mod detection;
 pub mod hota;
 pub mod identity;
+pub mod image;
 pub mod multi_object;
 pub mod ospa2;
 pub mod overlap;

@@ -9,6 +9,7 @@ pub mod config;
 pub mod detector;
 pub mod isolated;
 pub mod llr;
+pub mod noise;
 pub mod noise_level;
 pub mod pixel;
 pub mod probability;

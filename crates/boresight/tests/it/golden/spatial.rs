@@ -2,6 +2,8 @@
 
 use super::{load, number, rows};
 use boresight::Image;
+use boresight::metrics::image::{compare, pfe_spectral};
+use boresight::vision::noise::{gaussian, salt_and_pepper};
 use boresight::vision::spatial::{
     Border, Kernel, SpatialConfig, SpatialFilter, WindowConfig, convolve_exact, mean_exact, median_exact,
 };
@@ -53,4 +55,40 @@ fn the_spatial_filters_give_the_golden_images() {
         }
     }
     assert!(n_images >= 9 * golden.cases.len(), "only {n_images} images compared");
+}
+
+#[test]
+fn the_noise_generators_give_the_golden_images() {
+    let Some(golden) = load("image_noise") else { return };
+    for case in &golden.cases {
+        let inputs = &case["inputs"];
+        let mut salted = image(&inputs["image"], |v| v);
+        salt_and_pepper(&mut salted, number(&inputs["d"]), &rows(&inputs["u"]).concat()).unwrap();
+        golden.all_close(salted.as_slice(), &rows(&case["outputs"]["salt_pepper"]).concat(), "salt_pepper");
+        let clean = image(&inputs["image"], |v| v);
+        let noisy = gaussian(&clean, number(&inputs["sigma"]), &rows(&inputs["z"]).concat()).unwrap();
+        golden.all_close(noisy.as_slice(), &rows(&case["outputs"]["gaussian"]).concat(), "gaussian");
+    }
+}
+
+#[test]
+fn the_image_metrics_give_the_golden_numbers() {
+    let Some(golden) = load("image_metrics") else { return };
+    for case in &golden.cases {
+        let truth = image(&case["inputs"]["truth"], |v| v);
+        let filtered = image(&case["inputs"]["filtered"], |v| v);
+        let m = compare(&truth, &filtered, number(&case["inputs"]["imax"])).unwrap();
+        for (name, ours) in [
+            ("mse", m.mse),
+            ("rmse", m.rmse),
+            ("mae", m.mae),
+            ("pfe", m.pfe),
+            ("snr", m.snr),
+            ("psnr", m.psnr),
+            ("psnr_as_printed", m.psnr_as_printed),
+            ("pfe_spectral", pfe_spectral(&truth, &filtered).unwrap()),
+        ] {
+            golden.close(ours, number(&case["outputs"][name]), name);
+        }
+    }
 }

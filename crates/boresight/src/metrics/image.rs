@@ -1,0 +1,164 @@
+//! How far a filtered image is from the true one: MSE, RMSE, MAE, PFE, SNR, PSNR.
+//!
+//! Source: SPEC B, eqs 4.7-4.12 with its errata. `psnr` is 10 log10(peak² / MSE); `psnr_as_printed` is eq 4.12 as it
+//! stands, too small by 10 log10(n) (`E-B1`). `pfe` takes the Frobenius norm, `pfe_spectral` the largest singular value
+//! as MATLAB's `norm` of a matrix does (`R-PFE`).
+//! Symbols: s truth, y filtered, d = s - y, n pixels. Units: as the pixels; PFE percent; SNR and PSNR dB.
+//! Identical images: all errors 0, SNR and PSNR +inf. An all-zero truth with an error: PFE +inf, SNR -inf.
+//! Cost of `pfe_spectral`: the smaller side squared times the larger, and an eigenvalue problem of the smaller side.
+
+use crate::{Error, ErrorKind, Image, Result};
+use nalgebra::DMatrix;
+
+/// The measures of one image against the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageMetrics {
+    /// Mean square error, counts².
+    pub mse: f64,
+    /// Root of it, counts.
+    pub rmse: f64,
+    /// Mean absolute error, counts.
+    pub mae: f64,
+    /// Percentage fit error, Frobenius norm, %.
+    pub pfe: f64,
+    /// Signal to noise ratio, dB.
+    pub snr: f64,
+    /// Peak signal to noise ratio, dB.
+    pub psnr: f64,
+    /// Eq 4.12 as printed, without 1/n, dB.
+    pub psnr_as_printed: f64,
+}
+
+/// Compares `filtered` with `truth`; `peak` is the largest value a pixel can have (255 for 8 bits), counts.
+///
+/// ```
+/// use boresight::{Image, metrics::image::{compare, pfe_spectral}};
+/// // SPEC W9
+/// let s = Image::from_vec(3, 3, vec![10u8, 20, 30, 40, 50, 60, 70, 80, 90]).unwrap();
+/// let y = Image::from_vec(3, 3, vec![11u8, 18, 30, 43, 50, 55, 70, 84, 90]).unwrap();
+/// let m = compare(&s, &y, 255.0)?;
+/// let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * b.abs(), "{a} {b}");
+/// close(m.mse, 6.1111111111111);
+/// close(m.rmse, 2.4720661623652);
+/// close(m.mae, 1.6666666666667);
+/// close(m.pfe, 4.3929768510698);
+/// close(m.snr, 27.144821705143);
+/// close(m.psnr, 40.26960180813);
+/// close(m.psnr_as_printed, 30.727176713737);
+/// close(pfe_spectral(&s, &y)?, 3.4785631527583);
+/// # Ok::<(), boresight::Error>(())
+/// ```
+/// # Errors
+/// Images of different sizes or without pixels; a pixel that is not finite; a peak that is not above 0.
+pub fn compare<T: Copy + Into<f64>>(truth: &Image<T>, filtered: &Image<T>, peak: f64) -> Result<ImageMetrics> {
+    check_sizes(truth, filtered)?;
+    if !(peak > 0.0 && peak.is_finite()) {
+        return Err(Error::new(ErrorKind::Config, "expected a largest pixel value above 0")
+            .at(format!("peak = {peak}"))
+            .hint("255 for 8-bit images, 65535 for 16-bit ones"));
+    }
+    let (mut d2, mut d1, mut s2) = (0.0, 0.0, 0.0);
+    for (&s, &y) in truth.as_slice().iter().zip(filtered.as_slice()) {
+        let s: f64 = s.into();
+        let d = s - y.into();
+        d2 += d * d;
+        d1 += d.abs();
+        s2 += s * s;
+    }
+    check_finite(d2 + s2)?;
+    let n = truth.as_slice().len() as f64;
+    let mse = d2 / n;
+    let ratio_db = |signal: f64, noise: f64| if noise == 0.0 { f64::INFINITY } else { 10.0 * (signal / noise).log10() };
+    Ok(ImageMetrics {
+        mse,
+        rmse: mse.sqrt(),
+        mae: d1 / n,
+        pfe: percent(d2.sqrt(), s2.sqrt()),
+        snr: ratio_db(s2, d2),
+        psnr: ratio_db(peak * peak, mse),
+        psnr_as_printed: ratio_db(peak * peak, d2),
+    })
+}
+
+/// The percentage fit error with the largest singular value as the norm, %.
+/// # Errors
+/// As [`compare`].
+pub fn pfe_spectral<T: Copy + Into<f64>>(truth: &Image<T>, filtered: &Image<T>) -> Result<f64> {
+    check_sizes(truth, filtered)?;
+    let s: Vec<f64> = truth.as_slice().iter().map(|&v| v.into()).collect();
+    let d: Vec<f64> = s.iter().zip(filtered.as_slice()).map(|(s, &y)| s - y.into()).collect();
+    check_finite(s.iter().chain(&d).map(|v| v * v).sum())?;
+    Ok(percent(spectral_norm(d, truth.width()), spectral_norm(s, truth.width())))
+}
+
+/// Largest singular value of the matrix with rows of `width`: root of the largest eigenvalue of the smaller Gram matrix.
+fn spectral_norm(values: Vec<f64>, width: usize) -> f64 {
+    // Column-major storage reads the rows as columns: the transposed matrix has the same singular values.
+    let a = DMatrix::from_vec(width, values.len() / width.max(1), values);
+    let gram = if a.nrows() <= a.ncols() { &a * a.transpose() } else { a.transpose() * &a };
+    gram.symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+fn percent(error: f64, signal: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { 100.0 * error / signal }
+}
+
+fn check_sizes<T: Copy>(truth: &Image<T>, filtered: &Image<T>) -> Result<()> {
+    let (a, b) = ((truth.width(), truth.height()), (filtered.width(), filtered.height()));
+    if a != b || a.0 == 0 || a.1 == 0 {
+        return Err(Error::new(ErrorKind::Config, "expected two images of the same size, with pixels")
+            .at(format!("{} x {} and {} x {} px", a.0, a.1, b.0, b.1)));
+    }
+    Ok(())
+}
+
+fn check_finite(sum: f64) -> Result<()> {
+    if sum.is_finite() {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::Numeric, "a pixel is not finite or too large to square")
+        .hint("replace NaN and infinite pixels before comparing"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(values: &[f64]) -> Image<f64> {
+        Image::from_vec(values.len(), 1, values.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn identical_images_have_no_error_and_an_infinite_ratio() {
+        let s = row(&[3.0, 4.0]);
+        let m = compare(&s, &s, 255.0).unwrap();
+        assert_eq!((m.mse, m.rmse, m.mae, m.pfe), (0.0, 0.0, 0.0, 0.0));
+        assert_eq!((m.snr, m.psnr), (f64::INFINITY, f64::INFINITY));
+        assert_eq!(pfe_spectral(&s, &s).unwrap(), 0.0);
+        let zero = row(&[0.0, 0.0]);
+        let m = compare(&zero, &s, 255.0).unwrap();
+        assert_eq!((m.pfe, m.snr), (f64::INFINITY, f64::NEG_INFINITY));
+        assert_eq!(compare(&zero, &zero, 255.0).unwrap().pfe, 0.0);
+    }
+
+    #[test]
+    fn the_fit_error_follows_from_the_signal_to_noise_ratio() {
+        // SPEC B: PFE = 100 * 10^(-SNR / 20).
+        let m = compare(&row(&[10.0, 20.0, 35.0]), &row(&[11.0, 18.5, 35.25]), 255.0).unwrap();
+        assert!((m.pfe - 100.0 * 10f64.powf(-m.snr / 20.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn images_that_cannot_be_compared_are_refused() {
+        assert!(compare(&row(&[1.0]), &row(&[1.0, 2.0]), 255.0).is_err());
+        assert!(compare(&row(&[]), &row(&[]), 255.0).is_err());
+        assert!(compare(&row(&[f64::NAN]), &row(&[1.0]), 255.0).is_err());
+        assert!(compare(&row(&[1.0]), &row(&[1.0]), 0.0).is_err());
+        assert!(pfe_spectral(&row(&[f64::INFINITY]), &row(&[1.0])).is_err());
+    }
+
+    #[test]
+    fn the_spectral_norm_of_a_diagonal_matrix_is_its_largest_entry() {
+        assert!((spectral_norm(vec![3.0, 0.0, 0.0, 0.0, -7.0, 0.0], 3) - 7.0).abs() < 1e-12);
+    }
+}
