@@ -3,6 +3,7 @@
 //! A threshold turns one row of pixels into one row of bits (`&[u64]`, bit `x % 64` of word `x / 64` is pixel `x`, bits past
 //! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
 
+pub mod background;
 pub mod centroid;
 pub mod cluster;
 pub mod config;

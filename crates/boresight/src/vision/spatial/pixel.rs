@@ -31,6 +31,8 @@ pub trait SpatialPixel: Copy + Default + PartialEq + std::fmt::Debug + Send + Sy
     fn from_key(key: Self::Key) -> Self;
     /// The value as f64, exactly.
     fn to_f64(self) -> f64;
+    /// The value as f32 (exact for all three types).
+    fn to_f32(self) -> f32;
     /// The value as u32 for integer types (0 for f32, which never asks).
     fn to_u32(self) -> u32;
     /// The nearest value of this type: integers round half away from zero and saturate (NaN gives 0), f32 rounds to even.
@@ -85,6 +87,10 @@ macro_rules! integer_pixel {
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline(always)]
+            fn to_f32(self) -> f32 {
+                f32::from(self)
             }
             #[inline(always)]
             fn to_u32(self) -> u32 {
@@ -151,6 +157,10 @@ impl SpatialPixel for f32 {
     #[inline(always)]
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        self
     }
     #[inline(always)]
     fn to_u32(self) -> u32 {

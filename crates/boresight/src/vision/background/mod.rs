@@ -1,0 +1,478 @@
+//! Moving pixels of a fixed camera: a running background with shadows, changing light, ghosts and slight shake.
+//!
+//! [`Background`] keeps mean and deviation of every pixel ([`model`]) and gives one bit a pixel: moving or not. In a frame:
+//! 1. the light of the frame against the model's is estimated on a grid and taken off ([`light`]);
+//! 2. a pixel moves if it is farther than `threshold-sd` deviations from its mean;
+//! 3. moving pixels that are shadow ([`shadow`]) or, with `shake`, fit a neighbour's background, are background after all;
+//! 4. the model follows: still pixels with `time-constant-s`, moving ones with `standing-time-s`, so that a standing
+//!    target stays one; moving pixels that look like the still background beside them with `ghost-time-s`: the hole that
+//!    a departed target leaves fills from its edge (the idea of O. Barnich, M. Van Droogenbroeck, "ViBe", IEEE Trans.
+//!    Image Processing 20(6), 2011, here without chance);
+//! 5. the bits are cleaned ([`morphology`]).
+//!
+//! All times are in seconds of real time. A row is updated as seldom as its rate allows (see [`model`]), with the time that
+//! has passed. Limits: the camera stands still but for a pixel; the first `start-s` seconds learn.
+
+pub mod difference;
+mod light;
+pub mod model;
+pub mod morphology;
+pub mod shadow;
+
+pub use difference::{DifferenceConfig, FrameDifference};
+pub use model::BackgroundPixel;
+pub use morphology::{BitImage, CleanUp};
+pub use shadow::ShadowConfig;
+
+use crate::{Error, ErrorKind, Image, Result};
+use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch};
+use light::{Grid, Light};
+use model::{Coefficients, GHOST, MOVING, Rates, STILL};
+use multiversion::multiversion;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How the background is learned and what stands out from it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct BackgroundConfig {
+    /// Standard deviations of its background that make a pixel moving, 1 to 50. Lower finds fainter targets and more noise.
+    pub threshold_sd: f32,
+    /// Smallest difference that counts as moving, counts, 0... . If absent: from the deviation typical of the whole image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_difference: Option<f32>,
+    /// Time constant of the background, s, above 0. Shorter follows the light faster and absorbs slow targets.
+    pub time_constant_s: f64,
+    /// Time constant with which moving pixels enter the background, s, above 0. A target that stands is lost after about
+    /// this time.
+    pub standing_time_s: f64,
+    /// Time constant with which moving pixels that look like the background beside them enter it, s, above 0.
+    pub ghost_time_s: f64,
+    /// Time in which everything is learned at first, s, 0... .
+    pub start_s: f64,
+    /// Whether the light of the whole frame is followed at once (clouds, automatic exposure).
+    pub follow_light: bool,
+    /// Whether a pixel may fit the background of one of its 8 neighbours: forgives a shake of 1 px, costs edges.
+    pub shake: bool,
+    /// What is taken for shadow; absent: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shadow: Option<ShadowConfig>,
+    /// How the moving pixels are cleaned.
+    pub clean_up: CleanUp,
+}
+
+impl Default for BackgroundConfig {
+    fn default() -> Self {
+        Self {
+            threshold_sd: 6.0,
+            min_difference: None,
+            time_constant_s: 10.0,
+            standing_time_s: 60.0,
+            ghost_time_s: 2.0,
+            start_s: 1.0,
+            follow_light: true,
+            shake: false,
+            shadow: Some(ShadowConfig::default()),
+            clean_up: CleanUp::Majority,
+        }
+    }
+}
+
+impl BackgroundConfig {
+    /// Checks the parameters; `at` is the key of this part, for messages.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        let wrong = |key: &str, value: f64, expected: &str, hint: &str| {
+            Err(Error::new(ErrorKind::Config, format!("expected {expected}"))
+                .at(format!("{at}.{key} = {value}"))
+                .hint(hint))
+        };
+        if !(1.0..=50.0).contains(&self.threshold_sd) {
+            let hint = "6 leaves few noisy pixels";
+            return wrong("threshold-sd", self.threshold_sd.into(), "a number from 1 to 50", hint);
+        }
+        if let Some(d) = self.min_difference
+            && !(d >= 0.0 && d.is_finite())
+        {
+            return wrong("min-difference", d.into(), "0 or more counts", "leave it out to take it from the noise");
+        }
+        for (key, value) in [
+            ("time-constant-s", self.time_constant_s),
+            ("standing-time-s", self.standing_time_s),
+            ("ghost-time-s", self.ghost_time_s),
+        ] {
+            if !(value > 0.0 && value.is_finite()) {
+                return wrong(key, value, "a time above 0 s", "10 s suits the light of day, 60 s a standing target");
+            }
+        }
+        if !(self.start_s >= 0.0 && self.start_s.is_finite()) {
+            return wrong("start-s", self.start_s, "a time of 0 s or more", "1 s averages the first frames");
+        }
+        if let Some(s) = &self.shadow {
+            if !(s.darkest > 0.0 && s.darkest < s.lightest && s.lightest <= 1.0) {
+                let hint = "0.6 to 0.97 fits sunlit ground";
+                return wrong("shadow.darkest", s.darkest.into(), "0 < darkest < lightest <= 1", hint);
+            }
+            if !(s.spread > 0.0 && s.spread.is_finite()) {
+                return wrong("shadow.spread", s.spread.into(), "a ratio above 0", "0.03 forgives 3 % of texture");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Fewest of the row's updates a time constant: a rate below 1/32 would drown in the rounding of the fixed-point model.
+const SLOWEST_RATE: f64 = 1.0 / 32.0;
+/// A row waits at most this many frames for its update.
+const MOST_FRAMES: u64 = 32;
+/// The grid on which the light is estimated takes one pixel in 8 both ways.
+const GRID_PX: usize = 8;
+
+/// The background of a fixed camera and the pixels that move before it.
+#[derive(Clone, Debug)]
+pub struct Background<T: BackgroundPixel> {
+    config: BackgroundConfig,
+    mean: Image<T::Level>,
+    deviation: Image<T::Level>,
+    /// Time at which each row was last updated, s since the start.
+    updated_s: Vec<f64>,
+    now_s: f64,
+    n_frames: u64,
+    /// Frames that the start-up has averaged (0: nothing is known yet).
+    n_averaged: u64,
+    typical: f32,
+    light: Light,
+    grid: Grid,
+    states: Vec<u8>,
+    bits: BitImage,
+    /// The bits before cleaning, which the update goes by.
+    raw: BitImage,
+    work: BitImage,
+}
+
+impl<T: BackgroundPixel> Background<T> {
+    /// Builds a background that has seen nothing.
+    /// # Errors
+    /// As [`BackgroundConfig::validate`].
+    pub fn new(config: BackgroundConfig) -> Result<Self> {
+        config.validate("background")?;
+        Ok(Self {
+            config,
+            mean: Image::default(),
+            deviation: Image::default(),
+            updated_s: Vec::new(),
+            now_s: 0.0,
+            n_frames: 0,
+            n_averaged: 0,
+            typical: 1.0,
+            light: light::SAME,
+            grid: Grid::default(),
+            states: Vec::new(),
+            bits: BitImage::default(),
+            raw: BitImage::default(),
+            work: BitImage::default(),
+        })
+    }
+
+    /// Learns from frames seen beforehand: the median of each pixel and its mean absolute deviation, so that even the
+    /// first frame can be judged and a passing target leaves no trace. All frames must have the same size.
+    /// # Errors
+    /// No frame, or frames of different sizes.
+    pub fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        let Some(first) = frames.first() else {
+            return Err(Error::new(ErrorKind::Config, "expected at least one frame to learn the background from"));
+        };
+        let (w, h) = (first.width(), first.height());
+        if let Some(other) = frames.iter().find(|f| (f.width(), f.height()) != (w, h)) {
+            return Err(size_changed(w, h, other.width(), other.height()));
+        }
+        self.restart(w, h);
+        let mut values = Vec::with_capacity(frames.len());
+        for y in 0..h {
+            let rows: Vec<&[T]> = frames.iter().map(|f| f.row(y)).collect();
+            let (means, deviations) = (self.mean.row_mut(y), self.deviation.row_mut(y));
+            for x in 0..w {
+                values.clear();
+                values.extend(rows.iter().map(|r| r[x].to_f64() as f32));
+                let middle = values.len() / 2;
+                let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+                values.iter_mut().for_each(|v| *v = (*v - median).abs());
+                // Median absolute deviation -> mean absolute deviation of a normal: 1 / 0.6745 * 0.7979.
+                let mad = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+                (means[x], deviations[x]) = (T::level(median), T::level(1.183 * mad));
+            }
+        }
+        self.n_averaged = u64::MAX;
+        self.typical = self.typical_deviation();
+        Ok(())
+    }
+
+    /// Takes the next frame, `dt_s` seconds after the last (any number for the first): finds the moving pixels and learns.
+    /// # Errors
+    /// A frame of another size than before; a time step that is negative or not finite.
+    pub fn update(&mut self, frame: &Image<T>, dt_s: f64) -> Result<()> {
+        let (w, h) = (frame.width(), frame.height());
+        if self.n_averaged == 0 {
+            self.restart(w, h);
+        } else if (w, h) != (self.mean.width(), self.mean.height()) {
+            return Err(size_changed(self.mean.width(), self.mean.height(), w, h));
+        }
+        if !(dt_s >= 0.0 && dt_s.is_finite()) {
+            return Err(Error::new(ErrorKind::Config, "expected a time of 0 s or more since the last frame")
+                .at(format!("dt = {dt_s}"))
+                .hint("sort the frames by time"));
+        }
+        if self.n_frames > 0 {
+            self.now_s += dt_s;
+        }
+        self.raw.reset(w, h);
+        if self.n_averaged < u64::MAX && self.now_s > self.config.start_s && self.n_averaged > 1 {
+            self.n_averaged = u64::MAX;
+        }
+        let starting = self.n_averaged < u64::MAX;
+        if self.n_averaged == 0 {
+            self.learn_first(frame);
+        } else {
+            let terms = self.look(frame);
+            self.follow(frame, &terms, dt_s, starting);
+        }
+        if starting {
+            self.n_averaged += 1;
+        }
+        self.n_frames += 1;
+        self.bits.clone_from(&self.raw);
+        morphology::clean(&mut self.bits, self.config.clean_up, &mut self.work);
+        Ok(())
+    }
+
+    /// The moving pixels of row `y`, 64 a word.
+    pub fn row(&self, y: usize) -> &[u64] {
+        self.bits.row(y)
+    }
+
+    /// The moving pixels of the last frame.
+    pub fn moving(&self) -> &BitImage {
+        &self.bits
+    }
+
+    /// Whether the model still learns everything, so that what moves is not told apart yet.
+    pub fn is_starting(&self) -> bool {
+        self.n_averaged < u64::MAX
+    }
+
+    /// The mean of a pixel's background, counts; `None` outside.
+    pub fn mean(&self, x: usize, y: usize) -> Option<f32> {
+        self.mean.get(x, y).map(T::counts)
+    }
+
+    /// The standard deviation of a pixel's background, counts; `None` outside.
+    pub fn deviation(&self, x: usize, y: usize) -> Option<f32> {
+        // A normal's standard deviation is 1.2533 mean absolute deviations.
+        self.deviation.get(x, y).map(|d| 1.2533 * T::counts(d).max(self.typical))
+    }
+
+    fn restart(&mut self, w: usize, h: usize) {
+        self.mean.reset(w, h, T::Level::default());
+        self.deviation.reset(w, h, T::Level::default());
+        self.bits.reset(w, h);
+        self.raw.reset(w, h);
+        self.updated_s.clear();
+        self.updated_s.resize(h, 0.0);
+        self.states.clear();
+        self.states.resize(w.next_multiple_of(64), STILL);
+        (self.now_s, self.n_frames, self.n_averaged) = (0.0, 0, 0);
+        self.light = light::SAME;
+    }
+
+    fn learn_first(&mut self, frame: &Image<T>) {
+        for y in 0..frame.height() {
+            for (m, v) in self.mean.row_mut(y).iter_mut().zip(frame.row(y)) {
+                let v = v.to_f64() as f32;
+                *m = T::level(if v.is_finite() { v } else { 0.0 });
+            }
+        }
+    }
+
+    /// Median of the deviations on the grid, counts.
+    fn typical_deviation(&mut self) -> f32 {
+        let mut all = Vec::new();
+        for y in (0..self.mean.height()).step_by(GRID_PX) {
+            all.extend(self.deviation.row(y).iter().step_by(GRID_PX).map(|&d| T::counts(d)));
+        }
+        let middle = all.len() / 2;
+        if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    }
+
+    /// Finds the moving pixels, into `raw`.
+    fn look(&mut self, frame: &Image<T>) -> T::Terms {
+        let (w, h) = (frame.width(), frame.height());
+        self.light = light::SAME;
+        if self.config.follow_light {
+            self.grid.clear();
+            for y in (GRID_PX / 2..h).step_by(GRID_PX) {
+                let (row, means) = (frame.row(y), self.mean.row(y));
+                for x in (GRID_PX / 2..w).step_by(GRID_PX) {
+                    let m = T::counts(means[x]);
+                    self.grid.push(m, row[x].to_f64() as f32 - m);
+                }
+            }
+            self.light = self.grid.light(self.typical);
+        }
+        // `threshold-sd` counts standard deviations, the model mean absolute ones.
+        let factor = 1.2533 * self.config.threshold_sd;
+        let least = self.config.min_difference.map_or(0.0, |d| d / factor);
+        let floor = if self.config.min_difference.is_some() { least } else { self.typical.max(T::NOISE_FLOOR) };
+        let light = self.light;
+        let terms = T::terms(&Coefficients { gain: light.gain, offset: light.offset, factor, floor });
+        for y in 0..h {
+            judge(frame.row(y), self.mean.row(y), self.deviation.row(y), &terms, &mut self.states);
+            let states = &self.states;
+            let bits = self.raw.row_mut(y);
+            dispatch!(Level::new(), simd => pack(simd, states, bits));
+            self.doubt(frame, y, &terms);
+        }
+        terms
+    }
+
+    /// Clears the bits of row `y` that are shadow or shake.
+    fn doubt(&mut self, frame: &Image<T>, y: usize, terms: &T::Terms) {
+        if self.config.shadow.is_none() && !self.config.shake {
+            return;
+        }
+        let h = frame.height();
+        let (above, below) = (y.saturating_sub(1), (y + 1).min(h - 1));
+        let rows = [frame.row(above), frame.row(y), frame.row(below)];
+        let means = [self.mean.row(above), self.mean.row(y), self.mean.row(below)];
+        let deviations = [self.deviation.row(above), self.deviation.row(y), self.deviation.row(below)];
+        let light = (self.light.gain, self.light.offset);
+        let last = frame.width() - 1;
+        for (i, word) in self.raw.row_mut(y).iter_mut().enumerate() {
+            let mut left = *word;
+            while left != 0 {
+                let x = i * 64 + left.trailing_zeros() as usize;
+                left &= left - 1;
+                let shaken = self.config.shake
+                    && (x.saturating_sub(1)..=(x + 1).min(last))
+                        .any(|nx| (0..3).any(|k| !rows[1][x].moves(means[k][nx], deviations[k][nx], terms)));
+                let shadow = || {
+                    self.config.shadow.as_ref().is_some_and(|c| {
+                        let d = T::counts(deviations[1][x]).max(self.typical);
+                        shadow::is_shadow(c, rows, means, x, light, d)
+                    })
+                };
+                if shaken || shadow() {
+                    *word &= !(1 << (x % 64));
+                }
+            }
+        }
+    }
+
+    /// Lets the model follow the frame.
+    fn follow(&mut self, frame: &Image<T>, terms: &T::Terms, dt_s: f64, starting: bool) {
+        let h = frame.height();
+        let rate = |time_s: f64, tau_s: f64| -((-time_s / tau_s).exp_m1());
+        // As many frames between two updates of a row as keep its rate above the smallest.
+        let per_frame = rate(dt_s, self.config.time_constant_s).max(1e-9);
+        let period = if starting { 1 } else { ((SLOWEST_RATE / per_frame) as u64).clamp(1, MOST_FRAMES) };
+        for y in 0..h {
+            if (self.n_frames + y as u64) % period != 0 {
+                continue;
+            }
+            let time_s = self.now_s - self.updated_s[y];
+            self.updated_s[y] = self.now_s;
+            let rates = if starting {
+                let rate = 1.0 / (self.n_averaged + 1) as f32;
+                Rates { still: rate, moving: rate, ghost: rate }
+            } else {
+                Rates {
+                    still: rate(time_s, self.config.time_constant_s) as f32,
+                    moving: rate(time_s, self.config.standing_time_s) as f32,
+                    ghost: rate(time_s, self.config.ghost_time_s) as f32,
+                }
+            };
+            self.states.fill(STILL);
+            self.spread_states(frame, y, terms);
+            let steps = T::steps(&rates);
+            adapt(frame.row(y), &self.states, terms, &steps, self.mean.row_mut(y), self.deviation.row_mut(y));
+        }
+        // The typical deviation moves slowly: once in a while is enough.
+        if starting || self.n_frames % 16 == 0 {
+            self.typical = self.typical_deviation();
+        }
+    }
+
+    /// Writes the states of the moving pixels of row `y`: moving, or a ghost where they fit still background beside them.
+    fn spread_states(&mut self, frame: &Image<T>, y: usize, terms: &T::Terms) {
+        let row = frame.row(y);
+        let (w, h) = (frame.width(), frame.height());
+        for i in 0..w.div_ceil(64) {
+            let mut left = self.raw.row(y)[i];
+            while left != 0 {
+                let x = i * 64 + left.trailing_zeros() as usize;
+                left &= left - 1;
+                let fits = |nx: usize, ny: usize| {
+                    !self.raw.get(nx, ny) && !row[x].moves(self.mean.row(ny)[nx], self.deviation.row(ny)[nx], terms)
+                };
+                let ghost = (x > 0 && fits(x - 1, y))
+                    || (x + 1 < w && fits(x + 1, y))
+                    || (y > 0 && fits(x, y - 1))
+                    || (y + 1 < h && fits(x, y + 1));
+                self.states[x] = if ghost { GHOST } else { MOVING };
+            }
+        }
+    }
+}
+
+fn size_changed(w: usize, h: usize, found_w: usize, found_h: usize) -> Error {
+    Error::new(ErrorKind::Damaged, format!("expected a frame of {w} x {h} px, as before"))
+        .at(format!("{found_w} x {found_h} px"))
+        .hint("frames of one sequence must have one size")
+}
+
+/// Writes 1 for each pixel that moves and 0 for the rest, also past the width.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
+fn judge<T: BackgroundPixel>(
+    row: &[T],
+    mean: &[T::Level],
+    deviation: &[T::Level],
+    terms: &T::Terms,
+    states: &mut [u8],
+) {
+    let n = row.len();
+    let (mean, deviation) = (&mean[..n], &deviation[..n]);
+    let (inside, outside) = states.split_at_mut(n);
+    for x in 0..n {
+        inside[x] = u8::from(row[x].moves(mean[x], deviation[x], terms));
+    }
+    outside.fill(0);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
+fn adapt<T: BackgroundPixel>(
+    row: &[T],
+    states: &[u8],
+    terms: &T::Terms,
+    steps: &T::Steps,
+    mean: &mut [T::Level],
+    deviation: &mut [T::Level],
+) {
+    let n = row.len();
+    let (states, mean, deviation) = (&states[..n], &mut mean[..n], &mut deviation[..n]);
+    for x in 0..n {
+        (mean[x], deviation[x]) = row[x].adapt(mean[x], deviation[x], states[x], terms, steps);
+    }
+}
+
+/// Packs bytes 0 and 1 into bits; `states` has 64 bytes for every word.
+#[inline(always)]
+fn pack<S: Simd>(simd: S, states: &[u8], bits: &mut [u64]) {
+    let lanes = S::u8s::LEN;
+    for (bytes, word) in states.chunks_exact(64).zip(bits) {
+        let mut w = 0;
+        for (i, part) in bytes.chunks_exact(lanes).enumerate() {
+            w |= S::u8s::from_slice(simd, part).simd_gt(0).to_bitmask() << (i * lanes);
+        }
+        *word = w;
+    }
+}
