@@ -1,5 +1,6 @@
 //! Integration tests: one binary, a module per matter.
 
+mod background;
 mod golden;
 mod images;
 mod metrics;

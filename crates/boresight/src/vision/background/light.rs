@@ -1,7 +1,7 @@
 //! How the light of a frame differs from the background's: a gain and an offset, robust against moving targets.
 //!
-//! On a grid of pixels the differences from the model's mean are put into two histograms, for the darker and the brighter
-//! half of the grid; the medians of both give the line difference = offset + (gain - 1) * mean. Up to half of each
+//! On a grid of pixels the differences from the model's mean are split into two groups, for the darker and the brighter
+//! half of the grid; the medians of both, taken again near the first line, give the line difference = offset + (gain - 1) * mean. Up to half of each
 //! group may be covered by targets. Limits: gain 0.5 to 1.9; where dark and bright differ by less than 16 deviations the
 //! gain stays 1 (the offset alone is well known). Our own method; cost: one pixel in 64.
 
@@ -33,30 +33,33 @@ impl Grid {
         }
     }
 
-    fn median(work: &mut Vec<f32>, values: impl Iterator<Item = f32>) -> Option<f32> {
-        work.clear();
-        work.extend(values);
-        if work.is_empty() {
-            return None;
-        }
-        let middle = work.len() / 2;
-        Some(*work.select_nth_unstable_by(middle, f32::total_cmp).1)
-    }
-
     /// The light; `deviation` is the typical deviation of a pixel, counts.
     pub(super) fn light(&mut self, deviation: f32) -> Light {
-        let Self { pairs, work } = self;
         // Too few pixels to tell light from targets.
-        if pairs.len() < 64 {
+        if self.pairs.len() < 64 {
             return SAME;
         }
-        let Some(split) = Self::median(work, pairs.iter().map(|p| p.0)) else { return SAME };
+        let mut light = self.fit(f32::INFINITY, SAME, deviation);
+        // Covered pixels on one side shift a median: fit again without those far from the line.
+        for _ in 0..2 {
+            let residual = |p: &(f32, f32)| (p.1 - line(light, p.0)).abs();
+            let Some(mad) = median(&mut self.work, self.pairs.iter().map(residual)) else { return light };
+            light = self.fit(2.0 * 1.4826 * mad.max(deviation), light, deviation);
+        }
+        light
+    }
+
+    /// The line through the medians of the dark and the bright pairs within `reach` of the line before.
+    fn fit(&mut self, reach: f32, before: Light, deviation: f32) -> Light {
+        let Self { pairs, work } = self;
+        let near = || pairs.iter().filter(|p| (p.1 - line(before, p.0)).abs() <= reach);
+        let Some(split) = median(work, near().map(|p| p.0)) else { return before };
         let mut side = |bright: bool| {
-            let group = || pairs.iter().filter(|p| (p.0 > split) == bright);
-            Some((Self::median(work, group().map(|p| p.0))?, Self::median(work, group().map(|p| p.1))?))
+            let group = || near().filter(|p| (p.0 > split) == bright);
+            Some((median(work, group().map(|p| p.0))?, median(work, group().map(|p| p.1))?))
         };
         let (dark, bright) = (side(false), side(true));
-        let Some((m0, d0)) = dark else { return SAME };
+        let Some((m0, d0)) = dark else { return before };
         let Some((m1, d1)) = bright else { return Light { gain: 1.0, offset: d0 } };
         if m1 - m0 < 16.0 * deviation.max(f32::MIN_POSITIVE) {
             return Light { gain: 1.0, offset: 0.5 * (d0 + d1) };
@@ -64,6 +67,21 @@ impl Grid {
         let slope = ((d1 - d0) / (m1 - m0)).clamp(-0.5, 0.9);
         Light { gain: 1.0 + slope, offset: d0 - slope * m0 }
     }
+}
+
+/// The difference that the light gives at a mean.
+fn line(light: Light, mean: f32) -> f32 {
+    (light.gain - 1.0) * mean + light.offset
+}
+
+fn median(work: &mut Vec<f32>, values: impl Iterator<Item = f32>) -> Option<f32> {
+    work.clear();
+    work.extend(values);
+    if work.is_empty() {
+        return None;
+    }
+    let middle = work.len() / 2;
+    Some(*work.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 #[cfg(test)]

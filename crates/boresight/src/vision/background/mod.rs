@@ -13,12 +13,14 @@
 //! All times are in seconds of real time. A row is updated as seldom as its rate allows (see [`model`]), with the time that
 //! has passed. Limits: the camera stands still but for a pixel; the first `start-s` seconds learn.
 
+mod config;
 pub mod difference;
 mod light;
 pub mod model;
 pub mod morphology;
 pub mod shadow;
 
+pub use config::BackgroundConfig;
 pub use difference::{DifferenceConfig, FrameDifference};
 pub use model::BackgroundPixel;
 pub use morphology::{BitImage, CleanUp};
@@ -29,103 +31,13 @@ use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch};
 use light::{Grid, Light};
 use model::{Coefficients, GHOST, MOVING, Rates, STILL};
 use multiversion::multiversion;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// How the background is learned and what stands out from it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct BackgroundConfig {
-    /// Standard deviations of its background that make a pixel moving, 1 to 50. Lower finds fainter targets and more noise.
-    pub threshold_sd: f32,
-    /// Smallest difference that counts as moving, counts, 0... . If absent: from the deviation typical of the whole image.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub min_difference: Option<f32>,
-    /// Time constant of the background, s, above 0. Shorter follows the light faster and absorbs slow targets.
-    pub time_constant_s: f64,
-    /// Time constant with which moving pixels enter the background, s, above 0. A target that stands is lost after about
-    /// this time.
-    pub standing_time_s: f64,
-    /// Time constant with which moving pixels that look like the background beside them enter it, s, above 0.
-    pub ghost_time_s: f64,
-    /// Time in which everything is learned at first, s, 0... .
-    pub start_s: f64,
-    /// Whether the light of the whole frame is followed at once (clouds, automatic exposure).
-    pub follow_light: bool,
-    /// Whether a pixel may fit the background of one of its 8 neighbours: forgives a shake of 1 px, costs edges.
-    pub shake: bool,
-    /// What is taken for shadow; absent: nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shadow: Option<ShadowConfig>,
-    /// How the moving pixels are cleaned.
-    pub clean_up: CleanUp,
-}
-
-impl Default for BackgroundConfig {
-    fn default() -> Self {
-        Self {
-            threshold_sd: 6.0,
-            min_difference: None,
-            time_constant_s: 10.0,
-            standing_time_s: 60.0,
-            ghost_time_s: 2.0,
-            start_s: 1.0,
-            follow_light: true,
-            shake: false,
-            shadow: Some(ShadowConfig::default()),
-            clean_up: CleanUp::Majority,
-        }
-    }
-}
-
-impl BackgroundConfig {
-    /// Checks the parameters; `at` is the key of this part, for messages.
-    /// # Errors
-    /// The first parameter out of its range.
-    pub fn validate(&self, at: &str) -> Result<()> {
-        let wrong = |key: &str, value: f64, expected: &str, hint: &str| {
-            Err(Error::new(ErrorKind::Config, format!("expected {expected}"))
-                .at(format!("{at}.{key} = {value}"))
-                .hint(hint))
-        };
-        if !(1.0..=50.0).contains(&self.threshold_sd) {
-            let hint = "6 leaves few noisy pixels";
-            return wrong("threshold-sd", self.threshold_sd.into(), "a number from 1 to 50", hint);
-        }
-        if let Some(d) = self.min_difference
-            && !(d >= 0.0 && d.is_finite())
-        {
-            return wrong("min-difference", d.into(), "0 or more counts", "leave it out to take it from the noise");
-        }
-        for (key, value) in [
-            ("time-constant-s", self.time_constant_s),
-            ("standing-time-s", self.standing_time_s),
-            ("ghost-time-s", self.ghost_time_s),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                return wrong(key, value, "a time above 0 s", "10 s suits the light of day, 60 s a standing target");
-            }
-        }
-        if !(self.start_s >= 0.0 && self.start_s.is_finite()) {
-            return wrong("start-s", self.start_s, "a time of 0 s or more", "1 s averages the first frames");
-        }
-        if let Some(s) = &self.shadow {
-            if !(s.darkest > 0.0 && s.darkest < s.lightest && s.lightest <= 1.0) {
-                let hint = "0.6 to 0.97 fits sunlit ground";
-                return wrong("shadow.darkest", s.darkest.into(), "0 < darkest < lightest <= 1", hint);
-            }
-            if !(s.spread > 0.0 && s.spread.is_finite()) {
-                return wrong("shadow.spread", s.spread.into(), "a ratio above 0", "0.03 forgives 3 % of texture");
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Fewest of the row's updates a time constant: a rate below 1/32 would drown in the rounding of the fixed-point model.
 const SLOWEST_RATE: f64 = 1.0 / 32.0;
 /// A row waits at most this many frames for its update.
 const MOST_FRAMES: u64 = 32;
+/// Samples that the start-up keeps for the median.
+const START_SAMPLES: usize = 11;
 /// The grid on which the light is estimated takes one pixel in 8 both ways.
 const GRID_PX: usize = 8;
 
@@ -141,6 +53,8 @@ pub struct Background<T: BackgroundPixel> {
     n_frames: u64,
     /// Frames that the start-up has averaged (0: nothing is known yet).
     n_averaged: u64,
+    /// Frames of the start-up, evenly spread in time.
+    samples: Vec<Image<T>>,
     typical: f32,
     light: Light,
     grid: Grid,
@@ -165,6 +79,7 @@ impl<T: BackgroundPixel> Background<T> {
             now_s: 0.0,
             n_frames: 0,
             n_averaged: 0,
+            samples: Vec::new(),
             typical: 1.0,
             light: light::SAME,
             grid: Grid::default(),
@@ -188,13 +103,23 @@ impl<T: BackgroundPixel> Background<T> {
             return Err(size_changed(w, h, other.width(), other.height()));
         }
         self.restart(w, h);
+        self.learn_median(frames);
+        Ok(())
+    }
+
+    /// Sets the model to median and deviation of frames that all have the model's size.
+    fn learn_median(&mut self, frames: &[&Image<T>]) {
+        let (w, h) = (self.mean.width(), self.mean.height());
         let mut values = Vec::with_capacity(frames.len());
         for y in 0..h {
             let rows: Vec<&[T]> = frames.iter().map(|f| f.row(y)).collect();
             let (means, deviations) = (self.mean.row_mut(y), self.deviation.row_mut(y));
             for x in 0..w {
                 values.clear();
-                values.extend(rows.iter().map(|r| r[x].to_f64() as f32));
+                values.extend(rows.iter().map(|r| r[x].to_f32()).filter(|v| v.is_finite()));
+                if values.is_empty() {
+                    continue;
+                }
                 let middle = values.len() / 2;
                 let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
                 values.iter_mut().for_each(|v| *v = (*v - median).abs());
@@ -205,7 +130,6 @@ impl<T: BackgroundPixel> Background<T> {
         }
         self.n_averaged = u64::MAX;
         self.typical = self.typical_deviation();
-        Ok(())
     }
 
     /// Takes the next frame, `dt_s` seconds after the last (any number for the first): finds the moving pixels and learns.
@@ -227,10 +151,10 @@ impl<T: BackgroundPixel> Background<T> {
             self.now_s += dt_s;
         }
         self.raw.reset(w, h);
-        if self.n_averaged < u64::MAX && self.now_s > self.config.start_s && self.n_averaged > 1 {
-            self.n_averaged = u64::MAX;
+        if self.is_starting() {
+            self.sample(frame);
         }
-        let starting = self.n_averaged < u64::MAX;
+        let starting = self.is_starting();
         if self.n_averaged == 0 {
             self.learn_first(frame);
         } else {
@@ -281,8 +205,22 @@ impl<T: BackgroundPixel> Background<T> {
         self.updated_s.resize(h, 0.0);
         self.states.clear();
         self.states.resize(w.next_multiple_of(64), STILL);
+        self.samples.clear();
         (self.now_s, self.n_frames, self.n_averaged) = (0.0, 0, 0);
         self.light = light::SAME;
+    }
+
+    /// Keeps a frame of the start-up, or ends it with the median of those kept.
+    fn sample(&mut self, frame: &Image<T>) {
+        let start_s = self.config.start_s;
+        let due_s = start_s * self.samples.len() as f64 / (START_SAMPLES - 1) as f64;
+        if self.now_s >= due_s && self.samples.len() < START_SAMPLES {
+            self.samples.push(frame.clone());
+        }
+        if self.now_s >= start_s && self.n_averaged > 1 {
+            let samples = std::mem::take(&mut self.samples);
+            self.learn_median(&samples.iter().collect::<Vec<_>>());
+        }
     }
 
     fn learn_first(&mut self, frame: &Image<T>) {
@@ -346,7 +284,7 @@ impl<T: BackgroundPixel> Background<T> {
         let means = [self.mean.row(above), self.mean.row(y), self.mean.row(below)];
         let deviations = [self.deviation.row(above), self.deviation.row(y), self.deviation.row(below)];
         let light = (self.light.gain, self.light.offset);
-        let last = frame.width() - 1;
+        let last = frame.width().saturating_sub(1);
         for (i, word) in self.raw.row_mut(y).iter_mut().enumerate() {
             let mut left = *word;
             while left != 0 {
@@ -376,19 +314,20 @@ impl<T: BackgroundPixel> Background<T> {
         let per_frame = rate(dt_s, self.config.time_constant_s).max(1e-9);
         let period = if starting { 1 } else { ((SLOWEST_RATE / per_frame) as u64).clamp(1, MOST_FRAMES) };
         for y in 0..h {
-            if (self.n_frames + y as u64) % period != 0 {
+            if !(self.n_frames + y as u64).is_multiple_of(period) {
                 continue;
             }
             let time_s = self.now_s - self.updated_s[y];
             self.updated_s[y] = self.now_s;
             let rates = if starting {
                 let rate = 1.0 / (self.n_averaged + 1) as f32;
-                Rates { still: rate, moving: rate, ghost: rate }
+                Rates { still: rate, moving: rate, ghost: rate, cautious: true }
             } else {
                 Rates {
                     still: rate(time_s, self.config.time_constant_s) as f32,
                     moving: rate(time_s, self.config.standing_time_s) as f32,
                     ghost: rate(time_s, self.config.ghost_time_s) as f32,
+                    cautious: false,
                 }
             };
             self.states.fill(STILL);
@@ -397,7 +336,7 @@ impl<T: BackgroundPixel> Background<T> {
             adapt(frame.row(y), &self.states, terms, &steps, self.mean.row_mut(y), self.deviation.row_mut(y));
         }
         // The typical deviation moves slowly: once in a while is enough.
-        if starting || self.n_frames % 16 == 0 {
+        if starting || self.n_frames.is_multiple_of(16) {
             self.typical = self.typical_deviation();
         }
     }

@@ -30,6 +30,8 @@ pub struct Rates {
     pub moving: f32,
     /// Of pixels that look like the background beside them.
     pub ghost: f32,
+    /// Whether a still pixel's distance counts only up to three deviations: at the start, when targets are not told apart.
+    pub cautious: bool,
 }
 
 /// A pixel type with its model.
@@ -87,6 +89,7 @@ pub struct FixedSteps {
     still: i16,
     moving: i16,
     ghost: i16,
+    cautious: bool,
 }
 
 /// Rounded product of a level and a 15-bit fraction.
@@ -118,7 +121,7 @@ impl BackgroundPixel for u8 {
     }
     fn steps(r: &Rates) -> FixedSteps {
         let fixed = |rate: f32| (rate * 32_768.0).round() as i16;
-        FixedSteps { still: fixed(r.still), moving: fixed(r.moving), ghost: fixed(r.ghost) }
+        FixedSteps { still: fixed(r.still), moving: fixed(r.moving), ghost: fixed(r.ghost), cautious: r.cautious }
     }
     fn level(counts: f32) -> i16 {
         (counts * 128.0).round() as i16
@@ -144,6 +147,8 @@ impl BackgroundPixel for u8 {
         let rate = if state == GHOST { s.ghost } else { s.moving };
         let rate = if still { 0 } else { rate };
         let mean = mean + share(v - mean, rate);
+        // What moves is a target, not noise: it may widen the deviation only slowly (flags, leaves, water).
+        let r = if still & !s.cautious { r } else { r.min(deviation.max(t.floor).saturating_mul(3)) };
         let rate = if still { s.still } else { s.moving };
         (mean, deviation + share(r - deviation, rate))
     }
@@ -187,8 +192,10 @@ macro_rules! float_pixel {
                 let rate = if state == GHOST { s.ghost } else { s.moving };
                 let rate = if still { 0.0 } else { rate };
                 let m = m + (v - m) * rate;
+                let r = (v - lit).abs();
+                let r = if still & !s.cautious { r } else { r.min(3.0 * deviation.max(t.floor)) };
                 let rate = if still { s.still } else { s.moving };
-                (m, deviation + ((v - lit).abs() - deviation) * rate)
+                (m, deviation + (r - deviation) * rate)
             }
         }
     };
@@ -205,7 +212,7 @@ mod tests {
     #[test]
     fn a_still_pixel_reaches_its_value_and_its_deviation() {
         fn settle<T: BackgroundPixel>(a: T, b: T) -> (f32, f32) {
-            let (t, s) = (T::terms(&LIGHT), T::steps(&Rates { still: 0.05, moving: 0.0, ghost: 0.0 }));
+            let (t, s) = (T::terms(&LIGHT), T::steps(&Rates { still: 0.05, moving: 0.0, ghost: 0.0, cautious: false }));
             let (mut m, mut d) = (T::level(80.0), T::level(10.0));
             for i in 0..2000 {
                 (m, d) = (if i % 2 == 0 { a } else { b }).adapt(m, d, STILL, &t, &s);

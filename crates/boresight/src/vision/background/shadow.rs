@@ -24,7 +24,7 @@ pub struct ShadowConfig {
 
 impl Default for ShadowConfig {
     fn default() -> Self {
-        Self { darkest: 0.6, lightest: 0.97, spread: 0.03 }
+        Self { darkest: 0.5, lightest: 0.97, spread: 0.2 }
     }
 }
 
