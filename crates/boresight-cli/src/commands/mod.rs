@@ -1,6 +1,8 @@
 //! One file a command: its arguments and what it does.
 
 pub mod completions;
+#[allow(dead_code)] // until the command line names it
+pub mod reproduce;
 mod run_options;
 pub mod simulate;
 pub mod track;

@@ -3,13 +3,17 @@
 //! [`ITEMS`] lists what can be reproduced; each item gives sections (a table under one reading, with a sentence that says what
 //! it means) and figures. Runs are spread over all cores and gathered in order: the same seed gives the same numbers.
 
+mod figures;
 pub mod follow;
+pub mod html;
 pub mod initiation;
 pub mod item;
 pub mod printed;
 pub mod scene_study;
 pub mod score;
 mod sensor_fusion;
+mod spatial;
+mod srif;
 pub mod study;
 mod tracking;
 
@@ -37,5 +41,15 @@ pub const ITEMS: &[Item] = &[
         what: "D1 Table 4.4: track fusion with loss",
         studies: 2,
         make: sensor_fusion::table_44,
+    },
+    Item { name: "srif-1", what: "D3 Table 1: CTSRIF and CTFSRIF", studies: 1, make: srif::table_1 },
+    Item { name: "srif-2", what: "D3 Table 2: CTSRIF and CTFSRIF", studies: 1, make: srif::table_2 },
+    Item { name: "srif-3-4", what: "D3 Tables 3, 4: two imagers and their fusion", studies: 2, make: srif::tables_3_4 },
+    Item { name: "filters-4.2", what: "D1 Figure 4.2: mean and median filters", studies: 1, make: spatial::figure_42 },
+    Item {
+        name: "figures",
+        what: "D0, D1, D3: the figures of tracking, from one run",
+        studies: 0,
+        make: figures::figures,
     },
 ];

@@ -5,7 +5,7 @@
 //! Coordinates: the papers' world counts pixels from 1 (percentage errors depend on it); the 1 is added here.
 //! Units: px, px/scan. Cost: one 64 x 64 frame of data set II about 20 µs a reading.
 
-use crate::sim::{SceneConfig, Seed};
+use crate::sim::{SceneConfig, SceneSource, Seed};
 use crate::vision::centroid::{Surroundings, centroid};
 use crate::vision::cluster::Clusterer;
 use crate::vision::config::{CentroidMethod, ClusterConfig};
@@ -64,7 +64,13 @@ pub struct SceneRun {
 /// # Errors
 /// A scene that is not one of 8-bit frames.
 pub fn run_scene(scene: &SceneConfig, seed: Seed, readings: &[Reading]) -> Result<SceneRun> {
-    let mut source = scene.build(seed)?;
+    run_scene_of(scene.build(seed)?, readings)
+}
+
+/// Segments a scene that is already built, in each reading.
+/// # Errors
+/// As [`run_scene`].
+pub fn run_scene_of(mut source: SceneSource, readings: &[Reading]) -> Result<SceneRun> {
     let mut out = SceneRun { truth: Vec::new(), centroids: vec![Vec::new(); readings.len()] };
     // One clusterer for each way of linking.
     let linking = |inclusive| ClusterConfig { distance_px: PROXIMITY_PX, inclusive, ..ClusterConfig::default() };
@@ -74,7 +80,7 @@ pub fn run_scene(scene: &SceneConfig, seed: Seed, readings: &[Reading]) -> Resul
         .map(|i| (i, Clusterer::new(&linking(i))))
         .collect();
     let around = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
-    let mut bits = vec![0u64; words(scene.width_px)];
+    let mut bits = vec![0u64; words(source.config().width_px)];
     while let Some(frame) = source.next_frame()? {
         let Pixels::Gray8(image) = &frame.pixels else {
             return Err(Error::new(ErrorKind::Config, "the papers' scenes have 8-bit frames").at("scene.bits"));

@@ -10,7 +10,7 @@ use super::score::{four_numbers, lost};
 use crate::Result;
 use crate::sim::{SceneConfig, Seed};
 use boresight_filters::model::ConstantVelocity;
-use boresight_filters::{Gaussian, Kf, Start, Ud};
+use boresight_filters::{FuzzySrif, Gaussian, Kf, Srif, Start, Ud};
 use nalgebra::{Vector2, Vector4};
 use rayon::prelude::*;
 
@@ -35,6 +35,10 @@ pub enum FilterKind {
     Kf,
     /// U-D filter (CTUDF).
     Ud,
+    /// Square-root information filter (CTSRIF).
+    Srif,
+    /// The same with the fuzzy-logic correlator (CTFSRIF).
+    FuzzySrif,
 }
 
 /// One way to follow the target of a scene.
@@ -113,6 +117,10 @@ pub fn estimates(job: &Job, scans: &[Vec<Vector2<f64>>], truth: &[Vector4<f64>])
     let all = |_| false;
     match job.filter {
         FilterKind::Kf => follow(|b: Gaussian<4>| Ok(Kf::<_, 4>::start(model, b)?), &job.tuning, scans, truth, all),
+        FilterKind::Srif => follow(|b: Gaussian<4>| Ok(Srif::<_, 4>::start(model, b)?), &job.tuning, scans, truth, all),
+        FilterKind::FuzzySrif => {
+            follow(|b: Gaussian<4>| Ok(<FuzzySrif<_, 4>>::start(model, b)?), &job.tuning, scans, truth, all)
+        }
         FilterKind::Ud => follow(|b: Gaussian<4>| Ok(Ud::<_, 4>::start(model, b)?), &job.tuning, scans, truth, all),
     }
 }

@@ -57,7 +57,7 @@ fn the_tables_agree_with_the_specification_within_three_standard_errors() {
             }
         }
     }
-    assert!(n >= 136, "{n} numbers compared");
+    assert!(n >= 216, "{n} numbers compared");
 }
 
 #[test]
