@@ -1,6 +1,7 @@
 //! Repository chores: `cargo xtask <NAME>`.
 
 mod ir_exam;
+mod mot_table;
 mod video_check;
 
 use clap::{Parser, Subcommand};
@@ -17,6 +18,8 @@ struct Cli {
 enum Chore {
     /// Track the public infrared clips with no options and score the tracks.
     IrExam(ir_exam::Args),
+    /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
+    MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
     VideoCheck(video_check::Args),
 }
@@ -30,6 +33,7 @@ fn test_data() -> PathBuf {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
         Chore::IrExam(args) => ir_exam::exam(&args),
+        Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }
 }

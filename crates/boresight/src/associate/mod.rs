@@ -8,6 +8,7 @@ pub mod gates;
 pub mod global_nearest;
 pub mod grid;
 pub mod groups;
+pub mod jpda;
 pub mod nearest;
 pub mod pda;
 
@@ -37,6 +38,8 @@ pub enum AssociatorConfig {
     GlobalNearest(global_nearest::GlobalNearestConfig),
     /// Probabilistic data association: each track is corrected by all its gated detections, weighted.
     Pda(pda::PdaConfig),
+    /// Joint probabilistic data association: as PDA, but no detection counts for two tracks at once.
+    Jpda(jpda::JpdaConfig),
 }
 
 impl Default for AssociatorConfig {
@@ -49,8 +52,11 @@ impl AssociatorConfig {
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
-    pub fn validate(&self, _at: &str) -> Result<()> {
-        Ok(())
+    pub fn validate(&self, at: &str) -> Result<()> {
+        match self {
+            Self::Jpda(c) => c.validate(at),
+            Self::Nearest(_) | Self::GlobalNearest(_) | Self::Pda(_) => Ok(()),
+        }
     }
 
     /// Builds the associator.
@@ -59,11 +65,12 @@ impl AssociatorConfig {
             Self::Nearest(c) => Box::new(nearest::Nearest::new(c)),
             Self::GlobalNearest(c) => Box::new(global_nearest::GlobalNearest::new(c)),
             Self::Pda(c) => Box::new(pda::Pda::new(c)),
+            Self::Jpda(c) => Box::new(jpda::Jpda::new(c)),
         }
     }
 
     /// Whether a detection may correct more than one track, or a track take more than one detection.
     pub fn is_soft(&self) -> bool {
-        matches!(self, Self::Pda(_))
+        matches!(self, Self::Pda(_) | Self::Jpda(_))
     }
 }

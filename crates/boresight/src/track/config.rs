@@ -1,8 +1,12 @@
 //! The tracker's configuration: every choice is an enum, every number has a unit and a range.
 
 use super::birth::BirthConfig;
+use super::clutter::ClutterConfig;
 use super::life::LifeConfig;
+use super::mht::MhtConfig;
 use super::proof::ProofConfig;
+use super::sharing::SharingConfig;
+use super::terms::TermsConfig;
 use crate::associate::AssociatorConfig;
 use crate::{Error, ErrorKind, Result};
 use boresight_filters::{Filter, Gaussian};
@@ -18,6 +22,11 @@ pub struct TrackerConfig {
     /// Standard deviation of the target's acceleration, px/s², above 0; larger follows manoeuvres, smaller smooths more.
     /// 28 px/s² is 0.03 px per frame² at 30 frames/s.
     pub acceleration_std_px_per_s2: f64,
+    /// Acceleration added to it in proportion to the target's box, 1/s²: `box height × this`, 0 or more. For scenes with
+    /// near and far targets, where a tall box moves more pixels.
+    pub acceleration_of_size_per_s2: f64,
+    /// Measurement noise in proportion to the detection's box: `box height × this` per axis, standard deviation, 0 or more.
+    pub extra_noise_of_size: f64,
     /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
     pub extra_noise_px: f64,
     /// Probability that a target's detection lies in its gate, in (0, 1); the gate is χ² with 2 degrees of freedom.
@@ -30,14 +39,28 @@ pub struct TrackerConfig {
     pub detection_probability: f64,
     /// False detections per px² and scan, 0 or more (used by every method that weighs detections against clutter).
     pub clutter_density_per_px2: f64,
+    /// Whether that density is taken as given, or estimated from the scans.
+    pub clutter: ClutterConfig,
     /// How detections are shared out among tracks.
     pub associator: AssociatorConfig,
+    /// Multiple-hypothesis tracking instead of an associator (which is then not used); left out: decisions are made at once.
+    pub mht: Option<MhtConfig>,
     /// When a track is believed and when it is given up.
     pub life: LifeConfig,
     /// How tracks start.
     pub birth: BirthConfig,
     /// What a new track must show, beside its life's rule, before it is reported as confirmed.
     pub proof: ProofConfig,
+    /// What a pair costs beside position: size, intensity, class, overlap.
+    pub terms: TermsConfig,
+    /// A second look at weak detections for tracks that found no strong one; left out: all detections are equal.
+    pub two_stage: Option<TwoStageConfig>,
+    /// Sharing of merged detections; left out: a detection belongs to one track only.
+    pub sharing: Option<SharingConfig>,
+    /// Two confirmed tracks that follow the same detections this long become one, s, above 0; the younger ends.
+    pub duplicate_s: f64,
+    /// How fast a track's box and intensity follow its detections, in (0, 1]; 1 takes the newest box as it is.
+    pub look_gain: f64,
     /// A confirmed track without detections is kept this long, s, 0 or more.
     pub coast_s: f64,
     /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
@@ -53,21 +76,46 @@ impl Default for TrackerConfig {
         Self {
             filter: FilterConfig::default(),
             acceleration_std_px_per_s2: 28.0,
+            acceleration_of_size_per_s2: 0.0,
+            extra_noise_of_size: 0.0,
             extra_noise_px: 0.3,
             gate_probability: 0.99,
             max_speed_px_per_s: 150.0,
             gate_within_max_speed: true,
             detection_probability: 0.9,
             clutter_density_per_px2: 1e-5,
+            clutter: ClutterConfig::default(),
             associator: AssociatorConfig::default(),
+            mht: None,
             life: LifeConfig::default(),
             birth: BirthConfig::default(),
             proof: ProofConfig::default(),
+            terms: TermsConfig::default(),
+            two_stage: None,
+            sharing: Some(SharingConfig::default()),
+            duplicate_s: 0.5,
+            look_gain: 0.3,
             coast_s: 0.5,
             coast_scans: 5,
             max_tracks: 250_000,
             max_gated: 64,
         }
+    }
+}
+
+/// A second look at weak detections (Y. Zhang et al., "ByteTrack", ECCV 2022).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TwoStageConfig {
+    /// Detections with at least this score are strong: they may start tracks and are shared out first.
+    pub high_score: f32,
+    /// Detections with less than this score are not looked at at all; at most `high-score`.
+    pub low_score: f32,
+}
+
+impl Default for TwoStageConfig {
+    fn default() -> Self {
+        Self { high_score: 0.5, low_score: 0.1 }
     }
 }
 
@@ -104,11 +152,10 @@ impl TrackerConfig {
     }
 
     /// Builds the filter of a new track.
-    pub(super) fn belief(&self, start: &Gaussian<4>) -> super::belief::Belief {
+    pub(super) fn belief(&self, start: &Gaussian<4>, height_px: f64) -> super::belief::Belief {
+        let std = self.acceleration_std_px_per_s2.hypot(self.acceleration_of_size_per_s2 * height_px);
         match self.filter {
-            FilterConfig::Kf {} => {
-                super::belief::Belief::Cv(super::cv::ConstantVelocity::new(start, self.acceleration_std_px_per_s2))
-            }
+            FilterConfig::Kf {} => super::belief::Belief::Cv(super::cv::ConstantVelocity::new(start, std)),
         }
     }
 
@@ -147,9 +194,38 @@ impl TrackerConfig {
             "3 false detections in 640 x 512 px are 1e-5",
         )?;
         self.associator.validate(&format!("{at}.associator"))?;
+        if let Some(c) = &self.mht {
+            c.validate(&format!("{at}.mht"))?;
+        }
         self.life.validate(&format!("{at}.life"))?;
         self.birth.validate(&format!("{at}.birth"))?;
         self.proof.validate(&format!("{at}.proof"))?;
+        self.clutter.validate(&format!("{at}.clutter"))?;
+        self.terms.validate(&format!("{at}.terms"))?;
+        if let Some(c) = &self.two_stage {
+            check(
+                c.low_score <= c.high_score,
+                &format!("{at}.two-stage"),
+                "low-score",
+                c.low_score,
+                "at most high-score",
+                "0.1 and 0.5 suit detectors with scores in 0..1",
+            )?;
+        }
+        if let Some(c) = &self.sharing {
+            c.validate(&format!("{at}.sharing"))?;
+        }
+        positive(at, "duplicate-s", self.duplicate_s, "half a second is usual")?;
+        check(
+            self.look_gain > 0.0 && self.look_gain <= 1.0,
+            at,
+            "look-gain",
+            self.look_gain,
+            "a gain in (0, 1]",
+            "0.3 smooths over about five scans",
+        )?;
+        not_negative(at, "acceleration-of-size-per-s2", self.acceleration_of_size_per_s2, "1 suits people in video")?;
+        not_negative(at, "extra-noise-of-size", self.extra_noise_of_size, "0.05 is usual for detectors of people")?;
         not_negative(at, "coast-s", self.coast_s, "0.5 bridges half a second without detections")?;
         let whole = |ok: bool, key: &str, value: u32| {
             check(ok, at, key, value, "a whole number of 1 or more", "leave it out for the default")

@@ -7,6 +7,7 @@
 use super::config::TrackerConfig;
 use super::gating::{Predicted, ScanTable, innovation_cov, normalised_square};
 use super::life::LifeConfig;
+use super::sharing::Part;
 use super::tracker::{Outcome, Track};
 use crate::Scan;
 use crate::associate::{Gates, Share};
@@ -32,6 +33,7 @@ impl Scratch {
         gates: &Gates,
         row: usize,
         shares: &[Share],
+        config: &TrackerConfig,
     ) -> Outcome {
         let prior = gates.prior(row);
         let missed = Outcome { ratio: 1.0 - prior.p_detection * prior.p_gate, ..Outcome::default() };
@@ -47,9 +49,10 @@ impl Scratch {
         let nis = normalised_square(&residual, &cov);
         let clutter = gates.clutter(share.detection);
         let density = (-0.5 * nis).exp() / (std::f64::consts::TAU * cov.determinant().sqrt());
-        track.seen(detection, &noise);
+        track.seen(detection, &noise, config.look_gain);
         Outcome {
             hit: true,
+            shared: false,
             detection: Some(share.detection),
             ratio: prior.p_detection * density / clutter,
             innovation: Some(Innovation { residual, cov, nis }),
@@ -101,15 +104,37 @@ impl Scratch {
         // With M-of-N any gated detection is a hit (SPEC D.5); else the target was seen if that is likelier than not.
         let hit = matches!(config.life, LifeConfig::MOfN(_)) || seen >= 0.5;
         if hit {
-            track.seen(&scan.detections[best.detection as usize], &table.noise(best.detection));
+            track.seen(&scan.detections[best.detection as usize], &table.noise(best.detection), config.look_gain);
         }
         let nis = normalised_square(&residual, &cov);
         Outcome {
             hit,
+            shared: false,
             detection: hit.then_some(best.detection),
             ratio,
             innovation: Some(Innovation { residual, cov, nis }),
         }
+    }
+}
+
+/// Corrects a track by its part of a shared detection; says nothing of its existence.
+pub(super) fn shared(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
+    let position = Vector2::from(part.position);
+    let measurement = Measurement { position, cov: part.noise.matrix() };
+    if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
+        return Outcome { ratio: 1.0, ..Outcome::default() };
+    }
+    let [x, y] = part.position;
+    track.anchor = [x, y, part.noise.xx.max(part.noise.yy).sqrt()];
+    let residual = position - Vector2::new(predicted.x, predicted.y);
+    let cov = innovation_cov(predicted, &part.noise);
+    let nis = normalised_square(&residual, &cov);
+    Outcome {
+        hit: true,
+        shared: !part.main,
+        detection: Some(part.detection),
+        ratio: 1.0,
+        innovation: Some(Innovation { residual, cov, nis }),
     }
 }
 

@@ -56,6 +56,8 @@ pub struct ScanTable {
     /// Largest variances in the scan, px².
     max_xx: f64,
     max_yy: f64,
+    /// Half of the widest and of the tallest box, px.
+    pub largest_half_px: [f64; 2],
     grid: UniformGrid,
 }
 
@@ -63,22 +65,27 @@ impl ScanTable {
     /// Checks a scan and takes its noise; nothing else changes before the check is over.
     /// # Errors
     /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
-    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64) -> Result<()> {
-        let extra = extra_noise_px * extra_noise_px;
+    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_of_size: f64) -> Result<()> {
         self.noise.clear();
         (self.max_xx, self.max_yy) = (0.0, 0.0);
+        self.largest_half_px = [0.0; 2];
         for (i, d) in scan.detections.iter().enumerate() {
+            let extra = extra_noise_px * extra_noise_px + (extra_of_size * d.extent.height_px).powi(2);
             let n = Noise {
                 xx: d.cov[(0, 0)] + extra,
                 xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
                 yy: d.cov[(1, 1)] + extra,
             };
-            let finite = (d.position.x + d.position.y + n.xx + n.xy + n.yy).is_finite();
+            let e = &d.extent;
+            let sides = e.left_px + e.top_px + e.width_px + e.height_px;
+            let finite = (d.position.x + d.position.y + n.xx + n.xy + n.yy + sides).is_finite();
             // Room for rounding: a covariance of rank one is a legal (if odd) measurement.
             let sound = d.cov[(0, 0)] >= 0.0 && d.cov[(1, 1)] >= 0.0 && n.xy * n.xy <= n.xx * n.yy * (1.0 + 1e-9);
             if !(finite && sound) {
                 return Err(refused(scan, i, d, finite));
             }
+            self.largest_half_px[0] = self.largest_half_px[0].max(0.5 * e.width_px);
+            self.largest_half_px[1] = self.largest_half_px[1].max(0.5 * e.height_px);
             if self.noise.len() == 1 && self.noise[0] == n {
                 continue;
             }
@@ -138,6 +145,9 @@ impl ScanTable {
                 let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
                 if distance2 <= gate && dx * dx + dy * dy <= reach2 {
                     let cost = distance2 + terms(p.index);
+                    if cost.is_infinite() {
+                        return looked_at < MOST_LOOKED_AT;
+                    }
                     let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
                     gates.push(Pair { detection: p.index, cost, log_likelihood });
                     gated += 1;
@@ -171,7 +181,7 @@ fn refused(scan: &Scan, i: usize, d: &Detection, finite: bool) -> Error {
     let what = if finite {
         format!("covariance {:?} is not positive semi-definite", d.cov.as_slice())
     } else {
-        format!("position {:?} or covariance {:?} is not finite", d.position.as_slice(), d.cov.as_slice())
+        format!("position {:?}, covariance {:?} or box is not finite", d.position.as_slice(), d.cov.as_slice())
     };
     Error::new(ErrorKind::Damaged, what)
         .at(format!("frame {}, detection {i}", scan.index.0))

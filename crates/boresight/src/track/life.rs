@@ -175,6 +175,8 @@ pub struct Life {
 pub struct Evidence {
     /// A detection was taken.
     pub hit: bool,
+    /// It belongs to another track as well: the track lives, but was not seen by itself.
+    pub shared: bool,
     /// Λ of this scan.
     pub ratio: f64,
 }
@@ -264,7 +266,9 @@ impl LifeConfig {
         life.entries = life.entries.saturating_add(1).min(64);
         if evidence.hit {
             life.misses = 0;
-            life.last_hit_ns = now_ns;
+            if !evidence.shared {
+                life.last_hit_ns = now_ns;
+            }
         } else {
             life.misses = life.misses.saturating_add(1);
         }
@@ -356,7 +360,7 @@ mod tests {
         let mut life = config.begin(points, 0, 1e-5, 1.0);
         hits.iter()
             .map(|h| {
-                let e = Evidence { hit: *h, ratio: if *h { 3f64.exp() } else { 0.11 } };
+                let e = Evidence { hit: *h, shared: false, ratio: if *h { 3f64.exp() } else { 0.11 } };
                 let v = config.advance(&mut life, e, 0);
                 (life.confirmed, v)
             })
@@ -385,7 +389,7 @@ mod tests {
         let c = LifeConfig::Existence(ExistenceConfig::default());
         let mut life = c.begin(1, 0, 4e-6, 1.0);
         assert!((c.existence(&life) - 0.2).abs() < 1e-12);
-        c.advance(&mut life, Evidence { hit: true, ratio: 8.0 }, 0);
+        c.advance(&mut life, Evidence { hit: true, shared: false, ratio: 8.0 }, 0);
         // 0.2 * 8 / (0.8 + 0.2 * 8) = 2/3.
         assert!((c.existence(&life) - 2.0 / 3.0).abs() < 1e-12);
         c.fade(&mut life, 0.9);

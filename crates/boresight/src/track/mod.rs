@@ -4,22 +4,30 @@
 
 mod belief;
 pub mod birth;
+pub mod clutter;
 pub mod config;
 mod correct;
 pub mod cv;
 pub mod gating;
 pub mod life;
+pub mod mht;
 mod pace;
 mod proof;
+pub mod sharing;
 pub mod stabilised;
 mod stage;
 mod starts;
+pub mod terms;
 pub mod tracker;
 
 pub use birth::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
-pub use config::{FilterConfig, TrackFilter, TrackerConfig};
+pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
+pub use config::{FilterConfig, TrackFilter, TrackerConfig, TwoStageConfig};
 pub use life::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+pub use mht::{Mht, MhtConfig};
 pub use proof::ProofConfig;
+pub use sharing::SharingConfig;
+pub use terms::{OverlapConfig, OverlapKind, TermsConfig};
 pub use tracker::Tracker;
 
 use crate::{Result, Scan, TrackState};
@@ -36,5 +44,9 @@ pub trait Tracking: Send {
 /// # Errors
 /// A value of the configuration outside its range.
 pub fn build(config: &TrackerConfig) -> Result<Box<dyn Tracking>> {
-    Ok(Box::new(stabilised::Stabilised::new(Box::new(Tracker::new(config)?))))
+    let inner: Box<dyn Tracking> = match &config.mht {
+        Some(mht) => Box::new(Mht::new(config, mht)?),
+        None => Box::new(Tracker::new(config)?),
+    };
+    Ok(Box::new(stabilised::Stabilised::new(inner)))
 }

@@ -3,18 +3,21 @@
 //! Source: SPEC D.5 (2), (3). Rows are tracks in ascending order; detections taken by an earlier stage are not seen.
 //! In soft stages (PDA and its kin) all gated detections count as used, as SPEC D.5 says.
 
+use super::clutter::Clutter;
 use super::config::TrackerConfig;
 use super::correct::Scratch;
 use super::gating::{Predicted, ScanTable};
 use super::tracker::{Outcome, Track};
 use crate::Scan;
-use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior};
+use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior, Share};
 
 /// An associator with its tables and the rows of this scan.
 pub(super) struct Stage {
     associator: Box<dyn Associator>,
     pub soft: bool,
     likelihood: bool,
+    /// What pairs may cost beside d².
+    terms_budget: f64,
     pub gates: Gates,
     pub answer: Assignment,
     rows: Vec<u32>,
@@ -22,12 +25,13 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    pub fn new(config: &AssociatorConfig) -> Self {
+    pub fn new(config: &AssociatorConfig, terms_budget: f64) -> Self {
         let associator = config.build();
         Self {
             likelihood: associator.needs_likelihood(),
             associator,
             soft: config.is_soft(),
+            terms_budget,
             gates: Gates::new(),
             answer: Assignment::new(),
             rows: Vec::new(),
@@ -35,9 +39,24 @@ impl Stage {
         }
     }
 
+    /// The rows, each with its track and its shares.
+    pub fn rows(&self) -> impl Iterator<Item = (u32, &[Share])> {
+        self.rows.iter().enumerate().map(|(row, i)| (*i, self.answer.row(row)))
+    }
+
+    /// Passes over the row of track `i`, if it has one here.
+    pub fn skip(&mut self, i: usize) {
+        if self.rows.get(self.cursor) == Some(&(i as u32)) {
+            self.cursor += 1;
+        }
+    }
+
     /// Begins a scan.
-    pub fn begin(&mut self, n_detections: usize, clutter_density: f64) {
-        self.gates.reset(n_detections, clutter_density);
+    pub fn begin(&mut self, scan: &Scan, clutter: &Clutter) {
+        self.gates.reset(scan.detections.len(), clutter.density());
+        if clutter.is_map() {
+            self.gates.set_clutter(scan.detections.iter().map(|d| clutter.at(d.position.x, d.position.y)));
+        }
         self.rows.clear();
         self.cursor = 0;
     }
@@ -53,14 +72,15 @@ impl Stage {
         gate: f64,
         config: &TrackerConfig,
         free: impl Fn(u32) -> bool,
+        terms: impl Fn(u32) -> f64,
     ) {
         self.rows.push(i as u32);
-        table.gate_row(track, gate, config.max_gated as usize, self.likelihood, free, |_| 0.0, &mut self.gates);
+        table.gate_row(track, gate, config.max_gated as usize, self.likelihood, free, terms, &mut self.gates);
         self.gates.end_row(Prior {
             p_detection: config.detection_probability,
             p_gate: config.gate_probability,
             existence,
-            miss_cost: gate,
+            miss_cost: gate + self.terms_budget,
         });
     }
 
@@ -100,7 +120,7 @@ impl Stage {
         Some(if self.soft {
             scratch.soft(track, predicted, scan, table, &self.gates, row, self.answer.row(row), config)
         } else {
-            scratch.hard(track, predicted, scan, table, &self.gates, row, self.answer.row(row))
+            scratch.hard(track, predicted, scan, table, &self.gates, row, self.answer.row(row), config)
         })
     }
 }

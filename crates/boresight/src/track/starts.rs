@@ -9,6 +9,7 @@ use super::birth::{BirthConfig, from_one_point, from_two_points};
 use super::config::TrackerConfig;
 use super::gating::{MOST_LOOKED_AT, Noise, normalised_square};
 use super::proof::Proof;
+use super::terms::Look;
 use super::tracker::{Outcome, Track, Tracker};
 use crate::Scan;
 use boresight_filters::{Filter, Measurement, Weighted};
@@ -22,10 +23,11 @@ pub(super) struct LeftOver {
 }
 
 /// Mean and variance of a new target's velocity (px/s, px²/s²), if anything is known of it.
-type VelocityPrior = Option<(Vector2<f64>, Vector2<f64>)>;
+pub(super) type VelocityPrior = Option<(Vector2<f64>, Vector2<f64>)>;
 
 impl BirthConfig {
-    fn velocity_prior(&self) -> VelocityPrior {
+    /// What is known of a new target's velocity.
+    pub(super) fn velocity_prior(&self) -> VelocityPrior {
         match self {
             Self::OnePoint(c) => Some((Vector2::zeros(), Vector2::repeat(c.velocity_std_px_per_s.powi(2)))),
             Self::TwoPoint(c) => c.velocity_std_px_per_s.map(|std| (Vector2::zeros(), Vector2::repeat(std * std))),
@@ -78,9 +80,9 @@ impl Tracker {
     }
 
     /// P_D l / λ of a second point when nothing is known of the velocity: uniform over what the speed lets it reach.
-    fn uniform_ratio(&self, dt_s: f64) -> f64 {
+    fn uniform_ratio(&self, dt_s: f64, clutter: f64) -> f64 {
         let area_px2 = std::f64::consts::PI * (self.config.max_speed_px_per_s * dt_s).powi(2);
-        self.config.detection_probability / (area_px2 * self.config.clutter_density_per_px2).max(1e-200)
+        self.config.detection_probability / (area_px2 * clutter).max(1e-200)
     }
 
     /// Starts one track from a detection, and the left-over before it if there is one.
@@ -91,7 +93,7 @@ impl Tracker {
         let (belief, ratio) = match (first, prior) {
             (Some(first), Some((velocity, variance))) => {
                 let start = from_one_point(&first.position, &first.noise.matrix(), velocity, variance);
-                let mut belief = config.belief(&start);
+                let mut belief = config.belief(&start, d.extent.height_px);
                 if belief.predict(dt_s).is_err() {
                     return;
                 }
@@ -103,23 +105,30 @@ impl Tracker {
                 if belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
                     return;
                 }
-                (belief, config.detection_probability * density / config.clutter_density_per_px2.max(1e-200))
+                (
+                    belief,
+                    config.detection_probability * density / self.clutter.at(d.position.x, d.position.y).max(1e-200),
+                )
             }
             (Some(first), None) => {
                 let start = from_two_points(&first.position, &first.noise.matrix(), &d.position, &n.matrix(), dt_s);
-                (config.belief(&start), self.uniform_ratio(dt_s))
+                (
+                    config.belief(&start, d.extent.height_px),
+                    self.uniform_ratio(dt_s, self.clutter.at(d.position.x, d.position.y)),
+                )
             }
             (None, prior) => {
                 let (velocity, variance) = prior.unwrap_or_default();
-                (config.belief(&from_one_point(&d.position, &n.matrix(), velocity, variance)), 1.0)
+                (config.belief(&from_one_point(&d.position, &n.matrix(), velocity, variance), d.extent.height_px), 1.0)
             }
         };
         let n_points = if first.is_some() { 2 } else { 1 };
         let mut track = Track {
             id: self.next_id,
             belief,
-            life: config.life.begin(n_points, scan.time.ns, config.clutter_density_per_px2, ratio),
-            size: [d.extent.width_px, d.extent.height_px],
+            life: config.life.begin(n_points, scan.time.ns, self.clutter.at(d.position.x, d.position.y), ratio),
+            look: Look::of(d),
+            twin_since_ns: None,
             anchor: [d.position.x, d.position.y, n.xx.max(n.yy).sqrt()],
             proof: Proof::begin([d.position.x, d.position.y], d.score),
         };

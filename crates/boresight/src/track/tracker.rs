@@ -10,14 +10,17 @@
 
 use super::Tracking;
 use super::belief::Belief;
+use super::clutter::Clutter;
 use super::config::TrackerConfig;
-use super::correct::Scratch;
+use super::correct::{Scratch, shared};
 use super::gating::{Noise, Predicted, ScanTable};
 use super::life::{Evidence, Life, Verdict};
 use super::pace::Pace;
 use super::proof::Proof;
+use super::sharing::Sharing;
 use super::stage::Stage;
 use super::starts::LeftOver;
+use super::terms::{Look, Terms};
 use crate::associate::AssociatorConfig;
 use crate::record::Innovation;
 use crate::{Detection, Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
@@ -30,8 +33,9 @@ pub(super) struct Track {
     pub id: u64,
     pub belief: Belief,
     pub life: Life,
-    /// Smoothed width and height of the box, px.
-    pub size: [f64; 2],
+    pub look: Look,
+    /// Since when it follows the same detections as an older track, ns.
+    pub twin_since_ns: Option<i64>,
     /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
     pub anchor: [f64; 3],
     /// What it has shown beside its life's rule.
@@ -42,6 +46,8 @@ pub(super) struct Track {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Outcome {
     pub hit: bool,
+    /// The detection is shared, and mainly another track's.
+    pub shared: bool,
     /// The detection of the largest weight.
     pub detection: Option<u32>,
     /// Λ of the scan.
@@ -49,8 +55,8 @@ pub(super) struct Outcome {
     pub innovation: Option<Innovation>,
 }
 
-/// How much a new box moves the smoothed one.
-const SIZE_GAIN: f64 = 0.3;
+/// No track took it.
+const NONE: u32 = u32::MAX;
 
 /// The tracker.
 pub struct Tracker {
@@ -60,8 +66,19 @@ pub struct Tracker {
     predicted: Vec<Predicted>,
     pub(super) table: ScanTable,
     pub(super) used: Vec<bool>,
-    /// Confirmed tracks, then tentative ones.
-    stages: [Stage; 2],
+    /// Confirmed tracks, tentative ones, and confirmed ones again with the weak detections.
+    stages: [Stage; 3],
+    terms: Terms,
+    pub(super) clutter: Clutter,
+    sharing: Sharing,
+    /// Which confirmed track took each detection, and which confirmed tracks took none.
+    taker: Vec<u32>,
+    silent: Vec<u32>,
+    /// Whether the associator is soft, and whether a detection already has an owner (then tracks may be twins).
+    is_soft: bool,
+    owner: Vec<bool>,
+    /// Detections taken by confirmed tracks.
+    believed: Vec<bool>,
     tentative: Vec<u32>,
     scratch: Scratch,
     pub(super) left_over: Vec<LeftOver>,
@@ -78,9 +95,18 @@ impl Tracker {
     /// A value of the configuration outside its range.
     pub fn new(config: &TrackerConfig) -> Result<Self> {
         config.validate("tracker")?;
+        let (hard, budget) = (AssociatorConfig::default(), config.terms.budget());
         Ok(Self {
             gate: config.gate(),
-            stages: [Stage::new(&config.associator), Stage::new(&AssociatorConfig::default())],
+            stages: [Stage::new(&config.associator, budget), Stage::new(&hard, budget), Stage::new(&hard, budget)],
+            terms: Terms::new(&config.terms),
+            clutter: Clutter::new(&config.clutter, config.clutter_density_per_px2),
+            sharing: Sharing::default(),
+            taker: Vec::new(),
+            silent: Vec::new(),
+            is_soft: config.associator.is_soft(),
+            owner: Vec::new(),
+            believed: Vec::new(),
             tentative: Vec::new(),
             scratch: Scratch::default(),
             config: config.clone(),
@@ -119,7 +145,10 @@ impl Tracker {
     }
 
     /// Predicts every track, and gates the confirmed ones while they are at hand.
-    fn predict(&mut self, dt_s: f64, now: Timestamp) -> Result<()> {
+    fn predict(&mut self, dt_s: f64, scan: &Scan) -> Result<()> {
+        let now = scan.time;
+        let high = self.config.two_stage.as_ref().map_or(f32::NEG_INFINITY, |c| c.high_score);
+        let plain = self.config.two_stage.is_none() && !self.config.terms.any();
         self.predicted.clear();
         self.tentative.clear();
         let speed = self.config.max_speed_px_per_s;
@@ -142,7 +171,15 @@ impl Tracker {
             self.predicted.push(predicted);
             if t.life.confirmed {
                 let existence = self.config.life.existence(&t.life);
-                self.stages[0].add(i, &predicted, existence, &self.table, self.gate, &self.config, |_| true);
+                let stage = &mut self.stages[0];
+                if plain {
+                    stage.add(i, &predicted, existence, &self.table, self.gate, &self.config, |_| true, |_| 0.0);
+                } else {
+                    let (terms, look) = (&self.terms, &t.look);
+                    let strong = |j: u32| scan.detections[j as usize].score >= high;
+                    let cost = |j: u32| terms.cost(predicted.x, predicted.y, look, &scan.detections[j as usize]);
+                    stage.add(i, &predicted, existence, &self.table, self.gate, &self.config, strong, cost);
+                }
             } else {
                 self.tentative.push(i as u32);
             }
@@ -150,42 +187,116 @@ impl Tracker {
         Ok(())
     }
 
-    /// Associates: the confirmed tracks first, then the tentative ones with what is left.
-    fn associate(&mut self) {
+    /// Adds a track to a later stage, with the detections that are free and score at least `least_score`.
+    fn add_later(&mut self, stage: usize, i: usize, scan: &Scan, least_score: f32) {
+        let t = &self.tracks[i];
+        let p = &self.predicted[i];
+        let (used, terms) = (&self.used, &self.terms);
+        let free = |j: u32| !used[j as usize] && scan.detections[j as usize].score >= least_score;
+        let cost = |j: u32| terms.cost(p.x, p.y, &t.look, &scan.detections[j as usize]);
+        let existence = self.config.life.existence(&t.life);
+        self.stages[stage].add(i, p, existence, &self.table, self.gate, &self.config, free, cost);
+    }
+
+    /// Associates: the confirmed tracks first, then the tentative ones with what is left, then weak detections.
+    fn associate(&mut self, scan: &Scan) {
+        let high = self.config.two_stage.as_ref().map_or(f32::NEG_INFINITY, |c| c.high_score);
         self.stages[0].solve(&mut self.used);
-        for i in &self.tentative {
-            let i = *i as usize;
-            let existence = self.config.life.existence(&self.tracks[i].life);
-            let used = &self.used;
-            self.stages[1]
-                .add(i, &self.predicted[i], existence, &self.table, self.gate, &self.config, |j| !used[j as usize]);
+        self.silent.clear();
+        self.taker.clear();
+        let sharing = self.config.sharing.is_some() && self.table.largest_half_px != [0.0; 2];
+        if sharing || self.config.two_stage.is_some() {
+            self.taker.resize(scan.detections.len(), NONE);
+            for (i, shares) in self.stages[0].rows() {
+                match shares {
+                    [] => self.silent.push(i),
+                    [one] => self.taker[one.detection as usize] = i,
+                    _ => {}
+                }
+            }
         }
+        if let Some(low) = self.config.two_stage.as_ref().map(|c| c.low_score) {
+            let silent = std::mem::take(&mut self.silent);
+            for i in &silent {
+                self.add_later(2, *i as usize, scan, low);
+            }
+            self.silent = silent;
+            self.stages[2].solve(&mut self.used);
+            self.silent.clear();
+            for (i, shares) in self.stages[2].rows() {
+                match shares {
+                    [one] => self.taker[one.detection as usize] = i,
+                    _ => self.silent.push(i),
+                }
+            }
+        }
+        self.believed.clone_from(&self.used);
+        let tentative = std::mem::take(&mut self.tentative);
+        for i in &tentative {
+            self.add_later(1, *i as usize, scan, high);
+        }
+        self.tentative = tentative;
         self.stages[1].solve(&mut self.used);
+        self.sharing.parts.clear();
+        if let (true, Some(config)) = (sharing && !self.silent.is_empty(), &self.config.sharing) {
+            let tracks = &self.tracks;
+            let half = self.table.largest_half_px;
+            let look = |i: u32| tracks[i as usize].look;
+            self.sharing.find(config, scan, &self.table, &self.predicted, look, &self.taker, &self.silent, half);
+            for part in &self.sharing.parts {
+                self.used[part.detection as usize] = true;
+            }
+        }
+        // Weak detections start nothing.
+        if self.config.two_stage.is_some() {
+            for (used, d) in self.used.iter_mut().zip(&scan.detections) {
+                *used |= d.score < high;
+            }
+        }
     }
 
     /// Corrects every track, lets it live on or die, and reports it; the order stays.
     fn correct(&mut self, scan: &Scan) {
         let now = scan.time;
         let budget_s = self.coast_budget_s();
+        let share_s = self.config.sharing.as_ref().map_or(0.0, |c| c.longest_s);
+        let (learn, twin_s) = (self.config.terms.learn, self.config.duplicate_s);
         self.states.clear();
-        let mut kept = 0;
+        self.owner.clear();
+        self.owner.resize(if self.is_soft { scan.detections.len() } else { 0 }, false);
+        let (mut kept, mut part) = (0, 0);
         for i in 0..self.tracks.len() {
             let t = &mut self.tracks[i];
-            let mut outcome = Outcome::default();
-            for stage in &mut self.stages {
-                if let Some(found) =
-                    stage.correct(i, t, &self.predicted[i], scan, &self.table, &self.config, &mut self.scratch)
-                {
-                    outcome = found;
+            let mut outcome = Outcome { ratio: 1.0, ..Outcome::default() };
+            if self.sharing.parts.get(part).is_some_and(|p| p.track as usize == i) {
+                outcome = shared(t, &self.predicted[i], &self.sharing.parts[part]);
+                part += 1;
+                for stage in &mut self.stages {
+                    stage.skip(i);
+                }
+            } else {
+                for stage in &mut self.stages {
+                    let found =
+                        stage.correct(i, t, &self.predicted[i], scan, &self.table, &self.config, &mut self.scratch);
+                    if let Some(found) = found {
+                        outcome = found;
+                    }
                 }
             }
-            let evidence = Evidence { hit: outcome.hit, ratio: outcome.ratio };
+            if learn && let (true, Some(j)) = (outcome.hit, outcome.detection) {
+                self.terms.learn(&t.look, &scan.detections[j as usize]);
+            }
+            let evidence = Evidence { hit: outcome.hit, shared: outcome.shared, ratio: outcome.ratio };
             let mut verdict = self.config.life.advance(&mut t.life, evidence, now.ns);
-            if t.life.misses > 0 {
+            if t.life.misses > 0 || outcome.shared {
                 let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
-                if silent_s >= budget_s - 1e-9 {
+                let longest_s = if outcome.shared { budget_s.max(share_s) } else { budget_s };
+                if silent_s >= longest_s - 1e-9 {
                     verdict = Verdict::Delete;
                 }
+            }
+            if self.is_soft && verdict == Verdict::Keep && t.is_lasting_twin(&mut self.owner, &outcome, now, twin_s) {
+                verdict = Verdict::Delete;
             }
             if verdict == Verdict::Keep {
                 self.states.push(t.state(&outcome, &self.config));
@@ -200,13 +311,21 @@ impl Tracker {
 }
 
 impl Track {
+    /// Whether the track has followed the same detections as an older one for `longest_s`.
+    fn is_lasting_twin(&mut self, owner: &mut [bool], outcome: &Outcome, now: Timestamp, longest_s: f64) -> bool {
+        let Some(j) = outcome.detection else { return false };
+        if !std::mem::replace(&mut owner[j as usize], true) {
+            self.twin_since_ns = None;
+            return false;
+        }
+        let since = *self.twin_since_ns.get_or_insert(now.ns);
+        now.seconds_since(Timestamp::from_ns(since)) >= longest_s
+    }
+
     /// Takes in the box and place of a detection that is (most likely) its own.
     #[inline]
-    pub(super) fn seen(&mut self, d: &Detection, noise: &Noise) {
-        let new = [d.extent.width_px, d.extent.height_px];
-        for a in 0..2 {
-            self.size[a] += SIZE_GAIN * (new[a] - self.size[a]);
-        }
+    pub(super) fn seen(&mut self, d: &Detection, noise: &Noise, look_gain: f64) {
+        self.look.follow(d, look_gain);
         self.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
         self.proof.seen(d.score);
     }
@@ -216,7 +335,7 @@ impl Track {
     pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig) -> TrackState {
         let kinematics = self.belief.kinematics();
         let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], outcome.hit);
-        let [width_px, height_px] = self.size;
+        let [width_px, height_px] = self.look.size;
         TrackState {
             id: TrackId(self.id),
             status: match (self.life.confirmed && proven, outcome.hit) {
@@ -255,7 +374,7 @@ impl Tracking for Tracker {
         if scan.detections.len() >= u32::MAX as usize {
             return Err(Error::new(ErrorKind::Unsupported, "more than 2³² − 2 detections in one scan"));
         }
-        self.table.read(scan, self.config.extra_noise_px)?;
+        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_of_size)?;
 
         if self.last.is_some() {
             self.expire(scan.time);
@@ -266,10 +385,11 @@ impl Tracking for Tracker {
         self.used.clear();
         self.used.resize(scan.detections.len(), false);
         for stage in &mut self.stages {
-            stage.begin(scan.detections.len(), self.config.clutter_density_per_px2);
+            stage.begin(scan, &self.clutter);
         }
-        self.predict(dt_s, scan.time)?;
-        self.associate();
+        self.predict(dt_s, scan)?;
+        self.associate(scan);
+        self.clutter.learn(scan, &self.believed, dt_s);
         self.correct(scan);
         self.start(scan);
         Ok(&self.states)

@@ -120,7 +120,7 @@ fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
             reach: f64::INFINITY,
         };
         let mut table = gating::ScanTable::default();
-        table.read(&scan, 0.0).unwrap();
+        table.read(&scan, 0.0, 0.0).unwrap();
         table.sort(&scan);
         let gate = number(&i["gamma"]);
         let gates_to = |gate: f64| {

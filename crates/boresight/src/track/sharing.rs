@@ -1,0 +1,163 @@
+//! Merged targets: one detection that several tracks predict is shared among them, and they part on exit.
+//!
+//! Method (ours): a confirmed track without a detection whose predicted centre lies inside a detection's box shares that
+//! detection with whoever took it. Along each axis the outer members are placed by the box's edges and their own size from
+//! before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place relative
+//! to the centre. Sizes do not follow while shared. Only the member that fits best counts as detected; the others live on a
+//! budget of their own in seconds, so a target that ended inside another does not live for ever.
+//! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
+
+use super::config::not_negative;
+use super::gating::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
+use super::terms::Look;
+use crate::{Result, Scan};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Sharing of merged detections.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct SharingConfig {
+    /// Longest time a track lives on shared detections alone, s, 0 or more.
+    pub longest_s: f64,
+    /// Standard deviation of a box edge, px, 0 or more: noise of the places found from edges.
+    pub edge_std_px: f64,
+}
+
+impl Default for SharingConfig {
+    fn default() -> Self {
+        Self { longest_s: 2.0, edge_std_px: 0.7 }
+    }
+}
+
+impl SharingConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        not_negative(at, "longest-s", self.longest_s, "2 s bridges people who pass each other")?;
+        not_negative(at, "edge-std-px", self.edge_std_px, "0.7 px suits thresholded blobs")
+    }
+}
+
+/// One member's part of a shared detection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    pub track: u32,
+    pub detection: u32,
+    pub position: [f64; 2],
+    pub noise: Noise,
+    /// Whether this member counts as detected.
+    pub main: bool,
+}
+
+/// Finds who shares what in one scan; keeps its memory.
+#[derive(Default)]
+pub(super) struct Sharing {
+    members: Vec<(u32, u32)>,
+    pub parts: Vec<Part>,
+    order: Vec<usize>,
+}
+
+impl Sharing {
+    /// Finds the parts. `taker[j]` is the confirmed track that took detection j (or `u32::MAX`), `silent` the confirmed
+    /// tracks without a detection, ascending.
+    pub fn find(
+        &mut self,
+        config: &SharingConfig,
+        scan: &Scan,
+        table: &ScanTable,
+        predicted: &[Predicted],
+        look: impl Fn(u32) -> Look,
+        taker: &[u32],
+        silent: &[u32],
+        largest_half_px: [f64; 2],
+    ) {
+        self.members.clear();
+        self.parts.clear();
+        for i in silent {
+            let p = &predicted[*i as usize];
+            let mut best: Option<(f64, u32)> = None;
+            let mut looked_at = 0;
+            table.grid().near(p.x, p.y, largest_half_px[0], largest_half_px[1], |g| {
+                looked_at += 1;
+                let e = &scan.detections[g.index as usize].extent;
+                let (dx, dy) = (p.x - e.left_px, p.y - e.top_px);
+                let inside = dx >= 0.0 && dy >= 0.0 && dx <= e.width_px && dy <= e.height_px;
+                let d = (p.x - g.x).powi(2) + (p.y - g.y).powi(2);
+                if inside && best.is_none_or(|(b, j)| d < b || (d == b && g.index < j)) {
+                    best = Some((d, g.index));
+                }
+                looked_at < MOST_LOOKED_AT
+            });
+            if let Some((_, j)) = best {
+                self.members.push((j, *i));
+            }
+        }
+        self.members.sort_unstable();
+        let mut from = 0;
+        while from < self.members.len() {
+            let j = self.members[from].0;
+            let to = from + self.members[from..].iter().take_while(|m| m.0 == j).count();
+            let took = taker[j as usize];
+            let mut group: Vec<u32> = self.members[from..to].iter().map(|m| m.1).collect();
+            if took != u32::MAX {
+                group.push(took);
+            }
+            if group.len() > 1 {
+                self.split(config, scan, table, predicted, &look, j, took, &group);
+            }
+            from = to;
+        }
+        self.parts.sort_unstable_by_key(|p| p.track);
+    }
+
+    fn split(
+        &mut self,
+        config: &SharingConfig,
+        scan: &Scan,
+        table: &ScanTable,
+        predicted: &[Predicted],
+        look: &impl Fn(u32) -> Look,
+        j: u32,
+        took: u32,
+        group: &[u32],
+    ) {
+        let d = &scan.detections[j as usize];
+        let noise = table.noise(j);
+        let first = self.parts.len();
+        let off = |i: u32| {
+            let p = &predicted[i as usize];
+            (p.x - d.position.x).powi(2) + (p.y - d.position.y).powi(2)
+        };
+        let nearest = group.iter().copied().min_by(|a, b| off(*a).total_cmp(&off(*b)).then(a.cmp(b)));
+        let main = if took != u32::MAX { Some(took) } else { nearest };
+        let edge = config.edge_std_px * config.edge_std_px;
+        for i in group {
+            let noise = Noise { xx: noise.xx + edge, xy: noise.xy, yy: noise.yy + edge };
+            self.parts.push(Part { track: *i, detection: j, position: [0.0; 2], noise, main: Some(*i) == main });
+        }
+        for axis in 0..2 {
+            let (low, high) = if axis == 0 {
+                (d.extent.left_px, d.extent.left_px + d.extent.width_px)
+            } else {
+                (d.extent.top_px, d.extent.top_px + d.extent.height_px)
+            };
+            let place = |i: u32| if axis == 0 { predicted[i as usize].x } else { predicted[i as usize].y };
+            self.order.clear();
+            self.order.extend(0..group.len());
+            self.order.sort_by(|a, b| place(group[*a]).total_cmp(&place(group[*b])).then(a.cmp(b)));
+            let mean = group.iter().map(|i| place(*i)).sum::<f64>() / group.len() as f64;
+            for (rank, k) in self.order.iter().enumerate() {
+                let half = (0.5 * look(group[*k]).size[axis]).min(0.5 * (high - low));
+                self.parts[first + *k].position[axis] = if rank == 0 {
+                    low + half
+                } else if rank + 1 == group.len() {
+                    high - half
+                } else {
+                    0.5 * (low + high) + place(group[*k]) - mean
+                };
+            }
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Terms beside position: what a pair costs because size, intensity, class or box do not fit.
+//!
+//! Each term is added to d², so it speaks the same language: the square of a deviation in standard deviations. Size and
+//! intensity compare logarithms (a ratio of two is as far up as down). Overlap costs `weight · (1 − IoU)`, with boxes
+//! grown by a buffer for small fast targets (F. Yang et al., "Hard to track objects with irregular motions and similar
+//! appearances? Make it easier by buffering the matching space", WACV 2023); GIoU as H. Rezatofighi et al., CVPR 2019.
+//! Limits: a detector that gives no boxes or sums must leave those terms out.
+
+use super::config::{not_negative, positive};
+use crate::{ClassId, Detection, Extent, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Terms beside position; all are left out by default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct TermsConfig {
+    /// Standard deviation of ln(width) and ln(height) from scan to scan, above 0: 0.1 for sharp boxes, 0.3 for noisy ones.
+    pub size_log_std: Option<f64>,
+    /// Standard deviation of ln(sum of the pixels) from scan to scan, above 0.
+    pub intensity_log_std: Option<f64>,
+    /// Cost when classes differ, 0 or more; 100 forbids it.
+    pub class_cost: Option<f64>,
+    /// Box overlap.
+    pub overlap: Option<OverlapConfig>,
+    /// Whether the two standard deviations are learnt from the pairs made (the given ones start it).
+    pub learn: bool,
+}
+
+/// Which overlap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OverlapKind {
+    /// Intersection over union, 0..=1.
+    #[default]
+    Iou,
+    /// Generalised: also says how far boxes lie apart, −1..=1.
+    Giou,
+}
+
+/// Box overlap as a term of association.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct OverlapConfig {
+    /// `iou` or `giou`.
+    pub kind: OverlapKind,
+    /// Cost at no overlap, 0 or more (at full overlap it is 0).
+    pub weight: f64,
+    /// Pairs that overlap less are not made; 0..1 for `iou`, −1..1 for `giou`.
+    pub least: f64,
+    /// Both boxes are grown by this share of their size on each side, 0 or more.
+    pub buffer: f64,
+}
+
+impl Default for OverlapConfig {
+    fn default() -> Self {
+        Self { kind: OverlapKind::Iou, weight: 10.0, least: 0.1, buffer: 0.0 }
+    }
+}
+
+impl TermsConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        if let Some(v) = self.size_log_std {
+            positive(at, "size-log-std", v, "0.1 for sharp boxes, 0.3 for noisy ones")?;
+        }
+        if let Some(v) = self.intensity_log_std {
+            positive(at, "intensity-log-std", v, "0.3 suits a steady target")?;
+        }
+        if let Some(v) = self.class_cost {
+            not_negative(at, "class-cost", v, "100 forbids a change of class")?;
+        }
+        if let Some(o) = &self.overlap {
+            let at = format!("{at}.overlap");
+            not_negative(&at, "weight", o.weight, "10 weighs as much as a gate")?;
+            not_negative(&at, "buffer", o.buffer, "0.3 for small fast boxes")?;
+            let low = if o.kind == OverlapKind::Iou { 0.0 } else { -1.0 };
+            super::config::check(
+                o.least >= low && o.least < 1.0,
+                &at,
+                "least",
+                o.least,
+                "an overlap below 1",
+                "0.1 is usual",
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Whether any term is in use.
+    pub fn any(&self) -> bool {
+        self.size_log_std.is_some()
+            || self.intensity_log_std.is_some()
+            || self.class_cost.is_some()
+            || self.overlap.is_some()
+    }
+
+    /// The most that gated pairs may cost beside position: three standard deviations of each term.
+    pub fn budget(&self) -> f64 {
+        self.size_log_std.map_or(0.0, |_| 18.0)
+            + self.intensity_log_std.map_or(0.0, |_| 9.0)
+            + self.class_cost.unwrap_or(0.0).min(50.0)
+            + self.overlap.as_ref().map_or(0.0, |o| o.weight)
+    }
+}
+
+/// What a track looks like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Smoothed width and height, px.
+    pub size: [f64; 2],
+    /// Smoothed sum of the pixels.
+    pub sum: f64,
+    /// Class of the newest detection that had one.
+    pub class: Option<ClassId>,
+}
+
+impl Look {
+    /// Looks of a detection.
+    pub fn of(d: &Detection) -> Self {
+        Self { size: [d.extent.width_px, d.extent.height_px], sum: d.sum, class: d.class }
+    }
+
+    /// Takes in a new detection with gain `gain` (0..=1).
+    #[inline]
+    pub fn follow(&mut self, d: &Detection, gain: f64) {
+        self.size[0] += gain * (d.extent.width_px - self.size[0]);
+        self.size[1] += gain * (d.extent.height_px - self.size[1]);
+        self.sum += gain * (d.sum - self.sum);
+        if d.class.is_some() {
+            self.class = d.class;
+        }
+    }
+}
+
+/// The terms with the deviations in use now.
+#[derive(Clone, Debug)]
+pub struct Terms {
+    config: TermsConfig,
+    /// Variance of the log ratios of size and intensity.
+    variance: [f64; 2],
+}
+
+/// Share of a new pair in a learnt variance.
+const LEARNING: f64 = 0.005;
+
+impl Terms {
+    /// Builds the terms.
+    pub fn new(config: &TermsConfig) -> Self {
+        let square = |v: Option<f64>| v.unwrap_or(1.0).powi(2);
+        Self { variance: [square(config.size_log_std), square(config.intensity_log_std)], config: config.clone() }
+    }
+
+    /// What the pair of a track at (`x`, `y`) and a detection costs beside position; infinite if it must not be made.
+    pub fn cost(&self, x: f64, y: f64, look: &Look, d: &Detection) -> f64 {
+        let c = &self.config;
+        let mut cost = 0.0;
+        if c.size_log_std.is_some() {
+            let [w, h] = look.size;
+            cost +=
+                (log_ratio(d.extent.width_px, w).powi(2) + log_ratio(d.extent.height_px, h).powi(2)) / self.variance[0];
+        }
+        if c.intensity_log_std.is_some() {
+            cost += log_ratio(d.sum, look.sum).powi(2) / self.variance[1];
+        }
+        if let (Some(price), Some(a), Some(b)) = (c.class_cost, look.class, d.class)
+            && a != b
+        {
+            cost += price;
+        }
+        if let Some(o) = &c.overlap {
+            let [w, h] = look.size;
+            let own = Extent { left_px: x - 0.5 * w, top_px: y - 0.5 * h, width_px: w, height_px: h };
+            let (a, b) = (grown(&own, o.buffer), grown(&d.extent, o.buffer));
+            let overlap = if o.kind == OverlapKind::Iou { iou(&a, &b) } else { giou(&a, &b) };
+            if overlap < o.least {
+                return f64::INFINITY;
+            }
+            cost += o.weight * (1.0 - overlap);
+        }
+        cost
+    }
+
+    /// Takes in a pair that was made.
+    pub fn learn(&mut self, look: &Look, d: &Detection) {
+        if self.config.learn {
+            let size = 0.5
+                * (log_ratio(d.extent.width_px, look.size[0]).powi(2)
+                    + log_ratio(d.extent.height_px, look.size[1]).powi(2));
+            let sum = log_ratio(d.sum, look.sum).powi(2);
+            for (v, new) in self.variance.iter_mut().zip([size, sum]) {
+                *v = (*v + LEARNING * (new - *v)).clamp(1e-4, 4.0);
+            }
+        }
+    }
+}
+
+fn log_ratio(a: f64, b: f64) -> f64 {
+    // Nothing is known of a size of zero: no cost.
+    if a > 0.0 && b > 0.0 { (a / b).ln() } else { 0.0 }
+}
+
+fn grown(e: &Extent, by: f64) -> Extent {
+    Extent {
+        left_px: e.left_px - by * e.width_px,
+        top_px: e.top_px - by * e.height_px,
+        width_px: e.width_px * (1.0 + 2.0 * by),
+        height_px: e.height_px * (1.0 + 2.0 * by),
+    }
+}
+
+fn sides(e: &Extent) -> [f64; 4] {
+    [e.left_px, e.top_px, e.left_px + e.width_px, e.top_px + e.height_px]
+}
+
+fn shared_and_all(a: &Extent, b: &Extent) -> (f64, f64) {
+    let ([al, at, ar, ab], [bl, bt, br, bb]) = (sides(a), sides(b));
+    let shared = (ar.min(br) - al.max(bl)).max(0.0) * (ab.min(bb) - at.max(bt)).max(0.0);
+    (shared, a.width_px * a.height_px + b.width_px * b.height_px - shared)
+}
+
+/// Intersection over union of two boxes, 0..=1; 0 if both are empty.
+pub fn iou(a: &Extent, b: &Extent) -> f64 {
+    let (shared, all) = shared_and_all(a, b);
+    if all > 0.0 { shared / all } else { 0.0 }
+}
+
+/// Generalised intersection over union, −1..=1.
+pub fn giou(a: &Extent, b: &Extent) -> f64 {
+    let ([al, at, ar, ab], [bl, bt, br, bb]) = (sides(a), sides(b));
+    let (shared, all) = shared_and_all(a, b);
+    let hull = (ar.max(br) - al.min(bl)) * (ab.max(bb) - at.min(bt));
+    if all > 0.0 && hull > 0.0 { shared / all - (hull - all) / hull } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overlap_of_two_boxes_follows_the_definitions() {
+        let a = Extent { left_px: 0.0, top_px: 0.0, width_px: 2.0, height_px: 2.0 };
+        let b = Extent { left_px: 1.0, top_px: 1.0, width_px: 2.0, height_px: 2.0 };
+        // Shared 1, union 7, hull 9.
+        assert!((iou(&a, &b) - 1.0 / 7.0).abs() < 1e-15);
+        assert!((giou(&a, &b) - (1.0 / 7.0 - 2.0 / 9.0)).abs() < 1e-15);
+        assert_eq!(iou(&Extent::default(), &Extent::default()), 0.0);
+    }
+}

@@ -1,0 +1,115 @@
+//! Tracks from MOTChallenge detections against SORT's: HOTA, IDF1, MOTA of every sequence, one configuration for all.
+//!
+//! Data: 2D MOT 2015 with SORT's Faster R-CNN detections (SORT's own result beside them) and MOT17 with DPM detections.
+//! Scores are those of `boresight::metrics`, which equal TrackEval's; `--out DIR` writes MOT files for TrackEval itself.
+
+use anyhow::{Context, Result};
+use boresight::io::tables::{TableOptions, mot_box_of_extent, read_detections};
+use boresight::io::tracks::{ReadOptions, mot};
+use boresight::metrics::{MatchOptions, Rules, Scores, evaluate, hota, preprocess};
+use boresight::track::{self, TrackerConfig};
+use boresight::{PixelOrigin, TrackRow, TrackStatus, TrackTable};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder with `mot15_text` and `mot17_text`.
+    #[arg(long, env = "BORESIGHT_TEST_DATA", default_value = "../shared/data")]
+    data: PathBuf,
+    /// Tracker configuration (JSON) instead of the built-in one for people.
+    #[arg(long)]
+    config: Option<PathBuf>,
+    /// Write the tracks as MOTChallenge text into this folder.
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// The one configuration for all sequences, in `configs/people.json` form.
+pub const PEOPLE: &str = include_str!("mot_people.json");
+
+pub fn run(args: &Args) -> Result<()> {
+    let config: TrackerConfig = match &args.config {
+        Some(path) => serde_json::from_str(&std::fs::read_to_string(path)?)?,
+        None => serde_json::from_str(PEOPLE)?,
+    };
+    let sets = [
+        ("mot15_text", "det_frcnn_sort.txt", Some("result_sort.txt"), Rules::Mot15),
+        ("mot17_text", "det_dpm.txt", None, Rules::Mot17),
+    ];
+    for (set, detections, peer, rules) in sets {
+        println!("\n{set}, {detections}            HOTA   IDF1   MOTA   IDSW    FP     FN");
+        let mut folders: Vec<PathBuf> = std::fs::read_dir(args.data.join(set))?
+            .flatten()
+            .map(|e| e.path())
+            .filter(|p| p.join(detections).exists())
+            .collect();
+        folders.sort();
+        let (mut ours, mut peers) = (Vec::new(), Vec::new());
+        for folder in &folders {
+            let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let truth = mot::read(&folder.join("gt.txt"), ReadOptions::default())?.0;
+            let result = tracked(&config, &folder.join(detections)).with_context(|| name.clone())?;
+            if let Some(out) = &args.out {
+                write(&out.join(format!("{name}.txt")), &result)?;
+            }
+            ours.push(judged(&truth, &result, rules)?);
+            print_row(&format!("{name:16} boresight"), &ours[ours.len() - 1]);
+            if let Some(peer) = peer {
+                peers.push(judged(&truth, &mot::read(&folder.join(peer), ReadOptions::default())?.0, rules)?);
+                print_row(&format!("{:16} SORT", ""), &peers[peers.len() - 1]);
+            }
+        }
+        print_row(&format!("{:16} boresight", "all"), &Scores::combined(&ours));
+        if peer.is_some() {
+            print_row(&format!("{:16} SORT", ""), &Scores::combined(&peers));
+        }
+    }
+    Ok(())
+}
+
+/// Runs the tracker over a detection file; rows are confirmed tracks with a detection in the frame.
+fn tracked(config: &TrackerConfig, detections: &Path) -> Result<TrackTable> {
+    let mut tracker = track::build(config)?;
+    let table = read_detections(detections, &TableOptions::default())?;
+    let mut rows = Vec::new();
+    for scan in &table.scans {
+        for s in tracker.step(scan)?.iter().filter(|s| s.status == TrackStatus::Confirmed) {
+            let bbox = mot_box_of_extent(&s.extent);
+            rows.push(TrackRow { frame: scan.index.0 as u32, id: s.id.0 as i64, bbox, ..TrackRow::default() });
+        }
+    }
+    Ok(TrackTable::from_rows("boresight", PixelOrigin::Pixel1, rows)?)
+}
+
+fn judged(truth: &TrackTable, result: &TrackTable, rules: Rules) -> Result<Scores> {
+    let (truth, result) = preprocess(truth, result, rules)?;
+    Ok(evaluate(&truth, &result, &MatchOptions::default())?)
+}
+
+fn print_row(name: &str, s: &Scores) {
+    println!(
+        "{name:32} {:6.2} {:6.2} {:6.2} {:6} {:6} {:6}",
+        100.0 * hota::mean(&s.hota.hota()),
+        100.0 * s.identity.idf1(),
+        100.0 * s.clear.mota(),
+        s.clear.idsw,
+        s.clear.fp,
+        s.clear.fn_
+    );
+}
+
+fn write(path: &Path, table: &TrackTable) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    let mut text = String::new();
+    for frame in 0..table.n_frames() {
+        for row in table.rows(frame) {
+            let [l, t, w, h] = table.boxes[row];
+            let id = table.ids[table.tracks[row] as usize];
+            writeln!(text, "{},{id},{l:.2},{t:.2},{w:.2},{h:.2},1,-1,-1,-1", frame + 1)?;
+        }
+    }
+    Ok(std::fs::write(path, text)?)
+}
