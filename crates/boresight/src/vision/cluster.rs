@@ -13,24 +13,25 @@ use super::region::Region;
 use super::threshold::band::{band_bits, words};
 use crate::Image;
 
-/// A horizontal run of set pixels.
-#[derive(Clone, Copy, Debug)]
-struct Run {
-    start: u32,
-    /// Last pixel, included.
-    end: u32,
-    region: u32,
+/// The runs of one row, from the left: first and last column, and the region of each.
+#[derive(Clone, Debug, Default)]
+struct RowRuns {
+    n: usize,
+    /// Longer than `n`: columns are written eight at a time.
+    start: Vec<u32>,
+    end: Vec<u32>,
+    region: Vec<u32>,
 }
 
 /// Joins rows of bits to regions.
 #[derive(Clone, Debug)]
 pub struct Clusterer {
-    /// Furthest linked column distance per row offset; `None` in the same row if not even neighbours are linked.
+    /// Furthest linked column distance per row offset, from 0.
     reach: Vec<u32>,
+    /// Whether not even neighbours are linked.
     single: bool,
-    width: usize,
     /// Runs of the last rows; row y lies in slot y % len.
-    rows: Vec<Vec<Run>>,
+    rows: Vec<RowRuns>,
     regions: Vec<Region>,
 }
 
@@ -59,24 +60,25 @@ impl Clusterer {
         let reach = reaches(config.distance_px, config.inclusive);
         let single = reach.first().is_none_or(|&r| r == 0);
         let n = reach.len().max(1);
-        Self { reach, single, width: 0, rows: vec![Vec::new(); n], regions: Vec::new() }
+        Self { reach, single, rows: vec![RowRuns::default(); n], regions: Vec::new() }
     }
 
     /// Starts a frame of `width` columns; what was kept of the last frame is dropped, its memory stays.
     pub fn begin(&mut self, width: usize) {
-        self.width = width;
         self.regions.clear();
+        let n = width.div_ceil(2) + 8;
         for row in &mut self.rows {
-            row.clear();
+            row.n = 0;
+            row.start.resize(n, 0);
+            row.end.resize(n, 0);
+            row.region.resize(n, 0);
         }
     }
 
     /// Takes row `y` (rows come in order, from 0, every row): its bits and its pixels.
+    ///
+    /// Bits past the pixels of the row must be 0.
     pub fn row<T: Pixel>(&mut self, y: usize, bits: &[u64], pixels: &[T]) {
-        let n = self.rows.len();
-        // Out of the ring while it is filled, so that the other rows can be read.
-        let mut current = std::mem::take(&mut self.rows[y % n]);
-        current.clear();
         if self.single {
             for (w, &word) in bits.iter().enumerate() {
                 let mut rest = word;
@@ -86,9 +88,18 @@ impl Clusterer {
                     self.new_region(y, x, x, pixels);
                 }
             }
-        } else {
-            runs(bits, |start, end| current.push(Run { start, end, region: 0 }));
-            self.link(y, &mut current, pixels);
+            return;
+        }
+        let n = self.rows.len();
+        // Out of the ring while it is filled, so that the other rows can be read.
+        let mut current = std::mem::take(&mut self.rows[y % n]);
+        find_runs(bits, &mut current);
+        if current.n > 0 {
+            if n == 2 {
+                self.link_neighbours(y, &mut current, pixels);
+            } else {
+                self.link(y, &mut current, pixels);
+            }
         }
         self.rows[y % n] = current;
     }
@@ -99,34 +110,63 @@ impl Clusterer {
         label
     }
 
-    /// Gives every run of the current row its region.
-    fn link<T: Pixel>(&mut self, y: usize, current: &mut [Run], pixels: &[T]) {
-        let n = self.rows.len();
-        let depth = (n - 1).min(y);
-        // Same row first, then the rows above; a run is made a region before others join it.
-        let reach0 = self.reach[0];
-        for i in 0..current.len() {
-            let run = current[i];
-            current[i].region = match i.checked_sub(1).map(|j| current[j]) {
-                Some(before) if run.start - before.end <= reach0 => {
-                    let root = self.root(before.region);
-                    let part = Region::of_run(root, y as u32, run.start, run.end, pixels);
-                    self.regions[root as usize].absorb(&part);
-                    root
+    /// Gives every run its region where only the row above is reached (4 and 8 neighbours): one pass over both rows.
+    fn link_neighbours<T: Pixel>(&mut self, y: usize, current: &mut RowRuns, pixels: &[T]) {
+        let reach = self.reach[1];
+        let above = std::mem::take(&mut self.rows[(y + 1) % 2]);
+        let n_above = if y == 0 { 0 } else { above.n };
+        let (starts, ends) = (&above.start[..n_above], &above.end[..n_above]);
+        let mut from = 0;
+        let columns = current.start.iter().zip(&current.end).zip(&mut current.region).take(current.n);
+        for ((&start, &end), region) in columns {
+            while from < n_above && ends[from] + reach < start {
+                from += 1;
+            }
+            if from < n_above && starts[from] <= end + reach {
+                let mut label = self.root(above.region[from]);
+                self.regions[label as usize].add_run(y as u32, start, end, pixels);
+                let mut next = from + 1;
+                while next < n_above && starts[next] <= end + reach {
+                    label = self.union(above.region[next], label);
+                    next += 1;
                 }
-                _ => self.new_region(y, run.start, run.end, pixels),
+                // The last run above may reach the next run of this row too.
+                from = next - 1;
+                *region = label;
+            } else {
+                *region = self.new_region(y, start, end, pixels);
+            }
+        }
+        self.rows[(y + 1) % 2] = above;
+    }
+
+    /// Gives every run its region for any reach: the same row first, then one pass for each row above.
+    fn link<T: Pixel>(&mut self, y: usize, current: &mut RowRuns, pixels: &[T]) {
+        let n = self.rows.len();
+        for i in 0..current.n {
+            let (start, end) = (current.start[i], current.end[i]);
+            current.region[i] = if i > 0 && start - current.end[i - 1] <= self.reach[0] {
+                let root = self.root(current.region[i - 1]);
+                self.regions[root as usize].add_run(y as u32, start, end, pixels);
+                root
+            } else {
+                self.new_region(y, start, end, pixels)
             };
         }
-        for dy in 1..=depth {
+        for dy in 1..=(n - 1).min(y) {
             let reach = self.reach[dy];
             let above = std::mem::take(&mut self.rows[(y - dy) % n]);
             let mut from = 0;
-            for run in current.iter() {
-                while above.get(from).is_some_and(|a| a.end + reach < run.start) {
+            for i in 0..current.n {
+                let (start, end) = (current.start[i], current.end[i]);
+                while from < above.n && above.end[from] + reach < start {
                     from += 1;
                 }
-                for a in above[from..].iter().take_while(|a| a.start <= run.end + reach) {
-                    self.union(a.region, run.region);
+                for k in from..above.n {
+                    if above.start[k] > end + reach {
+                        break;
+                    }
+                    self.union(above.region[k], current.region[i]);
                 }
             }
             self.rows[(y - dy) % n] = above;
@@ -145,15 +185,17 @@ impl Clusterer {
         }
     }
 
-    fn union(&mut self, a: u32, b: u32) {
+    /// Joins two regions and returns the one that stays, the earlier.
+    fn union(&mut self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.root(a), self.root(b));
         if a == b {
-            return;
+            return a;
         }
         let (first, second) = (a.min(b) as usize, a.max(b) as usize);
         let (head, tail) = self.regions.split_at_mut(second);
         head[first].absorb(&tail[0]);
         tail[0].parent = first as u32;
+        first as u32
     }
 
     /// The regions of the frame whose rows were all given, in raster order of their first pixel.
@@ -236,13 +278,54 @@ pub(crate) fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
     }
 }
 
+/// Finds the first and last columns of the runs of a row of bits.
+///
+/// A run starts at a set bit whose left neighbour is not set, and ends at one whose right neighbour is not; the two lists
+/// have the same length and order.
+fn find_runs(bits: &[u64], runs: &mut RowRuns) {
+    let (mut n_start, mut n_end) = (0, 0);
+    let mut left = 0u64;
+    for (w, &word) in bits.iter().enumerate() {
+        if word == 0 {
+            left = 0;
+            continue;
+        }
+        let right = bits.get(w + 1).map_or(0, |next| next << 63);
+        let base = w as u32 * 64;
+        n_start = columns(word & !(word << 1 | left), base, &mut runs.start, n_start);
+        n_end = columns(word & !(word >> 1 | right), base, &mut runs.end, n_end);
+        left = word >> 63;
+    }
+    runs.n = n_start.min(n_end);
+}
+
+/// Appends the columns of the set bits at `n` and returns the new length.
+///
+/// Eight are written without looking how many there are, and what is too much is written over: a branch for each bit
+/// would be guessed wrong about once a word.
+#[inline(always)]
+fn columns(mut bits: u64, base: u32, out: &mut [u32], n: usize) -> usize {
+    let count = bits.count_ones() as usize;
+    let mut at = n;
+    while bits != 0 {
+        let Some(eight) = out.get_mut(at..at + 8) else { return n };
+        for column in eight {
+            // For no bit left this is `base + 64`, which is not looked at.
+            *column = base + bits.trailing_zeros();
+            bits &= bits.wrapping_sub(1);
+        }
+        at += 8;
+    }
+    n + count
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Clusters by comparing all pairs of set pixels: area, Σx, Σy and first pixel of each, in raster order.
-    fn brute(image: &Image<u8>, distance_px: f64, inclusive: bool) -> Vec<(u32, f64, f64, u32, u32)> {
+    /// Clusters by comparing all pairs of set pixels: area, Σx, Σy and first row of each, in raster order.
+    fn brute(image: &Image<u8>, distance_px: f64, inclusive: bool) -> Vec<(u32, f64, f64, u32)> {
         let set: Vec<(i64, i64)> = (0..image.height())
             .flat_map(|y| (0..image.width()).map(move |x| (x as i64, y as i64)))
             .filter(|&(x, y)| image.row(y as usize)[x as usize] > 0)
@@ -262,7 +345,7 @@ mod tests {
             let members: Vec<_> = (0..set.len()).filter(|&i| label[i] == k).map(|i| set[i]).collect();
             if let Some(first) = members.first() {
                 let sum = |f: fn(&(i64, i64)) -> i64| members.iter().map(f).sum::<i64>() as f64;
-                out.push((members.len() as u32, sum(|p| p.0), sum(|p| p.1), first.0 as u32, first.1 as u32));
+                out.push((members.len() as u32, sum(|p| p.0), sum(|p| p.1), first.1 as u32));
             }
         }
         out
@@ -298,7 +381,7 @@ mod tests {
             let image = Image::from_vec(width, height, data).unwrap();
             let config = ClusterConfig { distance_px, inclusive, ..Default::default() };
             let ours: Vec<_> =
-                segment(&image, 1, 255, &config).iter().map(|r| (r.area, r.x, r.y, r.first, r.top)).collect();
+                segment(&image, 1, 255, &config).iter().map(|r| (r.area, r.x, r.y, r.top)).collect();
             prop_assert_eq!(ours, brute(&image, distance_px, inclusive));
         }
     }
@@ -323,14 +406,15 @@ mod tests {
 
     #[test]
     fn runs_cross_words_and_end_at_the_edge() {
-        let mut found = Vec::new();
-        runs(&[1 | 1 << 63, !0, 0b101], |a, b| found.push((a, b)));
-        assert_eq!(found, [(0, 0), (63, 128), (130, 130)]);
-        found.clear();
-        runs(&[!0, !0], |a, b| found.push((a, b)));
-        assert_eq!(found, [(0, 127)]);
-        found.clear();
-        runs(&[1 << 63, 0, 1 << 63], |a, b| found.push((a, b)));
-        assert_eq!(found, [(63, 63), (191, 191)]);
+        let found = |bits: &[u64]| {
+            let n = bits.len() * 32 + 8;
+            let mut runs = RowRuns { n: 0, start: vec![0; n], end: vec![0; n], region: vec![0; n] };
+            find_runs(bits, &mut runs);
+            (0..runs.n).map(|i| (runs.start[i], runs.end[i])).collect::<Vec<_>>()
+        };
+        assert_eq!(found(&[1 | 1 << 63, !0, 0b101]), [(0, 0), (63, 128), (130, 130)]);
+        assert_eq!(found(&[!0, !0]), [(0, 127)]);
+        assert_eq!(found(&[1 << 63, 0, 1 << 63]), [(63, 63), (191, 191)]);
+        assert_eq!(found(&[0x5555_5555_5555_5555; 3]).len(), 96);
     }
 }

@@ -1,6 +1,7 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
 use super::spatial::SpatialPixel;
+use super::threshold::band;
 
 /// A grey pixel.
 pub trait Pixel: SpatialPixel + PartialOrd {
@@ -13,14 +14,15 @@ pub trait Pixel: SpatialPixel + PartialOrd {
     /// The smallest and largest pixel inside the real band [`low`, `high`], or `None` if no pixel value lies in it.
     fn band(low: f64, high: f64) -> Option<(Self, Self)>;
     /// Writes bit `x` of `bits` for every `low <= row[x] <= high`, and 0 past the end; NaN is never set.
-    fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
-        super::threshold::band::band_bits(row, low, high, bits);
-    }
+    fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]);
 }
 
 macro_rules! integer_pixel {
-    ($t:ty) => {
+    ($t:ty, $band_bits:ident) => {
         impl Pixel for $t {
+            fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
+                band::$band_bits(row, low, high, bits);
+            }
             const STEP: f32 = 1.0;
             fn value(self) -> f64 {
                 f64::from(self)
@@ -36,10 +38,13 @@ macro_rules! integer_pixel {
         }
     };
 }
-integer_pixel!(u8);
-integer_pixel!(u16);
+integer_pixel!(u8, band_bits_u8);
+integer_pixel!(u16, band_bits_u16);
 
 impl Pixel for f32 {
+    fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
+        band::band_bits_f32(row, low, high, bits);
+    }
     const STEP: f32 = 0.0;
     fn value(self) -> f64 {
         f64::from(self)

@@ -17,8 +17,6 @@ pub struct Region {
     pub top: u32,
     /// Lowest row.
     pub bottom: u32,
-    /// Column of the first pixel in raster order; its row is `top`.
-    pub first: u32,
     /// Number of run ends that have a neighbour inside the image.
     pub n_edges: u32,
     /// Sum over those run ends of |I inside - I outside|, counts.
@@ -47,6 +45,7 @@ pub struct Region {
 
 impl Region {
     /// The moments of the run of pixels `start..=end` of row `y`.
+    #[inline]
     pub(crate) fn of_run<T: Pixel>(parent: u32, y: u32, start: u32, end: u32, row: &[T]) -> Self {
         let (mut sum, mut sum_i, mut min, mut max) = (0.0f64, 0.0f64, f32::INFINITY, f32::NEG_INFINITY);
         let pixels = row.get(start as usize..=end as usize).unwrap_or(&[]);
@@ -82,7 +81,6 @@ impl Region {
             right: end,
             top: y,
             bottom: y,
-            first: start,
             n_edges,
             edge_step,
             min,
@@ -98,7 +96,14 @@ impl Region {
         }
     }
 
-    /// Adds another region's pixels; the first pixel in raster order stays this one's.
+    /// Adds the run of pixels `start..=end` of row `y`.
+    #[inline]
+    pub(crate) fn add_run<T: Pixel>(&mut self, y: u32, start: u32, end: u32, row: &[T]) {
+        self.absorb(&Self::of_run(0, y, start, end, row));
+    }
+
+    /// Adds another region's pixels.
+    #[inline]
     pub(crate) fn absorb(&mut self, other: &Self) {
         self.area += other.area;
         self.left = self.left.min(other.left);

@@ -3,6 +3,7 @@
 //! Bits, not bytes, leave this file: bit `x % 64` of word `x / 64` is pixel `x`; bits past the width are 0.
 
 use crate::vision::pixel::Pixel;
+use fearless_simd::{Simd, SimdBase, SimdMask};
 
 /// Number of words for a row of `width` bits.
 pub fn words(width: usize) -> usize {
@@ -11,14 +12,44 @@ pub fn words(width: usize) -> usize {
 
 /// Writes bit `x` for every `low <= row[x] <= high`; `bits` holds at least [`words`]`(row.len())` words.
 pub fn band_bits<T: Pixel>(row: &[T], low: T, high: T, bits: &mut [u64]) {
-    for (word, chunk) in bits.iter_mut().zip(row.chunks(64)) {
-        let mut w = 0u64;
-        for (i, &v) in chunk.iter().enumerate() {
-            w |= u64::from((v >= low) & (v <= high)) << i;
-        }
-        *word = w;
-    }
+    T::band_bits(row, low, high, bits);
 }
+
+/// The plain form, for what is left of a row and as the twin of the vector forms.
+pub(crate) fn band_word<T: Pixel>(pixels: &[T], low: T, high: T) -> u64 {
+    pixels.iter().enumerate().fold(0, |w, (i, &v)| w | u64::from((v >= low) & (v <= high)) << i)
+}
+
+/// Makes the vector form for one pixel type: 64 pixels give one word of bits, in as many vectors as the machine needs.
+macro_rules! vector_band {
+    ($name:ident, $inner:ident, $t:ty, $vector:ident) => {
+        pub(crate) fn $name(row: &[$t], low: $t, high: $t, bits: &mut [u64]) {
+            fearless_simd::dispatch!(fearless_simd::Level::new(), simd => $inner(simd, row, low, high, bits));
+        }
+
+        #[inline(always)]
+        fn $inner<S: Simd>(simd: S, row: &[$t], low: $t, high: $t, bits: &mut [u64]) {
+            let n = S::$vector::LEN;
+            let (lows, highs) = (S::$vector::splat(simd, low), S::$vector::splat(simd, high));
+            let chunks = row.chunks_exact(64);
+            let rest = chunks.remainder();
+            for (word, chunk) in bits.iter_mut().zip(chunks) {
+                let mut w = 0u64;
+                for (k, part) in chunk.chunks_exact(n).enumerate() {
+                    let v = S::$vector::from_slice(simd, part);
+                    w |= (v.simd_ge(lows) & v.simd_le(highs)).to_bitmask() << (k * n);
+                }
+                *word = w;
+            }
+            if let (false, Some(word)) = (rest.is_empty(), bits.get_mut(row.len() / 64)) {
+                *word = band_word(rest, low, high);
+            }
+        }
+    };
+}
+vector_band!(band_bits_u8, band_u8, u8, u8s);
+vector_band!(band_bits_u16, band_u16, u16, u16s);
+vector_band!(band_bits_f32, band_f32, f32, f32s);
 
 /// Writes bit `x` for every `row[x] >= level[x]` (`ABOVE`) or `row[x] <= level[x]`.
 pub fn level_bits<T: Pixel, const ABOVE: bool>(row: &[T], level: &[f32], bits: &mut [u64]) {
@@ -41,6 +72,32 @@ mod tests {
         let mut bits = [0u64];
         band_bits(&[f32::NAN, 1.0, f32::INFINITY], 0.0, f32::INFINITY, &mut bits);
         assert_eq!(bits, [0b110]);
+    }
+
+    #[test]
+    fn the_vector_forms_give_the_plain_bits_for_every_length() {
+        let mut state = 7u32;
+        let mut next = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 16
+        };
+        for n in 0..200 {
+            let values: Vec<u16> = (0..n).map(|_| next() as u16).collect();
+            let bytes: Vec<u8> = values.iter().map(|v| *v as u8).collect();
+            let floats: Vec<f32> =
+                values.iter().map(|v| if v % 11 == 0 { f32::NAN } else { f32::from(*v) - 3e4 }).collect();
+            fn check<T: Pixel>(row: &[T], low: T, high: T) {
+                let mut bits = vec![!0u64; words(row.len())];
+                band_bits(row, low, high, &mut bits);
+                let plain: Vec<u64> = row.chunks(64).map(|c| band_word(c, low, high)).collect();
+                assert_eq!(bits, plain, "{} pixels", row.len());
+            }
+            check(&bytes, 40, 200);
+            check(&bytes, 0, 255);
+            check(&values, 5000, 50_000);
+            check(&values, 0x8000, u16::MAX);
+            check(&floats, -1e4, 2e4);
+        }
     }
 
     #[test]
