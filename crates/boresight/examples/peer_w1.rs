@@ -30,7 +30,9 @@ impl Job for Segmentation {
             self.clusters.row(y, &self.bits, row);
         }
         self.rows.clear();
-        self.rows.extend(self.clusters.regions().flat_map(|r| [r.sum_x / r.sum, r.sum_y / r.sum, f64::from(r.area), r.sum]));
+        for r in self.clusters.regions() {
+            self.rows.extend_from_slice(&[r.sum_x / r.sum, r.sum_y / r.sum, f64::from(r.area), r.sum]);
+        }
     }
 
     fn result(&mut self) -> (Vec<f64>, usize) {

@@ -12,6 +12,7 @@ use super::pixel::Pixel;
 use super::region::Region;
 use super::threshold::band::{band_bits, words};
 use crate::Image;
+use fearless_simd::Level;
 
 /// The runs of one row, from the left: first and last column, and the region of each.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,34 @@ struct RowRuns {
     start: Vec<u32>,
     end: Vec<u32>,
     region: Vec<u32>,
+    /// For each word of bits: where runs start and end in it, and how many start and end before it.
+    words: Vec<RunWord>,
+}
+
+/// Where runs start and end among 64 pixels.
+#[derive(Clone, Copy, Debug, Default)]
+struct RunWord {
+    starts: u64,
+    ends: u64,
+    n_starts: u32,
+    n_ends: u32,
+}
+
+impl RowRuns {
+    /// Number of runs that end left of column `x`.
+    #[inline(always)]
+    fn ending_before(&self, x: u32) -> usize {
+        let word = self.words.get(x as usize / 64).copied().unwrap_or_default();
+        (word.n_ends + (word.ends & ((1 << (x % 64)) - 1)).count_ones()) as usize
+    }
+
+    /// Number of runs that start at column `x` or left of it.
+    #[inline(always)]
+    fn starting_up_to(&self, x: u32) -> usize {
+        // The last column's right neighbour may lie past the words: then all runs have started.
+        let Some(word) = self.words.get(x as usize / 64) else { return self.n };
+        (word.n_starts + (word.starts & (!0 >> (63 - x % 64))).count_ones()) as usize
+    }
 }
 
 /// Joins rows of bits to regions.
@@ -72,6 +101,8 @@ impl Clusterer {
             row.start.resize(n, 0);
             row.end.resize(n, 0);
             row.region.resize(n, 0);
+            row.words.clear();
+            row.words.resize(words(width), RunWord::default());
         }
     }
 
@@ -79,6 +110,18 @@ impl Clusterer {
     ///
     /// Bits past the pixels of the row must be 0.
     pub fn row<T: Pixel>(&mut self, y: usize, bits: &[u64], pixels: &[T]) {
+        let n = self.rows.len();
+        // Most rows of most frames are empty.
+        if bits.iter().fold(0, |all, w| all | w) == 0 {
+            self.rows[y % n].n = 0;
+            return;
+        }
+        // Not for vectors but for the bit counting instructions, which the oldest machines lack.
+        fearless_simd::dispatch!(Level::new(), _simd => self.filled_row(y, bits, pixels));
+    }
+
+    #[inline(always)]
+    fn filled_row<T: Pixel>(&mut self, y: usize, bits: &[u64], pixels: &[T]) {
         if self.single {
             for (w, &word) in bits.iter().enumerate() {
                 let mut rest = word;
@@ -94,16 +137,15 @@ impl Clusterer {
         // Out of the ring while it is filled, so that the other rows can be read.
         let mut current = std::mem::take(&mut self.rows[y % n]);
         find_runs(bits, &mut current);
-        if current.n > 0 {
-            if n == 2 {
-                self.link_neighbours(y, &mut current, pixels);
-            } else {
-                self.link(y, &mut current, pixels);
-            }
+        if n == 2 {
+            self.link_neighbours(y, &mut current, pixels);
+        } else {
+            self.link(y, &mut current, pixels);
         }
         self.rows[y % n] = current;
     }
 
+    #[inline(always)]
     fn new_region<T: Pixel>(&mut self, y: usize, start: u32, end: u32, pixels: &[T]) -> u32 {
         let label = self.regions.len() as u32;
         self.regions.push(Region::of_run(label, y as u32, start, end, pixels));
@@ -111,36 +153,34 @@ impl Clusterer {
     }
 
     /// Gives every run its region where only the row above is reached (4 and 8 neighbours): one pass over both rows.
+    #[inline(always)]
     fn link_neighbours<T: Pixel>(&mut self, y: usize, current: &mut RowRuns, pixels: &[T]) {
         let reach = self.reach[1];
         let above = std::mem::take(&mut self.rows[(y + 1) % 2]);
-        let n_above = if y == 0 { 0 } else { above.n };
-        let (starts, ends) = (&above.start[..n_above], &above.end[..n_above]);
-        let mut from = 0;
+        // A row without runs has not set its words.
+        let no_above = y == 0 || above.n == 0;
         let columns = current.start.iter().zip(&current.end).zip(&mut current.region).take(current.n);
         for ((&start, &end), region) in columns {
-            while from < n_above && ends[from] + reach < start {
-                from += 1;
-            }
-            if from < n_above && starts[from] <= end + reach {
-                let mut label = self.root(above.region[from]);
-                self.regions[label as usize].add_run(y as u32, start, end, pixels);
-                let mut next = from + 1;
-                while next < n_above && starts[next] <= end + reach {
-                    label = self.union(above.region[next], label);
-                    next += 1;
+            // Counting bits instead of walking along the row above: a walk's branches are guessed wrong too often.
+            let first = if no_above { usize::MAX } else { above.ending_before(start.saturating_sub(reach)) };
+            let last = above.starting_up_to(end + reach);
+            *region = match above.region.get(first..last) {
+                Some([one, more @ ..]) => {
+                    let mut label = self.root(*one);
+                    self.regions[label as usize].add_run(y as u32, start, end, pixels);
+                    for &other in more {
+                        label = self.union(other, label);
+                    }
+                    label
                 }
-                // The last run above may reach the next run of this row too.
-                from = next - 1;
-                *region = label;
-            } else {
-                *region = self.new_region(y, start, end, pixels);
-            }
+                _ => self.new_region(y, start, end, pixels),
+            };
         }
         self.rows[(y + 1) % 2] = above;
     }
 
     /// Gives every run its region for any reach: the same row first, then one pass for each row above.
+    #[inline(always)]
     fn link<T: Pixel>(&mut self, y: usize, current: &mut RowRuns, pixels: &[T]) {
         let n = self.rows.len();
         for i in 0..current.n {
@@ -173,6 +213,7 @@ impl Clusterer {
         }
     }
 
+    #[inline(always)]
     fn root(&mut self, mut label: u32) -> u32 {
         loop {
             let parent = self.regions[label as usize].parent;
@@ -282,19 +323,20 @@ pub(crate) fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
 ///
 /// A run starts at a set bit whose left neighbour is not set, and ends at one whose right neighbour is not; the two lists
 /// have the same length and order.
+#[inline(always)]
 fn find_runs(bits: &[u64], runs: &mut RowRuns) {
     let (mut n_start, mut n_end) = (0, 0);
     let mut left = 0u64;
-    for (w, &word) in bits.iter().enumerate() {
-        if word == 0 {
-            left = 0;
-            continue;
-        }
+    for (w, (&word, run_word)) in bits.iter().zip(&mut runs.words).enumerate() {
         let right = bits.get(w + 1).map_or(0, |next| next << 63);
         let base = w as u32 * 64;
-        n_start = columns(word & !(word << 1 | left), base, &mut runs.start, n_start);
-        n_end = columns(word & !(word >> 1 | right), base, &mut runs.end, n_end);
+        let (starts, ends) = (word & !(word << 1 | left), word & !(word >> 1 | right));
+        *run_word = RunWord { starts, ends, n_starts: n_start as u32, n_ends: n_end as u32 };
         left = word >> 63;
+        if word != 0 {
+            n_start = columns(starts, base, &mut runs.start, n_start);
+            n_end = columns(ends, base, &mut runs.end, n_end);
+        }
     }
     runs.n = n_start.min(n_end);
 }
@@ -408,7 +450,13 @@ mod tests {
     fn runs_cross_words_and_end_at_the_edge() {
         let found = |bits: &[u64]| {
             let n = bits.len() * 32 + 8;
-            let mut runs = RowRuns { n: 0, start: vec![0; n], end: vec![0; n], region: vec![0; n] };
+            let mut runs = RowRuns {
+                n: 0,
+                start: vec![0; n],
+                end: vec![0; n],
+                region: vec![0; n],
+                words: vec![RunWord::default(); bits.len()],
+            };
             find_runs(bits, &mut runs);
             (0..runs.n).map(|i| (runs.start[i], runs.end[i])).collect::<Vec<_>>()
         };

@@ -1,5 +1,6 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
+use super::region::RunSums;
 use super::spatial::SpatialPixel;
 use super::threshold::band;
 
@@ -11,6 +12,8 @@ pub trait Pixel: SpatialPixel + PartialOrd {
     fn value(self) -> f64;
     /// The value as f32; exact for every type here.
     fn value_f32(self) -> f32;
+    /// Sums over the pixels of a run.
+    fn run_sums(run: &[Self]) -> RunSums;
     /// The smallest and largest pixel inside the real band [`low`, `high`], or `None` if no pixel value lies in it.
     fn band(low: f64, high: f64) -> Option<(Self, Self)>;
     /// Writes bit `x` of `bits` for every `low <= row[x] <= high`, and 0 past the end; NaN is never set.
@@ -24,6 +27,22 @@ macro_rules! integer_pixel {
                 band::$band_bits(row, low, high, bits);
             }
             const STEP: f32 = 1.0;
+            #[inline(always)]
+            fn run_sums(run: &[Self]) -> RunSums {
+                if let [only] = run {
+                    let v = f32::from(*only);
+                    return RunSums { sum: f64::from(*only), sum_i: 0.0, min: v, max: v };
+                }
+                let (mut sum, mut sum_i, mut min, mut max) = (0u64, 0u64, Self::MAX, 0);
+                for (i, &v) in run.iter().enumerate() {
+                    sum += u64::from(v);
+                    sum_i += u64::from(v) * i as u64;
+                    min = min.min(v);
+                    max = max.max(v);
+                }
+                RunSums { sum: sum as f64, sum_i: sum_i as f64, min: f32::from(min), max: f32::from(max) }
+            }
+            #[inline]
             fn value(self) -> f64 {
                 f64::from(self)
             }
@@ -46,9 +65,22 @@ impl Pixel for f32 {
         band::band_bits_f32(row, low, high, bits);
     }
     const STEP: f32 = 0.0;
+    #[inline(always)]
+    fn run_sums(run: &[Self]) -> RunSums {
+        let mut sums = RunSums { sum: 0.0, sum_i: 0.0, min: Self::INFINITY, max: Self::NEG_INFINITY };
+        for (i, &v) in run.iter().enumerate() {
+            sums.sum += f64::from(v);
+            sums.sum_i += f64::from(v) * i as f64;
+            sums.min = sums.min.min(v);
+            sums.max = sums.max.max(v);
+        }
+        sums
+    }
+    #[inline]
     fn value(self) -> f64 {
         f64::from(self)
     }
+    #[inline]
     fn value_f32(self) -> f32 {
         self
     }

@@ -17,10 +17,6 @@ pub struct Region {
     pub top: u32,
     /// Lowest row.
     pub bottom: u32,
-    /// Number of run ends that have a neighbour inside the image.
-    pub n_edges: u32,
-    /// Sum over those run ends of |I inside - I outside|, counts.
-    pub edge_step: f32,
     /// Smallest value, counts.
     pub min: f32,
     /// Largest value, counts.
@@ -43,50 +39,52 @@ pub struct Region {
     pub yy: f64,
 }
 
+/// Sums over the pixels of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct RunSums {
+    /// Σ I.
+    pub sum: f64,
+    /// Σ I i, i counted from the first pixel of the run.
+    pub sum_i: f64,
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value.
+    pub max: f32,
+}
+
+/// Σ x and Σ x² of the columns start..=end, exact.
+#[inline(always)]
+fn column_sums(start: u32, end: u32) -> (f64, f64) {
+    if start == end {
+        let a = f64::from(start);
+        return (a, a * a);
+    }
+    let n = u64::from(end - start) + 1;
+    let middle = 0.5 * (f64::from(start) + f64::from(end));
+    let x = n as f64 * middle;
+    // Σ (x - middle)² = n (n² - 1) / 12; the product is divisible by 6.
+    (x, x * middle + 0.5 * (n * (n * n - 1) / 6) as f64)
+}
+
 impl Region {
     /// The moments of the run of pixels `start..=end` of row `y`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of_run<T: Pixel>(parent: u32, y: u32, start: u32, end: u32, row: &[T]) -> Self {
-        let (mut sum, mut sum_i, mut min, mut max) = (0.0f64, 0.0f64, f32::INFINITY, f32::NEG_INFINITY);
-        let pixels = row.get(start as usize..=end as usize).unwrap_or(&[]);
-        for (i, &p) in pixels.iter().enumerate() {
-            let v = p.value();
-            sum += v;
-            sum_i += v * i as f64;
-            let v = p.value_f32();
-            min = min.min(v);
-            max = max.max(v);
-        }
-        let (mut n_edges, mut edge_step) = (0, 0.0);
-        let mut edge = |inside: Option<&T>, outside: Option<&T>| {
-            if let (Some(a), Some(b)) = (inside, outside) {
-                let step = (a.value_f32() - b.value_f32()).abs();
-                if step.is_finite() {
-                    n_edges += 1;
-                    edge_step += step;
-                }
-            }
-        };
-        edge(row.get(start as usize), (start as usize).checked_sub(1).and_then(|i| row.get(i)));
-        edge(row.get(end as usize), row.get(end as usize + 1));
-        let n = f64::from(end - start + 1);
-        let (a, b) = (f64::from(start), f64::from(end));
-        let x = n * (a + b) / 2.0;
-        let xx = n * (n * n - 1.0) / 12.0 + x * x / n;
-        let yf = f64::from(y);
+        let RunSums { sum, sum_i, min, max } = T::run_sums(row.get(start as usize..=end as usize).unwrap_or(&[]));
+        let area = end - start + 1;
+        let (n, yf) = (f64::from(area), f64::from(y));
+        let (x, xx) = column_sums(start, end);
         Self {
             parent,
-            area: end - start + 1,
+            area,
             left: start,
             right: end,
             top: y,
             bottom: y,
-            n_edges,
-            edge_step,
             min,
             max,
             sum,
-            sum_x: sum_i + sum * a,
+            sum_x: sum_i + sum * f64::from(start),
             sum_y: sum * yf,
             x,
             y: n * yf,
@@ -96,22 +94,37 @@ impl Region {
         }
     }
 
-    /// Adds the run of pixels `start..=end` of row `y`.
-    #[inline]
+    /// Adds the run of pixels `start..=end` of row `y`, which is not above the region's lowest row.
+    #[inline(always)]
     pub(crate) fn add_run<T: Pixel>(&mut self, y: u32, start: u32, end: u32, row: &[T]) {
-        self.absorb(&Self::of_run(0, y, start, end, row));
+        let RunSums { sum, sum_i, min, max } = T::run_sums(row.get(start as usize..=end as usize).unwrap_or(&[]));
+        let area = end - start + 1;
+        let (n, yf) = (f64::from(area), f64::from(y));
+        let (x, xx) = column_sums(start, end);
+        self.area += area;
+        self.left = self.left.min(start);
+        self.right = self.right.max(end);
+        self.bottom = y;
+        self.min = self.min.min(min);
+        self.max = self.max.max(max);
+        self.sum += sum;
+        self.sum_x += sum_i + sum * f64::from(start);
+        self.sum_y += sum * yf;
+        self.x += x;
+        self.y += n * yf;
+        self.xx += xx;
+        self.xy += x * yf;
+        self.yy += n * yf * yf;
     }
 
     /// Adds another region's pixels.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn absorb(&mut self, other: &Self) {
         self.area += other.area;
         self.left = self.left.min(other.left);
         self.right = self.right.max(other.right);
         self.top = self.top.min(other.top);
         self.bottom = self.bottom.max(other.bottom);
-        self.n_edges += other.n_edges;
-        self.edge_step += other.edge_step;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
         self.sum += other.sum;
