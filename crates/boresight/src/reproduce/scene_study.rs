@@ -79,7 +79,7 @@ pub fn run_scene_of(mut source: SceneSource, readings: &[Reading]) -> Result<Sce
         .filter(|i| readings.iter().any(|r| r.inclusive == *i))
         .map(|i| (i, Clusterer::new(&linking(i))))
         .collect();
-    let around = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
+    let around = Surroundings::plain();
     let mut bits = vec![0u64; words(source.config().width_px)];
     while let Some(frame) = source.next_frame()? {
         let Pixels::Gray8(image) = &frame.pixels else {

@@ -266,7 +266,7 @@ impl Clusterer {
 /// assert_eq!(sizes(2.0, true), [3, 4, 3, 1, 1]);
 /// assert_eq!(sizes(3.0, false), [12]);
 ///
-/// let plain = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
+/// let plain = Surroundings::plain();
 /// let regions = segment(&image, 90, 110, &ClusterConfig::default());
 /// let mask = centroid(&regions[0], &image, CentroidMethod::Mask, &plain).position.add_scalar(1.0);
 /// assert!((mask.x - 1.3412969283276).abs() < 1e-12 && (mask.y - 1.3344709897611).abs() < 1e-12);

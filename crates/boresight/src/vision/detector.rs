@@ -114,7 +114,8 @@ impl ThresholdDetector {
     /// Variance of one pixel at intensity 0, counts², and its growth with intensity.
     fn pixel_noise<T: Pixel>(&mut self, image: &Image<T>) -> (f64, f64) {
         match &self.config.noise {
-            NoiseConfig::Given(g) => (g.read_counts * g.read_counts, g.gain),
+            // The rounding to whole counts is noise as well.
+            NoiseConfig::Given(g) => (g.read_counts * g.read_counts + f64::from(T::STEP) / 12.0, g.gain),
             NoiseConfig::Estimated => (noise_level(image, &mut self.samples).powi(2), 0.0),
         }
     }
@@ -142,21 +143,27 @@ impl ThresholdDetector {
             return;
         }
         let above_background = self.above_background();
-        if above_background || matches!(self.config.threshold, ThresholdConfig::Local(_)) {
+        let fresh_grid = above_background || matches!(self.config.threshold, ThresholdConfig::Local(_));
+        if fresh_grid {
             self.grid.refresh(image);
         }
         self.bright.begin(image.width());
         self.dark.begin(image.width());
+        // The level at which pixels join, where it is the same all over the frame.
+        let mut level = None;
         match &self.config.threshold {
             ThresholdConfig::Band(c) => {
                 let band = T::band(c.low, c.high);
+                level = band.map(|(low, high)| band_edge(low, high));
                 one_band(image, band, &mut self.bits, &mut self.bright);
             }
-            ThresholdConfig::Level(c) => one_side(image, c, &mut self.bits, &mut self.bright, &mut self.dark),
+            ThresholdConfig::Level(c) => {
+                level = one_side(image, c, &mut self.bits, &mut self.bright, &mut self.dark);
+            }
             ThresholdConfig::Otsu(c) => {
-                if let Some(level) = otsu_level(image) {
-                    let c = LevelConfig { level, side: c.side, exclusive: false };
-                    one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
+                if let Some(found) = otsu_level(image) {
+                    let c = LevelConfig { level: found, side: c.side, exclusive: false };
+                    level = one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
                 }
             }
             // Ran above: they have no rows of bits of their own.
@@ -175,12 +182,29 @@ impl ThresholdDetector {
                 }
             }
         }
+        let (min, max) = self.config.cluster.area_limits();
         for (clusters, dark) in [(&self.bright, false), (&self.dark, true)] {
-            let (min, max) = self.config.cluster.area_limits();
             for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
-                let background = if above_background { background_of(region, &self.grid) } else { 0.0 };
-                let sign = if above_background && dark { -1.0 } else { 1.0 };
-                let around = Surroundings { background, sign, variance, gain };
+                let local = fresh_grid.then(|| {
+                    let n = f64::from(region.area);
+                    self.grid.at(region.x / n, region.y / n)
+                });
+                let ground = local.map(|(median, _)| median);
+                let sign = if dark { -1.0 } else { 1.0 };
+                let level = match (&self.config.threshold, local) {
+                    (ThresholdConfig::Local(c), Some((median, deviation))) => {
+                        Some(median + sign * (c.k * deviation).max(c.min_contrast))
+                    }
+                    _ => level,
+                };
+                let around = Surroundings {
+                    background: ground.filter(|_| above_background).unwrap_or(0.0),
+                    sign: if above_background { sign } else { 1.0 },
+                    variance,
+                    gain,
+                    level,
+                    ground,
+                };
                 scan.detections.push(detection(region, image, &self.config, &around, dark));
             }
         }
@@ -188,9 +212,15 @@ impl ThresholdDetector {
     }
 }
 
-fn background_of(region: &Region, grid: &BackgroundGrid) -> f64 {
-    let n = f64::from(region.area);
-    grid.at(region.x / n, region.y / n).0
+/// The edge of a band towards the background: the lower one, or the upper one if the band has no lower end. Whole-number
+/// pixels join half a count before it.
+fn band_edge<T: Pixel>(low: T, high: T) -> f64 {
+    let half = 0.5 * f64::from(T::STEP);
+    if T::band(f64::NEG_INFINITY, f64::INFINITY).is_some_and(|(least, _)| low <= least) {
+        high.value() + half
+    } else {
+        low.value() - half
+    }
 }
 
 fn one_band<T: Pixel>(image: &Image<T>, band: Option<(T, T)>, bits: &mut [u64], clusters: &mut Clusterer) {
@@ -202,24 +232,26 @@ fn one_band<T: Pixel>(image: &Image<T>, band: Option<(T, T)>, bits: &mut [u64], 
     }
 }
 
-/// A level is a band with one open end.
+/// A level is a band with one open end; returns the edge.
 fn one_side<T: Pixel>(
     image: &Image<T>,
     c: &LevelConfig,
     bits: &mut [u64],
     bright: &mut Clusterer,
     dark: &mut Clusterer,
-) {
-    match c.side {
+) -> Option<f64> {
+    let (band, clusters) = match c.side {
         Side::Bright => {
             let low = if c.exclusive { c.level.next_up() } else { c.level };
-            one_band(image, T::band(low, f64::INFINITY), bits, bright);
+            (T::band(low, f64::INFINITY), bright)
         }
         Side::Dark => {
             let high = if c.exclusive { c.level.next_down() } else { c.level };
-            one_band(image, T::band(f64::NEG_INFINITY, high), bits, dark);
+            (T::band(f64::NEG_INFINITY, high), dark)
         }
-    }
+    };
+    one_band(image, band, bits, clusters);
+    band.map(|(low, high)| band_edge(low, high))
 }
 
 fn detection<T: Pixel>(

@@ -7,4 +7,5 @@ mod metrics;
 mod reproduce;
 mod rooms;
 mod tables;
+mod vision_covariance;
 mod vision_real;

@@ -222,6 +222,8 @@ fn detection<T: Pixel>(
         sign: if side == Side::Bright { 1.0 } else { -1.0 },
         variance: noise * noise,
         gain: 0.0,
+        level: Some(shape.level),
+        ground: Some(best.background),
     };
     let c = centroid(&region, image, config.centroid.method, &around);
     let extra = config.centroid.extra_sd_px * config.centroid.extra_sd_px;

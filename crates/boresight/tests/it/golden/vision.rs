@@ -56,7 +56,7 @@ fn clusters_and_centroids_are_the_golden_ones() {
                 }
                 assert_eq!(sums, [f64::from(r.area), r.x, r.y, r.xx, r.xy, r.yy], "{name}, label {k}");
             }
-            let plain = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
+            let plain = Surroundings::plain();
             for (method, key) in [
                 (CentroidMethod::Mask, "centroid_intensity"),
                 (CentroidMethod::Binary, "centroid_binary"),
