@@ -1,4 +1,5 @@
 //! Tests of the whole crate from outside: golden vectors, conformance of every form, numerics.
 
+mod conformance;
 mod forms;
 mod golden;

@@ -1,7 +1,7 @@
 //! Golden vectors of gating and probabilistic data association (SPEC D.4, E).
 
 use super::{golden, list, matrix, num, vector};
-use crate::forms::{each_form, forms};
+use crate::forms::{each_form, exact_forms};
 use boresight_filters::linalg::invert_pair;
 use boresight_filters::pda::{Clutter, association_probabilities};
 use boresight_filters::{Gaussian, Measurement, Weighted};
@@ -18,7 +18,7 @@ fn every_form_gives_the_golden_pda_update() {
     let Some(g) = golden("pda") else { return };
     for (i, (inp, out)) in g.cases.iter().enumerate() {
         let belief = Gaussian { mean: vector(&inp["x"]), cov: matrix(&inp["P"]) };
-        for (name, mut filter) in forms(&belief) {
+        for (name, mut filter) in exact_forms(&belief) {
             let predicted = filter.predicted();
             let z = measurements(inp);
             let gated: Vec<usize> = (0..z.len())
