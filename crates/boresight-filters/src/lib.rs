@@ -9,6 +9,7 @@
 
 pub mod adaptive;
 pub mod ar1;
+pub mod batch;
 pub mod bounds;
 pub mod consistency;
 pub mod converted;
