@@ -69,7 +69,9 @@ impl Consistency {
     /// Adds one normalised squared error; what is not finite counts as very large.
     pub fn add(&mut self, error2: f64) {
         self.n += 1;
-        self.sum += if error2.is_nan() { f64::MAX.sqrt() } else { error2.clamp(0.0, f64::MAX.sqrt()) };
+        // Large, but a sum of many stays finite.
+        const LARGE: f64 = 1e150;
+        self.sum += if error2.is_nan() { LARGE } else { error2.clamp(0.0, LARGE) };
     }
 
     /// Returns the mean; about `dof` for a consistent filter.

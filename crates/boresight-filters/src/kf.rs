@@ -8,7 +8,7 @@
 //! Cost: N = 4, constant velocity: about 60 flops to predict, 130 to correct (Joseph).
 
 use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{invert_pair, symmetrize};
+use crate::linalg::{halves_apart, invert_pair, symmetrize};
 use crate::mixture::{joseph, mixture_update};
 use crate::model::Model;
 use crate::real::all_finite;
@@ -31,6 +31,8 @@ pub struct Kf<M, const N: usize, T: Real = f64> {
     model: M,
     belief: Gaussian<N, T>,
     form: CovarianceForm,
+    /// The axes are uncorrelated and the model keeps them so: half the work.
+    apart: bool,
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
@@ -46,7 +48,8 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Kf<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
         crate::linalg::ud_factorize(&belief.cov)?;
-        Ok(Self { model, belief, form: CovarianceForm::Joseph })
+        let apart = M::AXES && halves_apart(&belief.cov);
+        Ok(Self { model, belief, form: CovarianceForm::Joseph, apart })
     }
 
     fn model(&self) -> &M {
@@ -68,13 +71,20 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
             return Ok(());
         }
         let mut next = self.belief;
-        self.model.propagate(dt_s, &mut next.mean, &mut next.cov);
+        if self.apart {
+            self.model.propagate_apart(dt_s, &mut next.mean, &mut next.cov);
+        } else {
+            self.model.propagate(dt_s, &mut next.mean, &mut next.cov);
+        }
         self.accept(next)
     }
 
     #[inline]
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         check_measurement(m)?;
+        if self.apart && m.cov[(1, 0)] == T::zero() && self.form == CovarianceForm::Joseph {
+            return self.correct_apart(m);
+        }
         let at = M::POSITION;
         let prior = position_of(&self.belief, at);
         let s = invert_pair(&(prior.cov + m.cov), "the innovation covariance")?;
@@ -104,7 +114,9 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
                 }
             }
         }
-        self.accept(next)
+        self.accept(next)?;
+        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
+        Ok(())
     }
 
     fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
@@ -112,7 +124,9 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
         I: Iterator<Item = Weighted<T>> + Clone,
     {
         let next = mixture_update(&self.belief, M::POSITION, hypotheses)?;
-        self.accept(next)
+        self.accept(next)?;
+        self.apart = M::AXES && halves_apart(&self.belief.cov);
+        Ok(())
     }
 
     #[inline]
@@ -123,6 +137,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
     fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
         check_belief(belief)?;
         self.belief = *belief;
+        self.apart = M::AXES && halves_apart(&belief.cov);
         Ok(())
     }
 
@@ -143,6 +158,44 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
+    /// The Joseph update of two uncorrelated axes, each measured by one number: N/2 states at a time.
+    #[inline(always)]
+    fn correct_apart(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        let half = N / 2;
+        let mut next = self.belief;
+        let p = &self.belief.cov;
+        let mut fine = true;
+        for axis in 0..2 {
+            let (from, to, at, r) = (axis * half, axis * half + half, M::POSITION[axis], m.cov[(axis, axis)]);
+            let s = p[(at, at)] + r;
+            let inv = T::one() / s;
+            fine &= s > T::zero() && inv <= T::MAX;
+            let nu = m.position[axis] - self.belief.mean[at];
+            let mut k = [T::zero(); N];
+            for i in from..to {
+                k[i] = p[(i, at)] * inv;
+                next.mean[i] += k[i] * nu;
+                fine &= next.mean[i].abs() <= T::MAX;
+            }
+            for j in from..to {
+                for i in from..=j {
+                    // (I - K H) P (I - K H)ᵀ + K R Kᵀ, the upper half only.
+                    let a = p[(i, j)] - k[i] * p[(at, j)];
+                    let b = (p[(i, at)] - k[i] * p[(at, at)]) - k[i] * r;
+                    let v = a - b * k[j];
+                    next.cov[(i, j)] = v;
+                    next.cov[(j, i)] = v;
+                    fine &= v.abs() <= T::MAX;
+                }
+            }
+        }
+        if !fine {
+            return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+        }
+        self.belief = next;
+        Ok(())
+    }
+
     /// Takes a new belief unless a sum overflowed.
     #[inline(always)]
     fn accept(&mut self, next: Gaussian<N, T>) -> Result<(), FilterError> {

@@ -8,7 +8,9 @@
 //! Cost: about 2 N²(N + W) flops per predict, 4 N² per correct, N³/3 to read the belief.
 
 use crate::filter::{check_belief, check_dt, check_measurement};
-use crate::linalg::{Cholesky, eliminate, fold_rows, mul, triangularize};
+use crate::linalg::{
+    Cholesky, eliminate, eliminate_in, fold_rows, fold_rows_in, halves_apart, mul, triangularize, triangularize_in,
+};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start};
@@ -134,11 +136,34 @@ impl<const N: usize, T: Real> InformationPair<N, T> {
     /// Moves the pair by x' = Phi x + G L w, w ~ N(0, I), given Phi⁻¹ and G L (any rank, zero allowed).
     #[inline]
     pub fn propagate<const W: usize>(&mut self, phi_inverse: &SMatrix<T, N, N>, noise_root: &SMatrix<T, N, W>) {
-        let mut r = mul(&self.r, phi_inverse);
-        let mut a = mul(&r, noise_root) * -T::one();
-        eliminate(&mut a, &mut r, &mut self.y);
-        triangularize(&mut r, &mut self.y);
-        self.r = r;
+        self.r = mul(&self.r, phi_inverse);
+        self.spread(noise_root, false);
+    }
+
+    /// The second half of [`InformationPair::propagate`]: R is R Phi⁻¹ already; `apart` works on each axis alone.
+    #[inline(always)]
+    fn spread<const W: usize>(&mut self, noise_root: &SMatrix<T, N, W>, apart: bool) {
+        let Self { r, y } = self;
+        if apart {
+            let mut a = SMatrix::<T, N, W>::zeros();
+            for axis in 0..2 {
+                let (n, w) = (N / 2, W / 2);
+                let (block, noise) = ((axis * n, axis * n + n), (axis * w, axis * w + w));
+                for c in noise.0..noise.1 {
+                    for i in block.0..block.1 {
+                        for k in i..block.1 {
+                            a[(i, c)] -= r[(i, k)] * noise_root[(k, c)];
+                        }
+                    }
+                }
+                eliminate_in(block, noise, &mut a, r, y);
+                triangularize_in(block.0, block.1, r, y);
+            }
+        } else {
+            let mut a = mul(r, noise_root) * -T::one();
+            eliminate(&mut a, r, y);
+            triangularize(r, y);
+        }
     }
 }
 
@@ -147,6 +172,8 @@ impl<const N: usize, T: Real> InformationPair<N, T> {
 pub struct Srif<M, const N: usize, T: Real = f64> {
     model: M,
     pair: InformationPair<N, T>,
+    /// The axes are uncorrelated and the model keeps them so: half the work.
+    apart: bool,
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
@@ -173,6 +200,27 @@ impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
         }
         let mut pair = self.pair;
         pair.measure(&h, &z);
+        self.accept(pair)?;
+        self.apart = self.apart && first.cov[(1, 0)] == T::zero() && second.cov[(1, 0)] == T::zero();
+        Ok(())
+    }
+
+    /// The measurement update of two uncorrelated axes, each measured by one number.
+    #[inline(always)]
+    fn correct_apart(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        check_measurement(m)?;
+        let mut pair = self.pair;
+        for axis in 0..2 {
+            let half = N / 2;
+            let white = T::one() / m.cov[(axis, axis)].sqrt();
+            if !(white > T::zero() && white <= T::MAX) {
+                return Err(FilterError::NotPositiveDefinite("the measurement covariance"));
+            }
+            let mut h = SMatrix::<T, 1, N>::zeros();
+            h[M::POSITION[axis]] = white;
+            let mut e = SVector::<T, 1>::new(m.position[axis] * white);
+            fold_rows_in(axis * half, axis * half + half, &mut pair.r, &mut pair.y, &mut h, &mut e);
+        }
         self.accept(pair)
     }
 
@@ -210,7 +258,8 @@ fn whitened<const N: usize, T: Real>(
 impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Srif<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
-        Ok(Self { model, pair: InformationPair::from_belief(&belief)? })
+        let apart = M::AXES && halves_apart(&belief.cov);
+        Ok(Self { model, pair: InformationPair::from_belief(&belief)?, apart })
     }
     fn model(&self) -> &M {
         &self.model
@@ -220,12 +269,13 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Srif<M, N, T> {
     }
 }
 
-struct TimeUpdate<'a, const N: usize, T> {
-    phi_inverse: &'a SMatrix<T, N, N>,
+/// Holds the pair with R Phi⁻¹ in place of R.
+struct TimeUpdate<const N: usize, T> {
     pair: InformationPair<N, T>,
+    apart: bool,
 }
 
-impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<'_, N, T> {
+impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<N, T> {
     type Out = InformationPair<N, T>;
     #[inline]
     fn visit<const W: usize>(mut self, g: &SMatrix<T, N, W>, q: &SVector<T, W>) -> Self::Out {
@@ -236,7 +286,7 @@ impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<'_, N, T> {
                 root[(i, c)] *= s;
             }
         }
-        self.pair.propagate(self.phi_inverse, &root);
+        self.pair.spread(&root, self.apart);
         self.pair
     }
 }
@@ -250,17 +300,14 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Srif<M, N, T
         if dt_s == T::zero() {
             return Ok(());
         }
-        let mut next = if M::LINEAR {
-            let back = self.model.inverse_transition(dt_s, &self.pair.y)?;
-            self.model.with_noise_factor(dt_s, TimeUpdate { phi_inverse: &back, pair: self.pair })?
-        } else {
-            let mean = self.pair.mean();
-            let back = self.model.inverse_transition(dt_s, &mean)?;
-            let mut next = self.model.with_noise_factor(dt_s, TimeUpdate { phi_inverse: &back, pair: self.pair })?;
+        let mean = if M::LINEAR { self.pair.y } else { self.pair.mean() };
+        let r = self.model.times_inverse_transition(dt_s, &mean, &self.pair.r)?;
+        let moved = InformationPair { r, y: self.pair.y };
+        let mut next = self.model.with_noise_factor(dt_s, TimeUpdate { pair: moved, apart: self.apart })?;
+        if !M::LINEAR {
             // The pair moved by the Jacobian; the mean moves by the function itself.
             next.y = mul(&next.r, &self.model.moved(dt_s, &mean));
-            next
-        };
+        }
         for i in 0..N {
             // A step cannot create exact ignorance; only underflow can, and accept() refuses it.
             next.r[(i, i)] = next.r[(i, i)].abs();
@@ -270,10 +317,15 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Srif<M, N, T
 
     #[inline]
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        if self.apart && m.cov[(1, 0)] == T::zero() {
+            return self.correct_apart(m);
+        }
         let (h, z) = whitened::<N, T>(m, M::POSITION)?;
         let mut pair = self.pair;
         pair.measure(&h, &z);
-        self.accept(pair)
+        self.accept(pair)?;
+        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
+        Ok(())
     }
 
     fn belief(&self) -> Gaussian<N, T> {
@@ -283,6 +335,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Srif<M, N, T
     fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
         check_belief(belief)?;
         self.pair = InformationPair::from_belief(belief)?;
+        self.apart = M::AXES && halves_apart(&belief.cov);
         Ok(())
     }
 

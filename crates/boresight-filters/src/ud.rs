@@ -8,7 +8,7 @@
 //! Limits: none of rank: a zero variance is allowed. Cost: about N²(N + W) + 3 N² flops per predict + update.
 
 use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{UdFactors, mul, mwgs, ud_factorize};
+use crate::linalg::{UdFactors, halves_apart, mwgs, mwgs_in, ud_factorize};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start};
@@ -67,12 +67,24 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
     a: &SVector<T, N>,
     r: T,
 ) -> ScalarUpdate<N, T> {
+    factor_update_in((0, N), factors, a, r)
+}
+
+/// [`factor_update`] where a, U and D matter only in one diagonal block.
+#[inline(always)]
+fn factor_update_in<const N: usize, T: Real>(
+    block: (usize, usize),
+    factors: &mut UdFactors<N, T>,
+    a: &SVector<T, N>,
+    r: T,
+) -> ScalarUpdate<N, T> {
     let UdFactors { u, d } = factors;
+    let (from, to) = block;
     let mut f = [T::zero(); N];
     let mut g = [T::zero(); N];
-    for j in 0..N {
+    for j in from..to {
         let mut sum = a[j];
-        for i in 0..j {
+        for i in from..j {
             sum += u[(i, j)] * a[i];
         }
         f[j] = sum;
@@ -80,7 +92,7 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
     }
     let mut gain = SVector::<T, N>::zeros();
     let mut alpha = r;
-    for j in 0..N {
+    for j in from..to {
         let before = alpha;
         alpha += g[j] * f[j];
         // Both are 0 only for r = 0 and directions already known exactly.
@@ -88,7 +100,7 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
         if alpha > T::zero() {
             d[j] *= before / alpha;
         }
-        for i in 0..j {
+        for i in from..j {
             let t = u[(i, j)];
             u[(i, j)] = t + lambda * gain[i];
             gain[i] += g[j] * t;
@@ -97,7 +109,7 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
     }
     if alpha > T::zero() {
         let inv = T::one() / alpha;
-        for i in 0..N {
+        for i in from..to {
             gain[i] *= inv;
         }
     }
@@ -110,6 +122,8 @@ pub struct Ud<M, const N: usize, T: Real = f64> {
     model: M,
     mean: SVector<T, N>,
     factors: UdFactors<N, T>,
+    /// The axes are uncorrelated and the model keeps them so: half the work.
+    apart: bool,
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Ud<M, N, T> {
@@ -132,7 +146,8 @@ impl<M: Model<N, T>, const N: usize, T: Real> Ud<M, N, T> {
 impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
-        Ok(Self { model, mean: belief.mean, factors: ud_factorize(&belief.cov)? })
+        let apart = M::AXES && halves_apart(&belief.cov);
+        Ok(Self { model, mean: belief.mean, factors: ud_factorize(&belief.cov)?, apart })
     }
 
     fn model(&self) -> &M {
@@ -148,13 +163,21 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
 struct TimeUpdate<'a, const N: usize, T> {
     phi_u: SMatrix<T, N, N>,
     d: &'a SVector<T, N>,
+    apart: bool,
 }
 
 impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<'_, N, T> {
     type Out = UdFactors<N, T>;
     #[inline]
     fn visit<const W: usize>(self, g: &SMatrix<T, N, W>, q: &SVector<T, W>) -> Self::Out {
-        mwgs(&self.phi_u, self.d, g, q)
+        if !self.apart {
+            return mwgs(&self.phi_u, self.d, g, q);
+        }
+        let mut f = UdFactors { u: SMatrix::identity(), d: SVector::zeros() };
+        let (n, w) = (N / 2, W / 2);
+        mwgs_in((0, n), (0, w), &mut f, &self.phi_u, self.d, g, q);
+        mwgs_in((n, N), (w, W), &mut f, &self.phi_u, self.d, g, q);
+        f
     }
 }
 
@@ -167,8 +190,8 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ud<M, N, T> 
         if dt_s == T::zero() {
             return Ok(());
         }
-        let phi_u = mul(&self.model.transition(dt_s, &self.mean), &self.factors.u);
-        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi_u, d: &self.factors.d })?;
+        let phi_u = self.model.transition_times(dt_s, &self.mean, &self.factors.u);
+        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi_u, d: &self.factors.d, apart: self.apart })?;
         self.accept(self.model.moved(dt_s, &self.mean), next)
     }
 
@@ -176,13 +199,35 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ud<M, N, T> 
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         check_measurement(m)?;
         let (mut mean, mut factors) = (self.mean, self.factors);
+        if self.apart && m.cov[(1, 0)] == T::zero() {
+            let mut regular = true;
+            for axis in 0..2 {
+                let half = N / 2;
+                let block = (axis * half, axis * half + half);
+                let at = M::POSITION[axis];
+                let mut a = SVector::<T, N>::zeros();
+                a[at] = T::one();
+                let done = factor_update_in(block, &mut factors, &a, m.cov[(axis, axis)]);
+                regular &= done.alpha > T::zero();
+                let innovation = m.position[axis] - self.mean[at];
+                for i in block.0..block.1 {
+                    mean[i] += done.gain[i] * innovation;
+                }
+            }
+            if !regular {
+                return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+            }
+            return self.accept(mean, factors);
+        }
         for (a, z, r) in whitened_rows::<N, T>(m, M::POSITION)? {
             let done = ud_scalar_update(&mut mean, &mut factors, &a, z, r);
             if !(done.alpha > T::zero()) {
                 return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
             }
         }
-        self.accept(mean, factors)
+        self.accept(mean, factors)?;
+        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
+        Ok(())
     }
 
     fn belief(&self) -> Gaussian<N, T> {
@@ -193,6 +238,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ud<M, N, T> 
         check_belief(belief)?;
         self.factors = ud_factorize(&belief.cov)?;
         self.mean = belief.mean;
+        self.apart = M::AXES && halves_apart(&belief.cov);
         Ok(())
     }
 

@@ -10,10 +10,15 @@ use nalgebra::{SMatrix, SVector};
 /// Reflector of (head, tail): returns s and β with u = (head - s, tail); `None` for a zero vector.
 #[inline(always)]
 fn reflector<T: Real, const M: usize>(head: T, tail: &[T; M]) -> Option<(T, T, T)> {
-    let mut norm2 = head * head;
+    let mut tail2 = T::zero();
     for v in tail {
-        norm2 += *v * *v;
+        tail2 += *v * *v;
     }
+    // Already in place.
+    if tail2 == T::zero() {
+        return None;
+    }
+    let norm2 = head * head + tail2;
     let norm = norm2.sqrt();
     if !(norm > T::zero()) {
         return None;
@@ -34,11 +39,24 @@ pub fn fold_rows<T: Real, const N: usize, const M: usize>(
     b: &mut SMatrix<T, M, N>,
     e: &mut SVector<T, M>,
 ) {
-    for j in 0..N {
+    fold_rows_in(0, N, r, y, b, e);
+}
+
+/// [`fold_rows`] of one diagonal block `from..to`, the rest being zero in these rows.
+#[inline(always)]
+pub(crate) fn fold_rows_in<T: Real, const N: usize, const M: usize>(
+    from: usize,
+    to: usize,
+    r: &mut SMatrix<T, N, N>,
+    y: &mut SVector<T, N>,
+    b: &mut SMatrix<T, M, N>,
+    e: &mut SVector<T, M>,
+) {
+    for j in from..to {
         let tail = b.data.0[j];
         if let Some((s, u0, beta)) = reflector(r[(j, j)], &tail) {
             r[(j, j)] = s;
-            for c in j + 1..N {
+            for c in j + 1..to {
                 let mut dot = u0 * r[(j, c)];
                 for k in 0..M {
                     dot += tail[k] * b[(k, c)];
@@ -60,7 +78,7 @@ pub fn fold_rows<T: Real, const N: usize, const M: usize>(
             }
         }
         if r[(j, j)] < T::zero() {
-            for c in j..N {
+            for c in j..to {
                 r[(j, c)] = -r[(j, c)];
             }
             y[j] = -y[j];
@@ -76,37 +94,53 @@ pub fn eliminate<T: Real, const N: usize, const W: usize>(
     r: &mut SMatrix<T, N, N>,
     y: &mut SVector<T, N>,
 ) {
-    for j in 0..W {
-        let tail = a.data.0[j];
-        // The head is 1: the unit block stays a unit block to the right of its diagonal.
+    eliminate_in((0, N), (0, W), a, r, y);
+}
+
+/// [`eliminate`] of the unknowns `noise` that reach only the diagonal block `block`.
+#[inline(always)]
+pub(crate) fn eliminate_in<T: Real, const N: usize, const W: usize>(
+    block: (usize, usize),
+    noise: (usize, usize),
+    a: &mut SMatrix<T, N, W>,
+    r: &mut SMatrix<T, N, N>,
+    y: &mut SVector<T, N>,
+) {
+    let (from, to) = block;
+    for j in noise.0..noise.1 {
+        let mut tail = [T::zero(); N];
+        for k in from..to {
+            tail[k] = a[(k, j)];
+        }
+        // The head is 1: the unit block stays a unit block to the right of its diagonal, and row j of it is zero in
+        // every later column, so the dot products are over the tail alone.
         let Some((_, _, beta)) = reflector(T::one(), &tail) else { continue };
-        // Row j of the unit block is zero in every later column, so the dot products are over the tail alone.
-        for c in j + 1..W {
+        for c in j + 1..noise.1 {
             let mut dot = T::zero();
-            for k in 0..N {
+            for k in from..to {
                 dot += tail[k] * a[(k, c)];
             }
             let f = beta * dot;
-            for k in 0..N {
+            for k in from..to {
                 a[(k, c)] += f * tail[k];
             }
         }
-        for c in 0..N {
+        for c in from..to {
             let mut dot = T::zero();
-            for k in 0..N {
+            for k in from..to {
                 dot += tail[k] * r[(k, c)];
             }
             let f = beta * dot;
-            for k in 0..N {
+            for k in from..to {
                 r[(k, c)] += f * tail[k];
             }
         }
         let mut dot = T::zero();
-        for k in 0..N {
+        for k in from..to {
             dot += tail[k] * y[k];
         }
         let f = beta * dot;
-        for k in 0..N {
+        for k in from..to {
             y[k] += f * tail[k];
         }
     }
@@ -115,41 +149,52 @@ pub fn eliminate<T: Real, const N: usize, const W: usize>(
 /// Triangularises a full `[R | y]` to upper triangular with a diagonal of at least 0.
 #[inline]
 pub fn triangularize<T: Real, const N: usize>(r: &mut SMatrix<T, N, N>, y: &mut SVector<T, N>) {
-    for j in 0..N {
+    triangularize_in(0, N, r, y);
+}
+
+/// [`triangularize`] of one diagonal block `from..to`.
+#[inline(always)]
+pub(crate) fn triangularize_in<T: Real, const N: usize>(
+    from: usize,
+    to: usize,
+    r: &mut SMatrix<T, N, N>,
+    y: &mut SVector<T, N>,
+) {
+    for j in from..to {
         let mut tail = [T::zero(); N];
-        for k in j + 1..N {
+        for k in j + 1..to {
             tail[k] = r[(k, j)];
         }
         if let Some((s, u0, beta)) = reflector(r[(j, j)], &tail) {
             r[(j, j)] = s;
-            for c in j + 1..N {
+            for c in j + 1..to {
                 let mut dot = u0 * r[(j, c)];
-                for k in j + 1..N {
+                for k in j + 1..to {
                     dot += tail[k] * r[(k, c)];
                 }
                 let f = beta * dot;
                 r[(j, c)] += f * u0;
-                for k in j + 1..N {
+                for k in j + 1..to {
                     r[(k, c)] += f * tail[k];
                 }
             }
             let mut dot = u0 * y[j];
-            for k in j + 1..N {
+            for k in j + 1..to {
                 dot += tail[k] * y[k];
             }
             let f = beta * dot;
             y[j] += f * u0;
-            for k in j + 1..N {
+            for k in j + 1..to {
                 y[k] += f * tail[k];
             }
         }
         if r[(j, j)] < T::zero() {
-            for c in j..N {
+            for c in j..to {
                 r[(j, c)] = -r[(j, c)];
             }
             y[j] = -y[j];
         }
-        for k in j + 1..N {
+        for k in j + 1..to {
             r[(k, j)] = T::zero();
         }
     }

@@ -8,8 +8,10 @@ mod ud;
 
 pub use cholesky::Cholesky;
 pub use householder::{eliminate, fold_rows, lower_factor, triangularize};
+pub(crate) use householder::{eliminate_in, fold_rows_in, triangularize_in};
 pub use pair::{Pair, invert_pair};
 pub use spectral::spectral_norm;
+pub(crate) use ud::mwgs_in;
 pub use ud::{UdFactors, mwgs, ud_factorize};
 
 use crate::{FilterError, Real};
@@ -97,6 +99,19 @@ pub(crate) fn symmetrize<T: Real, const N: usize>(m: &mut SMatrix<T, N, N>) {
             m[(c, r)] = mean;
         }
     }
+}
+
+/// Returns whether the two halves of a state (its axes) share no entry: both off-diagonal blocks are exactly 0.
+#[inline(always)]
+pub(crate) fn halves_apart<T: Real, const N: usize>(m: &SMatrix<T, N, N>) -> bool {
+    let half = N / 2;
+    let mut apart = true;
+    for c in half..N {
+        for r in 0..half {
+            apart &= m[(r, c)] == T::zero() && m[(c, r)] == T::zero();
+        }
+    }
+    apart
 }
 
 /// Returns whether a matrix is symmetric up to rounding, relative to its diagonal.

@@ -64,6 +64,7 @@ pub(crate) fn lift_to_acceleration<T: Real>(k: &Gaussian<4, T>, start_std: T) ->
 impl<T: Real> Model<6, T> for ConstantAcceleration<T> {
     const POSITION: [usize; 2] = [0, 3];
     const VELOCITY: Option<[usize; 2]> = Some([1, 4]);
+    const AXES: bool = true;
 
     fn transition(&self, dt: T, _at: &SVector<T, 6>) -> SMatrix<T, 6, 6> {
         let (o, z) = (T::one(), T::zero());

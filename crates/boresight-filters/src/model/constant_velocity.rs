@@ -58,6 +58,7 @@ impl<T: Real> ConstantVelocity<T> {
 impl<T: Real> Model<4, T> for ConstantVelocity<T> {
     const POSITION: [usize; 2] = [0, 2];
     const VELOCITY: Option<[usize; 2]> = Some([1, 3]);
+    const AXES: bool = true;
 
     #[inline]
     fn transition(&self, dt: T, _at: &SVector<T, 4>) -> SMatrix<T, 4, 4> {
@@ -91,7 +92,32 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
     }
 
     #[inline]
-    fn propagate(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
+    fn transition_times(&self, dt: T, _at: &SVector<T, 4>, a: &SMatrix<T, 4, 4>) -> SMatrix<T, 4, 4> {
+        let mut out = *a;
+        for c in 0..4 {
+            out[(0, c)] = a[(0, c)] + dt * a[(1, c)];
+            out[(2, c)] = a[(2, c)] + dt * a[(3, c)];
+        }
+        out
+    }
+
+    #[inline]
+    fn times_inverse_transition(
+        &self,
+        dt: T,
+        _at: &SVector<T, 4>,
+        a: &SMatrix<T, 4, 4>,
+    ) -> Result<SMatrix<T, 4, 4>, FilterError> {
+        let mut out = *a;
+        for r in 0..4 {
+            out[(r, 1)] = a[(r, 1)] - dt * a[(r, 0)];
+            out[(r, 3)] = a[(r, 3)] - dt * a[(r, 2)];
+        }
+        Ok(out)
+    }
+
+    #[inline(always)]
+    fn propagate_apart(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
         *x = self.moved(dt, x);
         let (q00, q01, q11) = self.axis_noise(dt);
         // Each 2 x 2 block B of P becomes F B Fᵀ with F = [[1, dt], [0, 1]].
@@ -103,6 +129,11 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
             p[(i + 1, i)] = v + q01;
             p[(i + 1, i + 1)] += q11;
         }
+    }
+
+    #[inline]
+    fn propagate(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
+        self.propagate_apart(dt, x, p);
         let cross = Matrix2::new(p[(0, 2)], p[(0, 3)], p[(1, 2)], p[(1, 3)]);
         let top = [cross[(0, 0)] + dt * cross[(1, 0)], cross[(0, 1)] + dt * cross[(1, 1)]];
         let block = [top[0] + dt * top[1], top[1], cross[(1, 0)] + dt * cross[(1, 1)], cross[(1, 1)]];

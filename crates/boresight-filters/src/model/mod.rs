@@ -36,6 +36,9 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
     const VELOCITY: Option<[usize; 2]>;
     /// Whether Phi is the same at every state.
     const LINEAR: bool = true;
+    /// Whether the state is two independent axes, x in the first half and y, alike, in the second, and the noise factor
+    /// has the columns of x first and as many of y after them: filters then skip the zeros between uncorrelated axes.
+    const AXES: bool = false;
 
     /// Returns Phi for a step of `dt_s` seconds; a nonlinear model linearises at the state `at`.
     fn transition(&self, dt_s: T, at: &SVector<T, N>) -> SMatrix<T, N, N>;
@@ -64,6 +67,31 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
         *x = self.moved(dt_s, x);
         *p = mul_transposed(&mul(&phi, p), &phi) + self.process_noise(dt_s);
         symmetrize(p);
+    }
+
+    /// Returns Phi A.
+    #[inline]
+    fn transition_times(&self, dt_s: T, at: &SVector<T, N>, a: &SMatrix<T, N, N>) -> SMatrix<T, N, N> {
+        mul(&self.transition(dt_s, at), a)
+    }
+
+    /// Returns A Phi⁻¹.
+    /// # Errors
+    /// As [`Model::inverse_transition`].
+    #[inline]
+    fn times_inverse_transition(
+        &self,
+        dt_s: T,
+        at: &SVector<T, N>,
+        a: &SMatrix<T, N, N>,
+    ) -> Result<SMatrix<T, N, N>, FilterError> {
+        Ok(mul(a, &self.inverse_transition(dt_s, at)?))
+    }
+
+    /// [`Model::propagate`] for a P whose axes are uncorrelated; only called where [`Model::AXES`] holds.
+    #[inline]
+    fn propagate_apart(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        self.propagate(dt_s, x, p);
     }
 
     /// Hands the factored process noise Q = G diag(q) Gᵀ to the visitor; the default factors Q with W = N.

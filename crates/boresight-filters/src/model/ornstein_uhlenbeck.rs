@@ -40,6 +40,7 @@ impl<T: Real> OrnsteinUhlenbeck<T> {
 impl<T: Real> Model<4, T> for OrnsteinUhlenbeck<T> {
     const POSITION: [usize; 2] = [0, 2];
     const VELOCITY: Option<[usize; 2]> = Some([1, 3]);
+    const AXES: bool = true;
 
     fn transition(&self, dt: T, _at: &SVector<T, 4>) -> SMatrix<T, 4, 4> {
         let [p, v] = self.response(dt);

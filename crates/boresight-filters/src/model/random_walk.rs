@@ -27,6 +27,7 @@ impl<T: Real> RandomWalk<T> {
 impl<T: Real> Model<2, T> for RandomWalk<T> {
     const POSITION: [usize; 2] = [0, 1];
     const VELOCITY: Option<[usize; 2]> = None;
+    const AXES: bool = true;
 
     fn transition(&self, _dt: T, _at: &SVector<T, 2>) -> SMatrix<T, 2, 2> {
         SMatrix::identity()

@@ -44,6 +44,7 @@ impl<const N: usize, T: Real, M: Model<N, T>> Model<N, T> for Scaled<M, T> {
     const POSITION: [usize; 2] = M::POSITION;
     const VELOCITY: Option<[usize; 2]> = M::VELOCITY;
     const LINEAR: bool = M::LINEAR;
+    const AXES: bool = M::AXES;
 
     fn transition(&self, dt_s: T, at: &SVector<T, N>) -> SMatrix<T, N, N> {
         self.model.transition(dt_s, at)

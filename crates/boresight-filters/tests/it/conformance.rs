@@ -92,10 +92,15 @@ fn every_exact_form_agrees_with_joseph_on_a_thousand_random_problems() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for problem in 0..1000 {
         let a = Matrix4::from_fn(|_, _| normal(&mut rng));
-        let start = Gaussian {
+        let mut start = Gaussian {
             mean: Vector4::from_fn(|_, _| 10.0 * normal(&mut rng)),
             cov: a * a.transpose() + Matrix4::identity() * 0.05,
         };
+        // Every second problem starts with uncorrelated axes, which the forms treat on a path of their own.
+        if problem % 2 == 0 {
+            start.cov.fixed_view_mut::<2, 2>(0, 2).fill(0.0);
+            start.cov.fixed_view_mut::<2, 2>(2, 0).fill(0.0);
+        }
         let b = Matrix2::from_fn(|_, _| normal(&mut rng));
         // Every third problem has a full measurement covariance, every third a hypothesis that may be clutter.
         let full = if problem % 3 == 0 { b * b.transpose() } else { Matrix2::zeros() };

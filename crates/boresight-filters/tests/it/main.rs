@@ -3,3 +3,5 @@
 mod conformance;
 mod forms;
 mod golden;
+mod nonlinear;
+mod numerics;
