@@ -3,11 +3,13 @@
 //! [`evaluate`] gives CLEAR, identity and HOTA of a result against a truth; [`set`] the distances between sets of points.
 
 pub mod assignment;
+pub mod bootstrap;
 pub mod cells;
 pub mod clear;
 pub mod clear_classic;
 pub mod consistency;
 pub mod detection;
+pub mod doubts;
 pub mod hota;
 pub mod identity;
 pub mod image;

@@ -25,14 +25,14 @@ pub fn read(path: &Path, options: ReadOptions) -> Result<(TrackTable, BadRows)> 
         if number == 1 || comma.is_none() {
             comma = separator(line);
         }
-        let pushed = row(Fields::new(line, comma)).and_then(|r| table.push(&r));
+        let pushed = row(Fields::new(line, comma), options.frames_from_zero).and_then(|r| table.push(&r));
         pushed.or_else(|e| bad.note(options, e.at(format!("{} line {number}", path.display()))))
     })?;
     Ok((table.finish(0)?, bad))
 }
 
-fn row(mut f: Fields<'_>) -> Result<TrackRow> {
-    let frame = f.integer("a frame number")?;
+fn row(mut f: Fields<'_>, from_zero: bool) -> Result<TrackRow> {
+    let frame = f.integer("a frame number")? + i64::from(from_zero);
     if !(1..=100_000_000).contains(&frame) {
         let e = Error::new(ErrorKind::Damaged, format!("frame {frame}: expected a number from 1 to 100 000 000"));
         return Err(if frame == 0 {

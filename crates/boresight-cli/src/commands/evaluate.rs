@@ -1,0 +1,268 @@
+//! `boresight evaluate`: how good is a result against the truth, by every measure of the field.
+
+mod compare;
+mod html;
+mod measures;
+mod sequences;
+mod table;
+
+use anyhow::{Context, bail};
+use boresight::io::tracks::Format;
+use boresight::metrics::{KittiClass, MatchOptions, Rules, Similarity};
+use clap::ValueEnum;
+use measures::Judged;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Judges results against the truth.
+#[derive(Debug, clap::Args)]
+#[command(long_about = "Judges results against the truth.\n\n\
+TRUTH and RESULT are tables (MOTChallenge, KITTI, CSV with named columns, Cell Tracking Challenge folders), told by their \
+look. For several sequences give folders (TRUTH/SEQ/gt/gt.txt or TRUTH/SEQ/gt.txt, RESULT/SEQ.txt) or paths with {seq} \
+where the names of the sequences stand: 'data/{seq}/gt.txt' 'data/{seq}/result.txt'.")]
+pub struct Args {
+    /// The truth: a table, a folder of sequences, or a path with {seq}.
+    truth: String,
+    /// The result, likewise.
+    result: String,
+    /// Further results to compare with the first, with confidence intervals.
+    #[arg(long, num_args = 1.., value_name = "RESULT")]
+    compare: Vec<String>,
+    /// Format of the truth, if its look deceives.
+    #[arg(long, value_parser = format)]
+    truth_format: Option<Format>,
+    /// Format of the results, if their look deceives.
+    #[arg(long, value_parser = format)]
+    result_format: Option<Format>,
+    /// What is left out before counting.
+    #[arg(long, value_enum, default_value = "auto")]
+    rules: RulesArg,
+    /// What makes a truth and a result match: overlap of boxes, or nearness of centres. Points always match by centres.
+    #[arg(long = "match", value_enum, default_value = "iou")]
+    matching: MatchArg,
+    /// Overlap from which a pair matches, in (0, 1].
+    #[arg(long, default_value_t = 0.5)]
+    threshold: f64,
+    /// Distance up to which centres match, px.
+    #[arg(long, default_value_t = 5.0)]
+    distance: f64,
+    /// How CLEAR counts: as TrackEval, or as py-motmetrics and the MATLAB kit.
+    #[arg(long, value_enum, default_value = "trackeval")]
+    convention: Convention,
+    /// Cutoff c of OSPA and GOSPA, px.
+    #[arg(long, default_value_t = 10.0)]
+    cutoff: f64,
+    /// Order p of OSPA and GOSPA.
+    #[arg(long, default_value_t = 2.0)]
+    order: f64,
+    /// Window of OSPA(2), frames.
+    #[arg(long, default_value_t = 50)]
+    window: usize,
+    /// Assign OSPA by plain distances, as Stone Soup does, instead of by their p-th powers.
+    #[arg(long)]
+    stonesoup_ospa: bool,
+    /// Frames per second, for rates per hour and times; taken from seqinfo.ini where there is one.
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Size of the frames as WIDTHxHEIGHT, px, for rates per megapixel; taken from seqinfo.ini where there is one.
+    #[arg(long, value_parser = size)]
+    size: Option<(f64, f64)>,
+    /// Leave out malformed rows and count them.
+    #[arg(long)]
+    skip_bad_rows: bool,
+    /// Count rows of boresight's tables whose status is tentative.
+    #[arg(long)]
+    tentative: bool,
+    /// Frames of MOTChallenge truths count from 0 in the file.
+    #[arg(long)]
+    truth_from_zero: bool,
+    /// Frames of MOTChallenge results count from 0 in the file.
+    #[arg(long)]
+    result_from_zero: bool,
+    /// Demand a score, for instance HOTA=0.4 (at least) or GOSPA=5 (at most); exit code 1 if it is not met.
+    #[arg(long, value_name = "MEASURE=VALUE", value_parser = demand)]
+    require: Vec<(String, f64)>,
+    /// Write the scores of each sequence as CSV.
+    #[arg(long)]
+    csv: Option<PathBuf>,
+    /// Write all scores and curves as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write a report with plots.
+    #[arg(long)]
+    html: Option<PathBuf>,
+    /// Draws of the bootstrap.
+    #[arg(long, default_value_t = 1000)]
+    draws: usize,
+    /// Seed of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print CLEAR, identity and HOTA only, and compute nothing else.
+    #[arg(long)]
+    mot_only: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RulesArg {
+    /// By the truth's look: KITTI's, MOT17's if it has classes, MOT15's if not.
+    Auto,
+    /// All rows count.
+    None,
+    /// Truth rows with 0 in column 7 do not count.
+    Mot15,
+    /// Distractors as in MOT16 and MOT17.
+    Mot17,
+    /// Distractors as in MOT20.
+    Mot20,
+    /// Cars, with DontCare regions.
+    KittiCar,
+    /// Pedestrians, with DontCare regions.
+    KittiPedestrian,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MatchArg {
+    /// Intersection over union.
+    Iou,
+    /// Distance of the centres.
+    Centre,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Convention {
+    /// TrackEval.
+    Trackeval,
+    /// py-motmetrics.
+    Motmetrics,
+}
+
+/// Parses a format's name.
+pub fn format(text: &str) -> Result<Format, String> {
+    let names: Vec<&str> = Format::ALL.iter().map(|f| f.name()).collect();
+    Format::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| format!("expected one of {}", names.join(", ")))
+}
+
+fn size(text: &str) -> Result<(f64, f64), String> {
+    let (w, h) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, for instance 640x512")?;
+    match (w.parse::<f64>(), h.parse::<f64>()) {
+        (Ok(w), Ok(h)) if w > 0.0 && h > 0.0 && w.is_finite() && h.is_finite() => Ok((w, h)),
+        _ => Err("expected WIDTHxHEIGHT, for instance 640x512".into()),
+    }
+}
+
+fn demand(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected MEASURE=VALUE, for instance HOTA=0.4")?;
+    let value = value.parse::<f64>().map_err(|_| format!("expected a number after =, found \"{value}\""))?;
+    Ok((name.trim().to_string(), value))
+}
+
+impl Args {
+    /// The rules by which rows are left out, by the look of the truth where not said.
+    fn rules(&self, truth: &boresight::TrackTable, format: Format) -> Rules {
+        match self.rules {
+            RulesArg::None => Rules::None,
+            RulesArg::Mot15 => Rules::Mot15,
+            RulesArg::Mot17 => Rules::Mot17,
+            RulesArg::Mot20 => Rules::Mot20,
+            RulesArg::KittiCar => Rules::Kitti(KittiClass::Car),
+            RulesArg::KittiPedestrian => Rules::Kitti(KittiClass::Pedestrian),
+            RulesArg::Auto => match format {
+                Format::Kitti => Rules::Kitti(KittiClass::Car),
+                Format::Mot | Format::MotTruth => {
+                    let has_classes = (0..truth.n_rows()).any(|r| truth.class.get(r) != 1);
+                    if !has_classes {
+                        Rules::Mot15
+                    } else if truth.label.to_ascii_uppercase().contains("MOT20") {
+                        Rules::Mot20
+                    } else {
+                        Rules::Mot17
+                    }
+                }
+                _ => Rules::None,
+            },
+        }
+    }
+
+    fn match_options(&self, points: bool) -> MatchOptions {
+        if points || self.matching == MatchArg::Centre {
+            // Similarity 1 - d / d0 reaches one half at half of d0.
+            return MatchOptions {
+                similarity: Similarity::Centre { zero_distance_px: 2.0 * self.distance },
+                threshold: 0.5,
+            };
+        }
+        MatchOptions { similarity: Similarity::Iou, threshold: self.threshold }
+    }
+}
+
+/// Runs the command.
+/// # Errors
+/// Inputs that cannot be read or do not belong together; outputs that cannot be written.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if !(args.distance > 0.0 && args.distance.is_finite()) {
+        bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
+    }
+    let mut results = Vec::with_capacity(1 + args.compare.len());
+    for result in std::iter::once(&args.result).chain(&args.compare) {
+        let found = sequences::find(&args.truth, result)?;
+        let judged = measures::judge_all(&args, result, &found)?;
+        for note in &judged.notes {
+            eprintln!("note: {note}");
+        }
+        results.push(judged);
+    }
+    let comparison = if args.compare.is_empty() { Vec::new() } else { compare::compare(&args, &results)? };
+    let mut text = String::new();
+    for judged in &results {
+        text.push_str(&table::sequences(judged, args.mot_only));
+    }
+    text.push_str(&compare::table(&results, &comparison));
+    super::print(text.as_bytes())?;
+    write_files(&args, &results, &comparison)?;
+    demands(&args, &results[0])
+}
+
+fn write_files(args: &Args, results: &[Judged], comparison: &[compare::Row]) -> anyhow::Result<()> {
+    let put = |path: &PathBuf, bytes: String| {
+        std::fs::write(path, bytes).map_err(|e| {
+            boresight::Error::new(boresight::ErrorKind::Output, "cannot be written").at(path.display()).because(e)
+        })
+    };
+    if let Some(path) = &args.csv {
+        put(path, table::csv(results))?;
+    }
+    if let Some(path) = &args.json {
+        let value = serde_json::json!({
+            "results": results.iter().map(Judged::to_json).collect::<Vec<_>>(),
+            "comparison": comparison,
+        });
+        put(path, serde_json::to_string_pretty(&value).context("scores as JSON")?)?;
+    }
+    if let Some(path) = &args.html {
+        put(path, html::report(results, comparison))?;
+    }
+    Ok(())
+}
+
+fn demands(args: &Args, judged: &Judged) -> anyhow::Result<ExitCode> {
+    let mut met = true;
+    let combined = judged.combined_values();
+    for (name, limit) in &args.require {
+        let Some((key, value)) = combined.iter().find(|(k, _)| k.eq_ignore_ascii_case(name)) else {
+            let known: Vec<&str> = combined.iter().map(|c| c.0).collect();
+            bail!(
+                boresight::Error::new(boresight::ErrorKind::Config, "no such measure")
+                    .at(format!("--require {name}"))
+                    .hint(format!("one of {}", known.join(", ")))
+            );
+        };
+        let at_most = measures::lower_is_better(key);
+        let ok = if at_most { *value <= *limit } else { *value >= *limit };
+        if !ok {
+            met = false;
+            let word = if at_most { "at most" } else { "at least" };
+            eprintln!("not met: {key} = {value:.6}, demanded {word} {limit}");
+        }
+    }
+    Ok(if met { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}

@@ -1,0 +1,121 @@
+//! Finds the sequences of a truth and a result: single tables, folders, or paths with `{seq}`.
+
+use boresight::{Error, ErrorKind, Result};
+use std::path::{Path, PathBuf};
+
+/// A truth and a result of one sequence, and what seqinfo.ini says of it.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    pub name: String,
+    pub truth: PathBuf,
+    /// `None` where the result has no table for this sequence.
+    pub result: Option<PathBuf>,
+    pub info: Info,
+}
+
+/// What seqinfo.ini says.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Info {
+    pub n_frames: Option<usize>,
+    pub rate_hz: Option<f64>,
+    pub size_px: Option<(f64, f64)>,
+}
+
+fn info(truth: &Path) -> Info {
+    let folders = [truth.parent(), truth.parent().and_then(Path::parent)];
+    let text = folders.into_iter().flatten().find_map(|f| std::fs::read_to_string(f.join("seqinfo.ini")).ok());
+    let Some(text) = text else { return Info::default() };
+    let value = |key: &str| {
+        text.lines().find_map(|l| {
+            let (k, v) = l.split_once('=')?;
+            if k.trim().eq_ignore_ascii_case(key) { v.trim().parse::<f64>().ok().filter(|v| *v > 0.0) } else { None }
+        })
+    };
+    Info {
+        n_frames: value("seqLength").map(|n| n as usize),
+        rate_hz: value("frameRate"),
+        size_px: value("imWidth").zip(value("imHeight")),
+    }
+}
+
+fn names_in(folder: &Path) -> Result<Vec<String>> {
+    let entries = std::fs::read_dir(folder)
+        .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be opened").at(folder.display()).because(e))?;
+    let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
+    names.sort();
+    Ok(names)
+}
+
+fn first_file(candidates: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
+    candidates.into_iter().find(|p| p.is_file())
+}
+
+/// The names for which `pattern` (with `{seq}`) leads to something.
+fn names_of_pattern(pattern: &str) -> Result<Vec<String>> {
+    let (before, after) = pattern.split_once("{seq}").unwrap_or((pattern, ""));
+    let (folder, prefix) = before.rsplit_once('/').unwrap_or((".", before));
+    let folder = if folder.is_empty() { "/" } else { folder };
+    let suffix = after.split('/').next().unwrap_or("");
+    let names = names_in(Path::new(folder))?;
+    let middle = |n: String| Some(n.strip_prefix(prefix)?.strip_suffix(suffix)?.to_string());
+    Ok(names.into_iter().filter_map(middle).filter(|n| Path::new(&pattern.replace("{seq}", n)).exists()).collect())
+}
+
+/// Finds the sequences.
+/// # Errors
+/// A path that is not there; a folder without sequences; a result that fits none of them.
+pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
+    let (truth_path, result_path) = (Path::new(truth), Path::new(result));
+    let single = |p: &Path| p.is_file() || p.is_dir() && boresight::io::tracks::ctc::is_ctc(p);
+    let mut out = Vec::new();
+    let result_of = |name: &str| {
+        if result.contains("{seq}") {
+            let p = PathBuf::from(result.replace("{seq}", name));
+            return p.exists().then_some(p);
+        }
+        let short = name.trim_end_matches(".txt");
+        first_file([
+            result_path.join(format!("{short}.txt")),
+            result_path.join(format!("{short}.csv")),
+            result_path.join(short).join("tracks.csv"),
+            result_path.join(short).join(format!("{short}.txt")),
+            result_path.join("data").join(format!("{short}.txt")),
+        ])
+    };
+    if truth.contains("{seq}") {
+        for name in names_of_pattern(truth)? {
+            let path = PathBuf::from(truth.replace("{seq}", &name));
+            out.push(Sequence { info: info(&path), truth: path, result: result_of(&name), name });
+        }
+    } else if truth_path.is_dir() && !single(truth_path) {
+        for name in names_in(truth_path)? {
+            let p = truth_path.join(&name);
+            let inside = [p.join("gt").join("gt.txt"), p.join("gt.txt"), p.join("truth.csv")];
+            let table = if p.is_dir() { first_file(inside) } else { Some(p).filter(|p| p.extension().is_some_and(|e| e == "txt")) };
+            if let Some(table) = table {
+                let short = name.trim_end_matches(".txt").to_string();
+                out.push(Sequence { info: info(&table), truth: table, result: result_of(&short), name: short });
+            }
+        }
+    } else {
+        for p in [truth_path, result_path] {
+            if !p.exists() {
+                return Err(Error::new(ErrorKind::NotFound, "no such file or folder").at(p.display()));
+            }
+        }
+        let name = truth_path.file_stem().map_or_else(|| truth.to_string(), |s| s.to_string_lossy().into_owned());
+        out.push(Sequence { name, info: info(truth_path), truth: truth_path.into(), result: Some(result_path.into()) });
+    }
+    if out.is_empty() {
+        return Err(Error::new(ErrorKind::NotFound, "no sequences here")
+            .at(truth)
+            .hint("expected SEQ/gt/gt.txt, SEQ/gt.txt or SEQ.txt in it, or a path with {seq}"));
+    }
+    if out.iter().all(|s| s.result.is_none()) {
+        let names: Vec<&str> = out.iter().take(3).map(|s| s.name.as_str()).collect();
+        return Err(Error::new(ErrorKind::NotFound, format!("has no table for any of the sequences {} ..", names.join(", ")))
+            .at(result)
+            .hint("expected SEQ.txt in it, or a path with {seq}"));
+    }
+    Ok(out)
+}
