@@ -36,8 +36,7 @@ pub struct Args {
 /// # Errors
 /// An input that cannot be read; an output that cannot be written; a loss where none is allowed.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let options =
-        ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, frames_from_zero: args.from_zero };
+    let options = ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, frames_from_zero: args.from_zero };
     let file = read(&args.input, args.from, options, args.tentative)?;
     if let Some(first) = &file.bad.first {
         eprintln!("note: {} malformed rows left out; the first: {first}", file.bad.count);

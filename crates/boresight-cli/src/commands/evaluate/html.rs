@@ -39,7 +39,8 @@ fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f
     if points().next().is_none() {
         return String::new();
     }
-    let fold = |f: &dyn Fn(&(f64, f64)) -> f64, start: f64, pick: fn(f64, f64) -> f64| points().map(f).fold(start, pick);
+    let fold =
+        |f: &dyn Fn(&(f64, f64)) -> f64, start: f64, pick: fn(f64, f64) -> f64| points().map(f).fold(start, pick);
     let (x0, mut x1) = (fold(&|p| p.0, f64::INFINITY, f64::min), fold(&|p| p.0, f64::NEG_INFINITY, f64::max));
     let mut y1 = y_max.unwrap_or(1.05 * fold(&|p| p.1, 0.0, f64::max));
     if x1 <= x0 {
@@ -51,7 +52,10 @@ fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f
     let (w, h, left, top, right, bottom) = (560.0, 320.0, 58.0, 30.0, 12.0, 44.0);
     let px = |x: f64| left + (x - x0) / (x1 - x0) * (w - left - right);
     let py = |y: f64| h - bottom - (y / y1).clamp(0.0, 1.0) * (h - top - bottom);
-    let mut s = format!("<svg viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{0}\"><text x=\"{left}\" y=\"18\" class=\"t\">{0}</text>", escaped(title));
+    let mut s = format!(
+        "<svg viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{0}\"><text x=\"{left}\" y=\"18\" class=\"t\">{0}</text>",
+        escaped(title)
+    );
     for t in ticks(0.0, y1) {
         let y = py(t);
         let _ = write!(s, "<line x1=\"{left}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" class=\"g\"/>", w - right);
@@ -61,7 +65,13 @@ fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f
         let x = px(t);
         let _ = write!(s, "<text x=\"{x:.1}\" y=\"{}\" class=\"n m\">{}</text>", h - bottom + 16.0, label(t));
     }
-    let _ = write!(s, "<text x=\"{}\" y=\"{}\" class=\"n m\">{}</text>", (left + w - right) / 2.0, h - 8.0, escaped(x_name));
+    let _ = write!(
+        s,
+        "<text x=\"{}\" y=\"{}\" class=\"n m\">{}</text>",
+        (left + w - right) / 2.0,
+        h - 8.0,
+        escaped(x_name)
+    );
     let _ = write!(
         s,
         "<text transform=\"translate(14 {}) rotate(-90)\" class=\"n m\">{}</text>",
@@ -76,11 +86,20 @@ fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f
             .filter(|p| p.0.is_finite() && p.1.is_finite())
             .map(|p| format!("{:.1},{:.1}", px(p.0), py(p.1)))
             .collect();
-        let _ = write!(s, "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>", path.join(" "));
+        let _ = write!(
+            s,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>",
+            path.join(" ")
+        );
     }
     s.push_str("</svg><p class=\"l\">");
     for (k, line) in lines.iter().enumerate() {
-        let _ = write!(s, "<span><i style=\"background:{}\"></i>{}</span>", COLOURS[k % COLOURS.len()], escaped(&line.name));
+        let _ = write!(
+            s,
+            "<span><i style=\"background:{}\"></i>{}</span>",
+            COLOURS[k % COLOURS.len()],
+            escaped(&line.name)
+        );
     }
     s.push_str("</p>");
     format!("<figure>{s}</figure>")
@@ -96,7 +115,8 @@ fn table(judged: &Judged) -> String {
     let mut row = |name: &str, values: &[(&'static str, f64)]| {
         let _ = write!(out, "<tr><td>{}</td>", escaped(name));
         for (k, _) in &all {
-            let cell = values.iter().find(|v| v.0 == *k).filter(|v| v.1.is_finite()).map_or("–".to_string(), |v| label(v.1));
+            let cell =
+                values.iter().find(|v| v.0 == *k).filter(|v| v.1.is_finite()).map_or("–".to_string(), |v| label(v.1));
             let _ = write!(out, "<td>{cell}</td>");
         }
         out.push_str("</tr>");
@@ -142,11 +162,8 @@ fn plots(judged: &Judged) -> String {
             name: name.into(),
             points: thinned(r.gospa.iter().map(f)),
         };
-        let lines = [
-            part("localisation", |g| g.localisation),
-            part("missed", |g| g.missed),
-            part("false", |g| g.false_),
-        ];
+        let lines =
+            [part("localisation", |g| g.localisation), part("missed", |g| g.missed), part("false", |g| g.false_)];
         out.push_str(&plot(&format!("GOSPA by parts: {}", r.name), "frame", "cost, px^p", &lines, None));
     }
     out

@@ -57,8 +57,8 @@ pub struct Judged {
 /// Whether a smaller value of this measure is better.
 pub fn lower_is_better(key: &str) -> bool {
     const LOWER: [&str; 17] = [
-        "FP", "FN", "IDSW", "Frag", "ML", "FP/frame", "FN/frame", "GOSPA", "OSPA", "OSPA2", "missed", "false", "location",
-        "SIAP_S", "SIAP_PA", "SIAP_R", "RMSE",
+        "FP", "FN", "IDSW", "Frag", "ML", "FP/frame", "FN/frame", "GOSPA", "OSPA", "OSPA2", "missed", "false",
+        "location", "SIAP_S", "SIAP_PA", "SIAP_R", "RMSE",
     ];
     LOWER.contains(&key) || key.starts_with("FP/")
 }
@@ -77,7 +77,15 @@ fn open(args: &Args, path: &std::path::Path, truth: bool) -> Result<TrackFile> {
     };
     let mut file = read(path, Some(format), options, args.tentative).map_err(|e| {
         let zero = e.to_string().contains("frame 0:");
-        if zero { e.hint(if truth { "frames that count from 0: --truth-from-zero" } else { "frames that count from 0: --result-from-zero" }) } else { e }
+        if zero {
+            e.hint(if truth {
+                "frames that count from 0: --truth-from-zero"
+            } else {
+                "frames that count from 0: --result-from-zero"
+            })
+        } else {
+            e
+        }
     })?;
     file.table.label = path.display().to_string();
     Ok(file)
@@ -122,9 +130,12 @@ fn judge(args: &Args, s: &Sequence) -> Result<Row> {
     if let Some(n) = s.info.n_frames {
         for t in [&truth.table, &result.table] {
             if t.n_frames() > n {
-                return Err(Error::new(ErrorKind::Damaged, format!("has rows in frame {}, seqinfo.ini says {n} frames", t.n_frames()))
-                    .at(&t.label)
-                    .hint("is it of another sequence? frames count from 1 in MOTChallenge tables"));
+                return Err(Error::new(
+                    ErrorKind::Damaged,
+                    format!("has rows in frame {}, seqinfo.ini says {n} frames", t.n_frames()),
+                )
+                .at(&t.label)
+                .hint("is it of another sequence? frames count from 1 in MOTChallenge tables"));
             }
         }
         truth.table.extend_to(n);
@@ -163,7 +174,13 @@ fn centre(t: &TrackTable, r: usize) -> [f64; 2] {
     [e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0]
 }
 
-fn more(args: &Args, t: &TrackTable, r: &TrackTable, options: &boresight::metrics::MatchOptions, row: &mut Row) -> Result<()> {
+fn more(
+    args: &Args,
+    t: &TrackTable,
+    r: &TrackTable,
+    options: &boresight::metrics::MatchOptions,
+    row: &mut Row,
+) -> Result<()> {
     let assignment = if args.stonesoup_ospa { OspaAssignment::FirstPower } else { OspaAssignment::OrderP };
     let set = SetOptions { cutoff_px: args.cutoff, order: args.order, assignment };
     set.validate("--")?;
@@ -225,7 +242,9 @@ fn cells(truth: &std::path::Path, result: &std::path::Path) -> Result<CellScores
         let pixels = |i: &Option<boresight::Image<u16>>| i.as_ref().map_or(empty.clone(), |i| i.as_slice().to_vec());
         frames.push(CellFrame::of(&pixels(&a), &pixels(&b)).map_err(|e| e.at(format!("frame {frame}")))?);
     }
-    let parents = |f: &ctc::CtcFolder| f.lineages.iter().filter(|l| l.parent != 0).map(|l| (l.label, l.parent)).collect::<Vec<_>>();
+    let parents = |f: &ctc::CtcFolder| {
+        f.lineages.iter().filter(|l| l.parent != 0).map(|l| (l.label, l.parent)).collect::<Vec<_>>()
+    };
     cell_scores(&frames, &parents(&t), &parents(&r))
 }
 
@@ -357,7 +376,9 @@ impl Judged {
 
     /// All as JSON.
     pub fn to_json(&self) -> serde_json::Value {
-        let named = |v: Vec<(&str, f64)>| v.into_iter().map(|(k, x)| (k.to_string(), x.into())).collect::<serde_json::Map<_, _>>();
+        let named = |v: Vec<(&str, f64)>| {
+            v.into_iter().map(|(k, x)| (k.to_string(), x.into())).collect::<serde_json::Map<_, _>>()
+        };
         serde_json::json!({
             "result": self.label,
             "combined": named(self.combined_values()),

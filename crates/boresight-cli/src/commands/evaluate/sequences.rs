@@ -91,7 +91,11 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
         for name in names_in(truth_path)? {
             let p = truth_path.join(&name);
             let inside = [p.join("gt").join("gt.txt"), p.join("gt.txt"), p.join("truth.csv")];
-            let table = if p.is_dir() { first_file(inside) } else { Some(p).filter(|p| p.extension().is_some_and(|e| e == "txt")) };
+            let table = if p.is_dir() {
+                first_file(inside)
+            } else {
+                Some(p).filter(|p| p.extension().is_some_and(|e| e == "txt"))
+            };
             if let Some(table) = table {
                 let short = name.trim_end_matches(".txt").to_string();
                 out.push(Sequence { info: info(&table), truth: table, result: result_of(&short), name: short });
@@ -113,9 +117,12 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
     }
     if out.iter().all(|s| s.result.is_none()) {
         let names: Vec<&str> = out.iter().take(3).map(|s| s.name.as_str()).collect();
-        return Err(Error::new(ErrorKind::NotFound, format!("has no table for any of the sequences {} ..", names.join(", ")))
-            .at(result)
-            .hint("expected SEQ.txt in it, or a path with {seq}"));
+        return Err(Error::new(
+            ErrorKind::NotFound,
+            format!("has no table for any of the sequences {} ..", names.join(", ")),
+        )
+        .at(result)
+        .hint("expected SEQ.txt in it, or a path with {seq}"));
     }
     Ok(out)
 }

@@ -3,10 +3,12 @@
 use super::measures::{Judged, mot_values};
 use std::fmt::Write;
 
-fn number(v: f64) -> String {
+const COUNTS: [&str; 7] = ["FP", "FN", "IDSW", "Frag", "MT", "PT", "ML"];
+
+fn number(key: &str, v: f64) -> String {
     if v.is_nan() {
         "-".into()
-    } else if v.fract() == 0.0 && v.abs() < 1e9 && v.abs() > 1.0 {
+    } else if COUNTS.contains(&key) {
         format!("{v:.0}")
     } else if v.abs() >= 1000.0 {
         format!("{v:.1}")
@@ -17,7 +19,8 @@ fn number(v: f64) -> String {
 
 /// A table whose first column is left-aligned and whose others are right-aligned.
 pub fn aligned(head: &[String], rows: &[Vec<String>]) -> String {
-    let width = |c: usize| rows.iter().chain([&head.to_vec()]).filter_map(|r| r.get(c)).map(|t| t.chars().count()).max();
+    let width =
+        |c: usize| rows.iter().chain([&head.to_vec()]).filter_map(|r| r.get(c)).map(|t| t.chars().count()).max();
     let widths: Vec<usize> = (0..head.len()).map(|c| width(c).unwrap_or(0)).collect();
     let mut out = String::new();
     for row in std::iter::once(&head.to_vec()).chain(rows) {
@@ -34,19 +37,23 @@ pub fn aligned(head: &[String], rows: &[Vec<String>]) -> String {
     out
 }
 
-fn block(judged: &Judged, values: &dyn Fn(usize) -> Vec<(&'static str, f64)>, combined: &[(&'static str, f64)]) -> String {
+fn block(
+    judged: &Judged,
+    values: &dyn Fn(usize) -> Vec<(&'static str, f64)>,
+    combined: &[(&'static str, f64)],
+) -> String {
     let mut head = vec!["sequence".to_string()];
     head.extend(combined.iter().map(|c| c.0.to_string()));
     let mut rows = Vec::new();
     for (k, row) in judged.rows.iter().enumerate() {
         let own = values(k);
         let mut cells = vec![row.name.clone()];
-        cells.extend(combined.iter().map(|c| own.iter().find(|o| o.0 == c.0).map_or("-".into(), |o| number(o.1))));
+        cells.extend(combined.iter().map(|c| own.iter().find(|o| o.0 == c.0).map_or("-".into(), |o| number(o.0, o.1))));
         rows.push(cells);
     }
     if judged.rows.len() > 1 {
         let mut cells = vec!["COMBINED".to_string()];
-        cells.extend(combined.iter().map(|c| number(c.1)));
+        cells.extend(combined.iter().map(|c| number(c.0, c.1)));
         rows.push(cells);
     }
     aligned(&head, &rows)
@@ -93,7 +100,8 @@ pub fn csv(results: &[Judged]) -> String {
         let _ = write!(out, ",{n}");
     }
     out.push('\n');
-    let quoted = |s: &str| if s.contains([',', '"']) { format!("\"{}\"", s.replace('"', "\"\"")) } else { s.to_string() };
+    let quoted =
+        |s: &str| if s.contains([',', '"']) { format!("\"{}\"", s.replace('"', "\"\"")) } else { s.to_string() };
     for judged in results {
         let mut line = |name: &str, values: Vec<(&'static str, f64)>| {
             let _ = write!(out, "{},{}", quoted(&judged.label), quoted(name));
