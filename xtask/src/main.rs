@@ -1,5 +1,6 @@
 //! Repository chores: `cargo xtask <NAME>`.
 
+mod bench_metrics;
 mod ir_exam;
 mod mot_table;
 mod video_check;
@@ -16,6 +17,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Chore {
+    /// Measure the speed of the evaluation from files, beside other tools.
+    BenchMetrics(bench_metrics::Args),
     /// Track the public infrared clips with no options and score the tracks.
     IrExam(ir_exam::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
@@ -32,6 +35,7 @@ fn test_data() -> PathBuf {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
+        Chore::BenchMetrics(args) => bench_metrics::run(&args),
         Chore::IrExam(args) => ir_exam::exam(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),

@@ -2,12 +2,12 @@
 
 pub mod completions;
 #[allow(dead_code)] // until the command line names it
-pub mod reproduce;
-mod run_options;
-#[allow(dead_code)] // until the command line names it
 pub mod convert;
 #[allow(dead_code)] // until the command line names it
 pub mod evaluate;
+#[allow(dead_code)] // until the command line names it
+pub mod reproduce;
+mod run_options;
 #[allow(dead_code)] // until the command line names it
 pub mod simulate;
 pub mod track;

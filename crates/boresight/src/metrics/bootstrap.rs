@@ -126,8 +126,10 @@ mod tests {
     #[test]
     fn the_seed_fixes_the_interval_and_one_unit_is_refused() {
         let a: Vec<Scores> = (0..5).map(|k| unit(60 + 7 * k, 5)).collect();
-        let run =
-            |seed| compare(&[a.clone()], &[Scores::combined(&a)], |s| s.clear.mota(), 0.9, 100, seed).unwrap()[0].score;
+        let run = |seed| {
+            compare(std::slice::from_ref(&a), &[Scores::combined(&a)], |s| s.clear.mota(), 0.9, 100, seed).unwrap()[0]
+                .score
+        };
         assert_eq!(run(1), run(1));
         assert!(compare(&[vec![unit(1, 1)]], &[unit(1, 1)], |s| s.clear.mota(), 0.9, 10, 1).is_err());
     }

@@ -80,6 +80,10 @@ fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f
     );
     for (k, line) in lines.iter().enumerate() {
         let colour = COLOURS[k % COLOURS.len()];
+        if let [p] = line.points[..] {
+            // A single point has no line: a result whose scores are all the same.
+            let _ = write!(s, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"4\" fill=\"{colour}\"/>", px(p.0), py(p.1));
+        }
         let path: Vec<String> = line
             .points
             .iter()
@@ -135,10 +139,10 @@ fn table(judged: &Judged) -> String {
     out
 }
 
-/// At most about 800 points of a long curve: each the mean of a run of frames.
+/// At most about 200 points of a long curve: each the mean of a run of frames.
 fn thinned(values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     let v: Vec<f64> = values.collect();
-    let step = v.len().div_ceil(800).max(1);
+    let step = v.len().div_ceil(200).max(1);
     v.chunks(step).enumerate().map(|(k, c)| ((k * step) as f64, c.iter().sum::<f64>() / c.len() as f64)).collect()
 }
 
@@ -196,7 +200,7 @@ pre{overflow-x:auto;background:#f6f6f6;padding:.8rem}.note{color:#8a4b00}\
         out.push_str(&table(judged));
         let _ = write!(out, "<div class=\"f\">{}</div>", plots(judged));
     }
-    let _ = write!(out, "<p>boresight {}</p></html>\n", env!("CARGO_PKG_VERSION"));
+    let _ = writeln!(out, "<p>boresight {}</p></html>", env!("CARGO_PKG_VERSION"));
     out
 }
 
