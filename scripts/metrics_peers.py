@@ -73,7 +73,8 @@ def trackers(t, r, n):
 def motrics(t, r, n):
     import motrics as m
     from motrics import motchallenge as f
-    e = m.evaluate(*f.align_frames(f.load_motchallenge(t), f.load_motchallenge(r)))
+    gi, gb, ti, tb = f.align_frames(f.load_motchallenge(t), f.load_motchallenge(r))
+    e = m.evaluate(m.Frames(gi, gb), m.Frames(ti, tb))
     return e.clear.mota, e.identity.idf1, e.hota.hota
 
 

@@ -37,7 +37,7 @@ pub struct Args {
 fn write_scene(args: &Args, truth: &Path, result: &Path) -> Result<()> {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let side = 60.0 * (args.tracks as f64).sqrt();
-    let mut normal = |sigma: f64, rng: &mut ChaCha8Rng| {
+    let normal = |sigma: f64, rng: &mut ChaCha8Rng| {
         // The sum of twelve uniforms is normal enough for a scene.
         sigma * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0)
     };
