@@ -153,6 +153,13 @@ impl Annotator {
     /// Appends to the trails and forgets what is old or ended.
     fn remember(&mut self, view: &View<'_>) {
         let now = view.scan.time;
+        // Where the camera moves, trails stay on the ground.
+        if let Some(shift) = view.scan.camera_shift_px.filter(|s| s.x.is_finite() && s.y.is_finite()) {
+            for (_, (x, y)) in self.trails.values_mut().flatten() {
+                *x += shift.x;
+                *y += shift.y;
+            }
+        }
         if self.options.trail_s > 0.0 {
             for t in view.tracks {
                 let mean = &t.kinematics.mean;

@@ -7,5 +7,6 @@ mod metrics;
 mod reproduce;
 mod rooms;
 mod tables;
+mod video;
 mod vision_covariance;
 mod vision_real;

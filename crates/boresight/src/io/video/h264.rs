@@ -178,7 +178,9 @@ fn check_size(info: &SpsInfo, max_pixels: u64) -> Result<(), Refusal> {
     if mbs == 0 || info.width == 0 || info.height == 0 {
         return Err(Refusal::Damaged("its header claims a picture without pixels".into()));
     }
-    if mbs > MAX_PICTURE_MBS || w * h > max_pixels.saturating_add(256 * (w + h)) {
+    let shown = u64::from(info.width) * u64::from(info.height);
+    // The coded size is the shown one rounded up to macroblocks (pairs of them if interlaced).
+    if mbs > MAX_PICTURE_MBS || shown > max_pixels || w * h > max_pixels.saturating_add(32 * (w + h)) {
         return Err(Refusal::Damaged(format!("its header claims {w} x {h} pixels, more than is accepted")));
     }
     if mbs * u64::from(info.reference_frames) > MAX_REFERENCE_MBS.max(mbs * 4) || info.reference_frames > 16 {

@@ -44,3 +44,21 @@ pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSourc
 pub fn open_ffmpeg(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     ffmpeg::open(OsStr::new(FFMPEG), input, options)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_ffmpeg_is_named_with_the_way_to_install_it() {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
+        let name = OsStr::new("no-such-program-as-ffmpeg");
+        let err = ffmpeg::open(name, &here.to_string_lossy(), &OpenOptions::default()).err().unwrap();
+        assert_eq!(err.kind(), ErrorKind::MissingTool);
+        let text = err.to_string();
+        assert!(
+            text.contains("not installed") && text.contains("apt install ffmpeg") && text.contains("winget"),
+            "{text}"
+        );
+    }
+}

@@ -105,15 +105,20 @@ pub(super) fn steps(
     Ok(out)
 }
 
-/// Appends the pictures of one edit: from the sync sample before its start to the sync sample after its end.
+/// Appends the pictures of one edit: from the sync sample before its start to a sync sample after its end.
 fn push_edit(samples: &[Sample], start: i64, end: i64, at: i64, out: &mut Vec<Step>) {
     // Media time is composition time; the sync sample is looked for by it.
     let first = samples.iter().rposition(|s| s.sync && s.cts <= start).unwrap_or(0);
+    // In an open group of pictures, those coded after a sync sample may be shown before it: then one more is waited for.
+    let mut syncs_to_pass = if samples.iter().any(|s| s.cts != s.dts) { 2 } else { 1 };
     for (i, s) in samples.iter().enumerate().skip(first) {
         let shown = s.cts >= start && s.cts < end;
         out.push(Step { sample: i as u32, pts: s.cts.saturating_sub(start).saturating_add(at), shown });
         if s.sync && s.cts.saturating_add(i64::from(s.duration)) >= end {
-            break;
+            syncs_to_pass -= 1;
+            if syncs_to_pass == 0 {
+                break;
+            }
         }
     }
     // Pictures after the last shown one need not be decoded.
