@@ -2,7 +2,8 @@
 //!
 //! The decoder is young, so it runs behind three fences: sizes are checked in every parameter set before it may take
 //! memory, broken unit lengths are found before it sees them, and a panic inside it is an error of that one sample.
-//! Limits (ITU-T H.264 A.3.1, level 6.2): 139 264 macroblocks a picture, 696 320 in all reference pictures.
+//! Limits (ITU-T H.264 A.3.1, level 6.2): 139 264 macroblocks a picture, 696 320 in all reference pictures. Wrong bits
+//! inside a slice that still parses are not seen: the decoder (0.6) keeps the part of the picture decoded before them.
 
 use crate::{Error, ErrorKind, Result};
 use rust_h264::decoder::{Decoder, Frame};
