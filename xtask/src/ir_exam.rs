@@ -93,7 +93,7 @@ fn clip(input: &str, truth: &HashMap<u64, Vec<Box4>>, sets: &[String]) -> Result
     let tracking = boresight::track::build(&config.tracker)?;
     let seen = Arc::new(Mutex::new(Seen::default()));
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&seen)))];
-    let go_on = &mut |_| ControlFlow::Continue(());
+    let go_on = &mut |_: &boresight::pipeline::Summary| ControlFlow::Continue(());
     let (summary, broken) = run(Input::Frames(Box::new(replay), detector), Some(tracking), sinks, go_on)?;
     if let Some(e) = broken {
         return Err(e.into());

@@ -20,6 +20,12 @@ struct Cli {
 enum Command {
     /// Track what moves in a video, an image sequence or a table of detections.
     Track(commands::track::Args),
+    /// Detect what stands out in a video or an image sequence.
+    Detect(commands::detect::Args),
+    /// Print, check and explain configurations.
+    Config(commands::config::Args),
+    /// Reproduce the papers' tables and figures.
+    Reproduce(commands::reproduce::Args),
     /// Simulate a scene: frames and their truth.
     Simulate(commands::simulate::Args),
     /// Write completions for a shell, or the manual page.
@@ -30,6 +36,9 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
+        Command::Detect(args) => commands::detect::run(args),
+        Command::Config(args) => commands::config::run(&args),
+        Command::Reproduce(args) => commands::reproduce::run(args),
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Completions(args) => commands::completions::run::<Cli>(&args),
     };

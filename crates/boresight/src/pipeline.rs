@@ -63,7 +63,7 @@ pub fn run(
     input: Input,
     mut tracking: Option<Box<dyn Tracking>>,
     mut sinks: Vec<Box<dyn Sink>>,
-    go_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+    go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
 ) -> Result<(Summary, Option<Error>)> {
     let mut summary = Summary::default();
     let mut counts = Counts::default();
@@ -103,7 +103,7 @@ fn drive(
     input: Input,
     tracking: &mut Option<Box<dyn Tracking>>,
     sinks: &mut [Box<dyn Sink>],
-    go_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+    go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
     summary: &mut Summary,
     counts: &mut Counts,
 ) -> Result<()> {
@@ -133,7 +133,7 @@ fn drive(
             }
         }
         summary.most_at_once = summary.most_at_once.max(now);
-        Ok(go_on(summary.frames))
+        Ok(go_on(summary))
     };
     match input {
         Input::Scans(scans) => {
@@ -160,6 +160,9 @@ fn drive(
                     break Err(e);
                 }
                 summary.times.detect += read.elapsed();
+                if source.warnings().len() > summary.warnings.len() {
+                    summary.warnings = source.warnings().to_vec();
+                }
                 match one(Some(&frame), &scan, summary) {
                     Ok(ControlFlow::Continue(())) => source.recycle(frame),
                     Ok(ControlFlow::Break(())) => {

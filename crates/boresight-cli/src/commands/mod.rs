@@ -7,6 +7,8 @@ pub mod convert;
 pub mod evaluate;
 #[allow(dead_code)] // until the command line names it
 pub mod reproduce;
+pub mod config;
+pub mod detect;
 mod run_options;
 #[allow(dead_code)] // until the command line names it
 pub mod simulate;

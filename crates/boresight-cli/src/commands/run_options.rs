@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use boresight::auto::{self, Replay};
+use boresight::io::tables::TableOptions;
 use boresight::pipeline::{Input, Summary};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
@@ -64,6 +65,9 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
     }
+    if is_table(&args.input) {
+        return plan_table(args, given, base);
+    }
     let source = boresight::io::open(&args.input, &base.input.open_options())?;
     let info = source.info().clone();
     let mut source: Box<dyn boresight::FrameSource> = source;
@@ -76,14 +80,47 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
             (choice.config, choice.reasons)
         }
     };
+    config = changed(config, args)?;
+    let detector = vision::build(&config.detector, &info)?;
+    Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })
+}
+
+/// The configuration with what the command line changes.
+fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     if let Some(filter) = &args.filter {
         config = config.with(&format!("tracker.filter.{filter}={{}}"))?;
     }
     for set in &args.sets {
         config = config.with(set)?;
     }
-    let detector = vision::build(&config.detector, &info)?;
-    Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })
+    Ok(config)
+}
+
+/// Whether the input is a table of detections, by its ending.
+fn is_table(input: &str) -> bool {
+    let ending = Path::new(input).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    matches!(ending.as_str(), "csv" | "tsv" | "txt") && !input.contains("://")
+}
+
+fn plan_table(args: &InputArgs, given: Option<Config>, base: Config) -> anyhow::Result<Plan> {
+    let options = TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() };
+    let table = boresight::io::tables::read_detections(&args.input, &options)?;
+    let mut reasons = vec![format!(
+        "{} detections in {} frames at {} frames/s, read as {}.",
+        table.n_rows - table.n_skipped,
+        table.scans.len(),
+        table.rate_hz,
+        table.format
+    )];
+    reasons.extend(table.warnings.iter().cloned());
+    let mut config = base;
+    match given {
+        Some(_) => reasons.push("Configuration as given.".to_string()),
+        None => auto::for_detections(&table.scans, table.rate_hz, &mut config, &mut reasons),
+    }
+    config = changed(config, args)?;
+    let n_scans = Some(table.scans.len() as u64);
+    Ok(Plan { input: Input::Scans(table.scans), config, reasons, info: None, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.

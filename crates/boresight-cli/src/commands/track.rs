@@ -2,7 +2,10 @@
 
 use super::run_options::{self, InputArgs, Plan};
 use crate::progress;
+use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
+use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Summary};
+use boresight::report::{HtmlReport, Notes, ReportNotes};
 use boresight::{Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,7 +53,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
     run_options::make_folder(&dir)?;
     let tracking = track::build(&plan.config.tracker)?;
-    let sinks = sinks(&args, &plan, &dir)?;
+    let (sinks, notes) = sinks(&args, &plan, &dir)?;
     run_options::write_config(&dir, &plan)?;
     let quiet = args.input.quiet;
     if !quiet {
@@ -61,8 +64,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(plan.total(), "frames");
     let stop = run_options::stop_on_signal()?;
     let started = std::time::Instant::now();
-    let (summary, broken) = pipeline::run(plan.input, Some(tracking), sinks, &mut |n| {
-        bar.set_position(n);
+    let (summary, broken) = pipeline::run(plan.input, Some(tracking), sinks, &mut |so_far| {
+        bar.set_position(so_far.frames);
+        if let Some(notes) = &notes
+            && so_far.frames.is_multiple_of(16)
+        {
+            notes.edit(|n| tell(n, so_far));
+        }
         run_options::go_on(&stop)
     })?;
     bar.finish_and_clear();
@@ -72,7 +80,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     run_options::outcome(&summary, broken)
 }
 
-fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Vec<Box<dyn Sink>>> {
+/// Hands the report what is known only while the run goes on.
+fn tell(notes: &mut Notes, so_far: &Summary) {
+    let t = &so_far.times;
+    let named = [("read", t.read), ("detect", t.detect), ("track", t.track), ("write", t.write)];
+    notes.stages = named.iter().map(|(name, d)| ((*name).to_string(), d.as_secs_f64())).collect();
+    notes.warnings.clone_from(&so_far.warnings);
+}
+
+type Sinks = (Vec<Box<dyn Sink>>, Option<ReportNotes>);
+
+fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Sinks> {
     use boresight::io::{DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(dir.join("tracks.csv"))?),
@@ -82,8 +100,25 @@ fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<V
     if args.json {
         sinks.push(Box::new(JsonLines::create(dir.join("tracks.jsonl"))?));
     }
-    let _ = (plan, matches!(plan.input, Input::Frames(..)));
-    Ok(sinks)
+    let pictures = matches!(plan.input, Input::Frames(..));
+    if pictures && !args.no_video {
+        let path = dir.join("annotated.mp4");
+        sinks.push(Box::new(AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?));
+    }
+    if pictures && args.png {
+        sinks.push(Box::new(PngFolder::create(dir.join("frames"), DrawOptions::default())?));
+    }
+    let mut notes = None;
+    if !args.no_report {
+        let facts = plan.info.iter().map(|i| ("read as".to_string(), i.reader.clone())).collect();
+        let report = HtmlReport::create(
+            dir.join("report.html"),
+            Notes { input: args.input.input.clone(), facts, settings: plan.reasons.clone(), ..Notes::default() },
+        )?;
+        notes = Some(report.notes());
+        sinks.push(Box::new(report));
+    }
+    Ok((sinks, notes))
 }
 
 /// The summary on the terminal.

@@ -3,9 +3,11 @@
 //! Source: our own. It only reads frames and proposes a [`Config`]; the run itself uses that configuration and nothing else, so
 //! the same configuration given back gives the identical result.
 
+mod detections;
 mod replay;
 mod spots;
 
+pub use detections::for_detections;
 pub use replay::Replay;
 
 use crate::{Config, Frame, Result, SourceInfo};
@@ -50,4 +52,13 @@ fn interval_s(frames: &[Frame], info: &SourceInfo) -> f64 {
         .or_else(|| info.rate_hz.map(|r| 1.0 / r))
         .filter(|g| g.is_finite() && *g > 0.0)
         .unwrap_or(0.04)
+}
+
+/// Three significant digits: what a person would write.
+fn round(v: f64) -> f64 {
+    if v == 0.0 || !v.is_finite() {
+        return v;
+    }
+    let digits = (2.0 - v.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{v:.digits$}").parse().unwrap_or(v)
 }

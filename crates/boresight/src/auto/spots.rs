@@ -1,7 +1,7 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
 use crate::track::TrackerConfig;
-use crate::vision::config::DetectorConfig;
+use crate::vision::config::{CameraConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::vision::{self};
@@ -61,9 +61,9 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
     Ok(Evidence { bright: side(Polarity::Bright)?, dark: side(Polarity::Dark)? })
 }
 
-/// The longest side looked for: a quarter of the frame's shorter side.
+/// The longest side looked for: two fifths of the frame's shorter side.
 fn max_side(info: &SourceInfo) -> u32 {
-    (info.width.min(info.height) / 4).clamp(8, 4096) as u32
+    (info.width.min(info.height) * 2 / 5).clamp(8, 4096) as u32
 }
 
 /// Writes detector and tracker for isolated targets.
@@ -99,21 +99,18 @@ pub fn configure(
         ..Default::default()
     };
     config.detector.cluster.min_area_px = Some(3);
+    config.detector.camera = CameraConfig::Moving;
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
-    tracker.acceleration_std_px_per_s2 = round(0.1 / (interval_s * interval_s));
-    tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
+    tracker.acceleration_std_px_per_s2 = super::round(0.1 / (interval_s * interval_s));
+    tracker.max_speed_px_per_s = super::round(0.5 * info.width.max(info.height) as f64);
+    tracker.coast_s = 0.7;
+    tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.proof.start_score = 6.0;
-    tracker.proof.sure_score = 9.0;
+    tracker.proof.sure_score = 11.0;
     tracker.proof.travel_px = 2.5;
     reasons.push(format!(
         "Tracks start from scores of {} or more, and are believed when their mean score reaches {} or they have travelled {} px.",
         tracker.proof.start_score, tracker.proof.sure_score, tracker.proof.travel_px
     ));
-}
-
-/// Three significant digits: what a person would write.
-fn round(v: f64) -> f64 {
-    let scale = 10f64.powf(v.abs().log10().floor() - 2.0);
-    (v / scale).round() * scale
 }

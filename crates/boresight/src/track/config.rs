@@ -65,6 +65,9 @@ pub struct TrackerConfig {
     pub coast_s: f64,
     /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
     pub coast_scans: u32,
+    /// Width and height of the image, px, above 0: tracks whose estimate lies outside are not reported; everywhere if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field_px: Option<[f64; 2]>,
     /// Most tracks alive at a time; no track is started beyond (a guard of memory and time).
     pub max_tracks: u32,
     /// Most gated detections kept per track, the nearest (a guard of memory and time).
@@ -97,6 +100,7 @@ impl Default for TrackerConfig {
             look_gain: 0.3,
             coast_s: 0.5,
             coast_scans: 5,
+            field_px: None,
             max_tracks: 250_000,
             max_gated: 64,
         }
@@ -227,6 +231,9 @@ impl TrackerConfig {
         not_negative(at, "acceleration-of-size-per-s2", self.acceleration_of_size_per_s2, "1 suits people in video")?;
         not_negative(at, "extra-noise-of-size", self.extra_noise_of_size, "0.05 is usual for detectors of people")?;
         not_negative(at, "coast-s", self.coast_s, "0.5 bridges half a second without detections")?;
+        for side in self.field_px.iter().flatten() {
+            positive(at, "field-px", *side, "the image's width and height: [640, 512]")?;
+        }
         let whole = |ok: bool, key: &str, value: u32| {
             check(ok, at, key, value, "a whole number of 1 or more", "leave it out for the default")
         };

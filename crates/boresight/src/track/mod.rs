@@ -48,5 +48,5 @@ pub fn build(config: &TrackerConfig) -> Result<Box<dyn Tracking>> {
         Some(mht) => Box::new(Mht::new(config, mht)?),
         None => Box::new(Tracker::new(config)?),
     };
-    Ok(Box::new(stabilised::Stabilised::new(inner)))
+    Ok(Box::new(stabilised::Stabilised::new(inner, config.field_px)))
 }

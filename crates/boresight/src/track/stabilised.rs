@@ -3,6 +3,7 @@
 //! Source: our own. Each scan says how far the background moved since the scan before ([`Scan::camera_shift_px`]); the sum is taken
 //! from every detection before the tracker inside sees it and given back to every track after. Filters, gates, starts and proofs
 //! then see targets against the ground, whatever the camera does. Positions and boxes that leave are the image's again.
+//! Where the image's size is known, tracks that have left it are no longer reported (they may come back while they coast).
 //! Departures: velocities stay relative to the background (px/s); the shift's own error is not added to any covariance.
 //! Limits: translation only. Scans without a shift (`None`) pass through untouched, bit by bit, until the first one with a shift.
 
@@ -13,6 +14,7 @@ use nalgebra::Vector2;
 /// Keeps the tracker inside on steady ground.
 pub struct Stabilised {
     inner: Box<dyn Tracking>,
+    field_px: Option<[f64; 2]>,
     camera: Vector2<f64>,
     /// Whether the camera was ever seen to move: only then are scans copied.
     moved: bool,
@@ -22,8 +24,8 @@ pub struct Stabilised {
 
 impl Stabilised {
     /// Puts a tracker on steady ground.
-    pub fn new(inner: Box<dyn Tracking>) -> Self {
-        Self { inner, camera: Vector2::zeros(), moved: false, steady: Scan::default(), states: Vec::new() }
+    pub fn new(inner: Box<dyn Tracking>, field_px: Option<[f64; 2]>) -> Self {
+        Self { inner, field_px, camera: Vector2::zeros(), moved: false, steady: Scan::default(), states: Vec::new() }
     }
 }
 
@@ -31,7 +33,7 @@ impl Tracking for Stabilised {
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
         let shift = scan.camera_shift_px.filter(|s| s.iter().all(|v| v.is_finite())).unwrap_or_default();
         self.moved |= shift != Vector2::zeros();
-        if !self.moved {
+        if !self.moved && self.field_px.is_none() {
             return self.inner.step(scan);
         }
         let camera = self.camera + shift;
@@ -52,6 +54,12 @@ impl Tracking for Stabilised {
             s.kinematics.mean[2] += camera.y;
             s.extent.left_px += camera.x;
             s.extent.top_px += camera.y;
+        }
+        if let Some([width, height]) = self.field_px {
+            self.states.retain(|s| {
+                let (x, y) = (s.kinematics.mean[0], s.kinematics.mean[2]);
+                x >= -0.5 && y >= -0.5 && x <= width - 0.5 && y <= height - 0.5
+            });
         }
         Ok(&self.states)
     }
@@ -91,7 +99,7 @@ mod tests {
         // The camera jumps by 40 px in scan 10; the target itself goes on by 1 px a scan.
         let config = TrackerConfig::default();
         let mut plain = Tracker::new(&config).unwrap();
-        let mut steady = Stabilised::new(Box::new(Tracker::new(&config).unwrap()));
+        let mut steady = Stabilised::new(Box::new(Tracker::new(&config).unwrap()), None);
         let mut ids = (Vec::new(), Vec::new());
         for k in 0..20u64 {
             let jump = if k >= 10 { 40.0 } else { 0.0 };
@@ -116,7 +124,7 @@ mod tests {
     fn without_shifts_nothing_changes() {
         let config = TrackerConfig::default();
         let mut plain = Tracker::new(&config).unwrap();
-        let mut steady = Stabilised::new(Box::new(Tracker::new(&config).unwrap()));
+        let mut steady = Stabilised::new(Box::new(Tracker::new(&config).unwrap()), None);
         for k in 0..10u64 {
             let now = scan(k, &[(10.0 + k as f64, 20.0)], None);
             assert_eq!(plain.step(&now).unwrap(), steady.step(&now).unwrap());

@@ -23,10 +23,23 @@ pub struct DetectorConfig {
     pub centroid: CentroidConfig,
     /// How the noise of one pixel is known; it sets the covariance of the centroids.
     pub noise: NoiseConfig,
+    /// Whether the camera's motion is followed, so that tracks live on steady ground.
+    pub camera: CameraConfig,
     /// Most detections kept in a frame, those with the largest score; no limit if absent. Range 1...
     /// Protects what follows from a threshold that floods it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_detections: Option<u32>,
+}
+
+/// Whether the camera's motion is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CameraConfig {
+    /// The camera stands still, or its motion is none of the tracker's business.
+    #[default]
+    Fixed,
+    /// The background's shift is measured in every frame and taken from every position before tracking.
+    Moving,
 }
 
 /// How set pixels are joined and which clusters are kept.

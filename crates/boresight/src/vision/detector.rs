@@ -1,8 +1,9 @@
 //! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
 
+use super::camera::CameraMotion;
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
-use super::config::{DetectorConfig, NoiseConfig, Weight};
+use super::config::{CameraConfig, DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
@@ -24,7 +25,25 @@ const DEFAULT_CELL_PX: u32 = 32;
 /// A parameter out of its range.
 pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Detector>> {
     config.validate("detector")?;
-    Ok(Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)?))
+    let detector = Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)?);
+    Ok(match config.camera {
+        CameraConfig::Fixed => detector,
+        CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotion::default() }),
+    })
+}
+
+/// A detector that also says how far the background moved.
+struct WithCamera {
+    detector: Box<dyn Detector>,
+    camera: CameraMotion,
+}
+
+impl Detector for WithCamera {
+    fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+        self.detector.detect(frame, scan)?;
+        scan.camera_shift_px = self.camera.step(&frame.pixels);
+        Ok(())
+    }
 }
 
 struct ThresholdDetector {
@@ -306,6 +325,7 @@ impl Detector for ThresholdDetector {
         scan.index = frame.index;
         scan.time = frame.time;
         scan.detections.clear();
+        scan.camera_shift_px = None;
         let (width, height) = (frame.pixels.width(), frame.pixels.height());
         if (width, height) != self.size || frame.pixels.kind() != self.kind {
             let (w, h) = self.size;

@@ -1,0 +1,77 @@
+//! `boresight config`: prints, checks and explains configurations.
+
+use boresight::{Config, Error, ErrorKind};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `boresight config`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  boresight config                                     every key with its default
+  boresight config --check my.toml                     exit code 0 if it is sound
+  boresight config --explain tracker.gate-probability  what a key means
+  boresight config --explain tracker                   what a table holds
+  boresight config --list filters                      the filters, a sentence each
+  boresight config --schema                            a JSON schema for editors")]
+pub struct Args {
+    /// Check a file and say what is wrong with it.
+    #[arg(long, value_name = "FILE")]
+    check: Option<PathBuf>,
+    /// Explain a key or a table: `tracker.coast-s`, `detector.threshold`.
+    #[arg(long, value_name = "KEY")]
+    explain: Option<String>,
+    /// List what can be chosen: filters, thresholds, associators, lives, births.
+    #[arg(long, value_name = "WHAT")]
+    list: Option<String>,
+    /// Print a JSON schema of the configuration.
+    #[arg(long)]
+    schema: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let text = if let Some(path) = &args.check {
+        Config::from_file(path)?;
+        format!("{}: a sound configuration\n", path.display())
+    } else if let Some(key) = &args.explain {
+        explain(key)?
+    } else if let Some(what) = &args.list {
+        list(what)?
+    } else if args.schema {
+        serde_json::to_string_pretty(&boresight::config::schema())? + "\n"
+    } else {
+        Config::default().to_toml()?
+    };
+    super::print(text.as_bytes())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list(what: &str) -> anyhow::Result<String> {
+    let key = match what {
+        "filters" => "tracker.filter",
+        "thresholds" => "detector.threshold",
+        "associators" => "tracker.associator",
+        "lives" => "tracker.life",
+        "births" => "tracker.birth",
+        _ => {
+            return Err(Error::new(ErrorKind::Config, "expected filters, thresholds, associators, lives or births")
+                .at(format!("--list {what}"))
+                .into());
+        }
+    };
+    explain(key)
+}
+
+fn explain(key: &str) -> anyhow::Result<String> {
+    let found = boresight::config::explain(key)?;
+    let mut text = format!("{key}\n  {}\n", found.meaning);
+    if let Some(default) = &found.default {
+        writeln!(text, "  default: {default}")?;
+    }
+    let width = found.entries.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    for (name, meaning) in &found.entries {
+        writeln!(text, "  {name:width$}  {meaning}")?;
+    }
+    Ok(text)
+}

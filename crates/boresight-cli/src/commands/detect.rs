@@ -1,0 +1,47 @@
+//! `boresight detect`: frames in, detections out.
+
+use super::run_options::{self, InputArgs};
+use crate::progress;
+use boresight::io::DetectionsCsv;
+use boresight::io::tables::Output;
+use boresight::{Sink, pipeline};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `boresight detect`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  boresight detect particles.tif -o particles.csv
+  boresight detect flight.mp4 -o - | head
+  boresight detect flight.mp4 --set detector.threshold.local.k=6 -o flight.csv")]
+pub struct Args {
+    #[command(flatten)]
+    input: InputArgs,
+    /// The table of detections; `-` is standard output; INPUT's name with `.detections.csv` if absent.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let plan = run_options::plan(&args.input)?;
+    let path = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "detections.csv"));
+    let to_stdout = path.as_os_str() == "-";
+    let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
+    if !args.input.quiet {
+        plan.reasons.iter().for_each(|r| eprintln!("  {r}"));
+    }
+    let bar = progress::bar(plan.total(), "frames");
+    let stop = run_options::stop_on_signal()?;
+    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(sink)];
+    let (summary, broken) = pipeline::run(plan.input, None, sinks, &mut |so_far| {
+        bar.set_position(so_far.frames);
+        run_options::go_on(&stop)
+    })?;
+    bar.finish_and_clear();
+    if !args.input.quiet {
+        eprintln!("{} frames, {} detections", summary.frames, summary.detections);
+        summary.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    }
+    run_options::outcome(&summary, broken)
+}
