@@ -9,6 +9,8 @@ use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// A score from which a blob is surely a thing and not noise.
 const SURE: f64 = 8.0;
+/// More sure blobs a frame than this are particles or cells.
+const MANY: f64 = 15.0;
 /// Frames looked at; they are spread over those given.
 const LOOKS: usize = 12;
 
@@ -107,10 +109,19 @@ pub fn configure(
     tracker.coast_s = 0.7;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.proof.start_score = 6.0;
+    if seen.per_frame > MANY {
+        reasons.push(
+            "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
+        );
+        tracker.proof.start_score = 4.0;
+        return;
+    }
     tracker.proof.sure_score = 11.0;
+    tracker.proof.sure_travel_px = 1.2;
     tracker.proof.travel_px = 2.5;
     reasons.push(format!(
-        "Tracks start from scores of {} or more, and are believed when their mean score reaches {} or they have travelled {} px.",
-        tracker.proof.start_score, tracker.proof.sure_score, tracker.proof.travel_px
+        "A track starts from a score of {} or more and is reported once it has moved {} px against the background ({} px if its mean score \
+         is {} or more): what stands still is taken for scenery. Report that too with --set tracker.proof.travel-px=0.",
+        tracker.proof.start_score, tracker.proof.travel_px, tracker.proof.sure_travel_px, tracker.proof.sure_score
     ));
 }

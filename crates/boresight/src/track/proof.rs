@@ -1,8 +1,8 @@
 //! Proof: what a track must show, beside its life's rule, before it is reported as confirmed.
 //!
 //! Source: our own. Clutter in real scenes persists: a lamp post or a hole in a tree passes every M-of-N. Two things tell a target
-//! from it: it stands out more clearly (the detector's score), or it moves. A track is proven once the mean score of its
-//! detections reaches `sure-score`, or once it has travelled `travel-px` from where it began; until then it is tentative for
+//! from it: it stands out more clearly (the detector's score), or it moves. A track is proven once it has travelled
+//! `travel-px` from where it began, or `sure-travel-px` if its mean score reaches `sure-score`; until then it is tentative for
 //! everyone outside, while it is associated and kept like a confirmed one.
 //! Symbols: score, the detector's own scale; travel distance of the estimate from the first one (px).
 //! Limits: travel is measured in the tracker's coordinates: steadied ones (`stabilised.rs`) where the camera's motion is known, else the
@@ -19,9 +19,11 @@ use serde::{Deserialize, Serialize};
 pub struct ProofConfig {
     /// Least score of a detection that starts a track, 0 or more; weaker ones only continue tracks.
     pub start_score: f64,
-    /// Mean score of a track's detections that proves it without travel, 0 or more (needed only if `travel-px` is above 0).
+    /// Mean score of a track's detections from which it is sure to be a thing, 0 or more; it then needs to travel less.
     pub sure_score: f64,
-    /// Distance from its start that proves a track, px, 0 or more; 0 asks for no proof.
+    /// Distance from its start that proves a sure track, px, 0 or more, at most `travel-px`.
+    pub sure_travel_px: f64,
+    /// Distance from its start that proves any other track, px, 0 or more; 0 asks for no proof.
     pub travel_px: f64,
 }
 
@@ -32,6 +34,7 @@ impl ProofConfig {
     pub fn validate(&self, at: &str) -> Result<()> {
         not_negative(at, "start-score", self.start_score, "0 lets every detection start a track")?;
         not_negative(at, "sure-score", self.sure_score, "0 proves every track at once")?;
+        not_negative(at, "sure-travel-px", self.sure_travel_px, "0 proves sure tracks at once")?;
         not_negative(at, "travel-px", self.travel_px, "0 asks for no proof")
     }
 
@@ -69,7 +72,8 @@ impl Proof {
     pub fn holds(&mut self, config: &ProofConfig, position: [f64; 2], hit: bool) -> bool {
         if !self.proven && (hit || config.travel_px <= 0.0) {
             let travel = (position[0] - self.start[0]).hypot(position[1] - self.start[1]);
-            self.proven = travel >= config.travel_px || self.score_sum >= config.sure_score * f64::from(self.hits);
+            let sure = self.score_sum >= config.sure_score * f64::from(self.hits);
+            self.proven = travel >= config.travel_px || (sure && travel >= config.sure_travel_px);
         }
         self.proven
     }
@@ -80,11 +84,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clear_target_is_proven_at_once_and_a_dim_one_by_moving() {
-        let config = ProofConfig { start_score: 5.0, sure_score: 9.0, travel_px: 3.0 };
+    fn a_clear_target_is_proven_by_a_small_step_and_a_dim_one_by_a_longer_way() {
+        let config = ProofConfig { start_score: 5.0, sure_score: 9.0, sure_travel_px: 0.5, travel_px: 3.0 };
         let mut clear = Proof::begin([10.0, 10.0], 12.0);
         clear.seen(11.0);
-        assert!(clear.holds(&config, [10.0, 10.0], true));
+        assert!(!clear.holds(&config, [10.0, 10.0], true), "a lamp is clear, but stands still");
+        assert!(clear.holds(&config, [10.6, 10.0], true));
         let mut dim = Proof::begin([10.0, 10.0], 6.0);
         dim.seen(6.0);
         assert!(!dim.holds(&config, [11.0, 10.0], true));
