@@ -9,6 +9,7 @@
 //! Limits: axes must be uncorrelated ([`Lanes::set`] refuses others): no PDA spread, no full R. Cost per track and step:
 //! 2 divisions, about 50 flops, 160 bytes moved.
 
+pub use crate::model::AxisNoise;
 use crate::model::ConstantVelocity;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
@@ -135,6 +136,20 @@ pub fn step_all<const L: usize, T: Real>(
     variance: Variance<'_, T>,
 ) -> Result<usize, FilterError> {
     crate::filter::check_dt(dt_s)?;
+    step_all_with(dt_s, model.noise_of_step(dt_s), packs, positions, variance)
+}
+
+/// [`step_all`] with the process noise of the step as numbers.
+/// # Errors
+/// As [`step_all`].
+pub fn step_all_with<const L: usize, T: Real>(
+    dt_s: T,
+    noise: AxisNoise<T>,
+    packs: &mut [Lanes<L, T>],
+    positions: &[[T; 2]],
+    variance: Variance<'_, T>,
+) -> Result<usize, FilterError> {
+    crate::filter::check_dt(dt_s)?;
     if L == 0 || positions.len().div_ceil(L) != packs.len() {
         return Err(FilterError::OutOfRange("as many positions as tracks in the packs"));
     }
@@ -153,23 +168,23 @@ pub fn step_all<const L: usize, T: Real>(
             use fearless_simd::Simd as _;
             simd.vectorize(
                 #[inline(always)]
-                || run(model, dt_s, packs, positions, variance),
+                || run(noise, dt_s, packs, positions, variance),
             )
         }))
     }
     #[cfg(not(feature = "simd"))]
-    Ok(run(model, dt_s, packs, positions, variance))
+    Ok(run(noise, dt_s, packs, positions, variance))
 }
 
 #[inline(always)]
 fn run<const L: usize, T: Real>(
-    model: &ConstantVelocity<T>,
+    noise: AxisNoise<T>,
     dt: T,
     packs: &mut [Lanes<L, T>],
     positions: &[[T; 2]],
     variance: Variance<'_, T>,
 ) -> usize {
-    let q = model.axis_noise(dt);
+    let q = (noise.q00, noise.q01, noise.q11);
     let mut refused = 0;
     match variance {
         Variance::Same(r) => {

@@ -8,7 +8,7 @@
 //! Cost: N = 4, constant velocity: about 60 flops to predict, 130 to correct (Joseph).
 
 use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{halves_apart, invert_pair, symmetrize};
+use crate::linalg::{halves_apart, invert_pair};
 use crate::mixture::{joseph, mixture_update};
 use crate::model::Model;
 use crate::real::all_finite;
@@ -76,7 +76,16 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
         } else {
             self.model.propagate(dt_s, &mut next.mean, &mut next.cov);
         }
-        self.accept(next)
+        // The variances bound the covariances of a positive definite P, so these are enough for what can overflow here.
+        let mut fine = true;
+        for i in 0..N {
+            fine &= (next.mean[i].abs() <= T::MAX) & (next.cov[(i, i)] <= T::MAX);
+        }
+        if !fine {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        self.belief = next;
+        Ok(())
     }
 
     #[inline]
@@ -103,7 +112,6 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
         match self.form {
             CovarianceForm::Joseph => {
                 next.cov = joseph(p, at, &k, &m.cov);
-                symmetrize(&mut next.cov);
             }
             CovarianceForm::Short => {
                 for c in 0..N {

@@ -61,3 +61,8 @@ pub use square_root::SquareRoot;
 pub use srif::Srif;
 pub use ud::Ud;
 pub use ukf::Ukf;
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

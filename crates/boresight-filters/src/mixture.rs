@@ -104,6 +104,7 @@ fn cached<'a, T: Real, const N: usize>(
 }
 
 /// Returns (I - K H) P (I - K H)ᵀ + K R Kᵀ for the position rows `at`.
+#[inline(always)]
 pub(crate) fn joseph<T: Real, const N: usize>(
     p: &SMatrix<T, N, N>,
     at: [usize; 2],
@@ -124,9 +125,16 @@ pub(crate) fn joseph<T: Real, const N: usize>(
         b[(i, 0)] = a[(i, at[0])] - (k[(i, 0)] * r[(0, 0)] + k[(i, 1)] * r[(1, 0)]);
         b[(i, 1)] = a[(i, at[1])] - (k[(i, 0)] * r[(0, 1)] + k[(i, 1)] * r[(1, 1)]);
     }
+    // The upper half, mirrored: exactly symmetric.
     for c in 0..N {
-        for i in 0..N {
-            a[(i, c)] -= b[(i, 0)] * k[(c, 0)] + b[(i, 1)] * k[(c, 1)];
+        for i in 0..=c {
+            let v = a[(i, c)] - (b[(i, 0)] * k[(c, 0)] + b[(i, 1)] * k[(c, 1)]);
+            a[(i, c)] = v;
+        }
+    }
+    for c in 0..N {
+        for i in 0..c {
+            a[(c, i)] = a[(i, c)];
         }
     }
     a

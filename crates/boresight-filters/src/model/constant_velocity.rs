@@ -21,6 +21,18 @@ pub struct ConstantVelocity<T = f64> {
 enum Noise<T> {
     Discrete(T),
     Continuous(T),
+    Given(AxisNoise<T>),
+}
+
+/// Process covariance [[q00, q01], [q01, q11]] of one axis over one step (px², px²/s, px²/s²).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisNoise<T = f64> {
+    /// Variance of the position.
+    pub q00: T,
+    /// Covariance of position and velocity.
+    pub q01: T,
+    /// Variance of the velocity.
+    pub q11: T,
 }
 
 impl<T: Real> ConstantVelocity<T> {
@@ -39,10 +51,30 @@ impl<T: Real> ConstantVelocity<T> {
         Ok(Self { noise: Noise::Continuous(check_strength(density, "a power density of at least 0")?) })
     }
 
+    /// Noise known as numbers for the one step time that is used; it does not change with dt.
+    /// # Errors
+    /// [`FilterError::NotPositiveDefinite`] if it is not a covariance.
+    pub fn for_step(noise: AxisNoise<T>) -> Result<Self, FilterError> {
+        let AxisNoise { q00, q01, q11 } = noise;
+        let fine = q00 >= T::zero() && q11 >= T::zero() && q00 <= T::MAX && q11 <= T::MAX;
+        if !(fine && q01.abs() <= (q00.sqrt() * q11.sqrt()) * (T::one() + T::EPSILON * T::of(8.0))) {
+            return Err(FilterError::NotPositiveDefinite("process noise"));
+        }
+        Ok(Self { noise: Noise::Given(noise) })
+    }
+
+    /// Returns the process covariance of one axis over a step of `dt_s` seconds.
+    #[inline]
+    pub fn noise_of_step(&self, dt_s: T) -> AxisNoise<T> {
+        let (q00, q01, q11) = self.axis_noise(dt_s);
+        AxisNoise { q00, q01, q11 }
+    }
+
     /// Returns q00, q01, q11 of one axis.
     #[inline(always)]
     pub(crate) fn axis_noise(&self, dt: T) -> (T, T, T) {
         match self.noise {
+            Noise::Given(AxisNoise { q00, q01, q11 }) => (q00, q01, q11),
             Noise::Discrete(q) => {
                 let g = dt * dt * T::of(0.5);
                 (g * g * q, g * dt * q, dt * dt * q)
@@ -163,6 +195,14 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
                 let (a, b) = (q * dt * dt * dt * T::of(1.0 / 12.0), q * dt);
                 Ok(visitor.visit(&g, &SVector::<T, 4>::new(a, b, a, b)))
             }
+            Noise::Given(AxisNoise { q00, q01, q11 }) => {
+                let u = if q11 > T::zero() { q01 / q11 } else { T::zero() };
+                let mut g = SMatrix::<T, 4, 4>::identity();
+                g[(0, 1)] = u;
+                g[(2, 3)] = u;
+                let a = (q00 - u * q01).max(T::zero());
+                Ok(visitor.visit(&g, &SVector::<T, 4>::new(a, q11, a, q11)))
+            }
         }
     }
 
@@ -189,8 +229,10 @@ mod tests {
         }
     }
 
-    fn models() -> [ConstantVelocity; 2] {
-        [ConstantVelocity::discrete(0.7).unwrap(), ConstantVelocity::continuous(0.3).unwrap()]
+    fn models() -> [ConstantVelocity; 3] {
+        let given = AxisNoise { q00: 0.3, q01: -0.1, q11: 0.2 };
+        let given = ConstantVelocity::for_step(given).unwrap();
+        [ConstantVelocity::discrete(0.7).unwrap(), ConstantVelocity::continuous(0.3).unwrap(), given]
     }
 
     #[test]
