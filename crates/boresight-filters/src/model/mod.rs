@@ -24,7 +24,7 @@ pub use scaled::Scaled;
 pub use singer::Singer;
 pub use turn::{ConstantTurn, NearlyConstantTurn};
 
-use crate::linalg::{invert, mul, ud_factorize};
+use crate::linalg::{invert, mul, mul_transposed, symmetrize, ud_factorize};
 use crate::{FilterError, Gaussian, Measurement, Real};
 use nalgebra::{SMatrix, SVector};
 
@@ -65,23 +65,8 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
     fn propagate(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
         let phi = self.transition(dt_s, x);
         *x = self.moved(dt_s, x);
-        let half = mul(&phi, p);
-        *p = self.process_noise(dt_s);
-        // The upper half of (Phi P) Phiᵀ, mirrored.
-        for c in 0..N {
-            for r in 0..=c {
-                let mut v = p[(r, c)];
-                for k in 0..N {
-                    v += half[(r, k)] * phi[(c, k)];
-                }
-                p[(r, c)] = v;
-            }
-        }
-        for c in 0..N {
-            for r in 0..c {
-                p[(c, r)] = p[(r, c)];
-            }
-        }
+        *p = mul_transposed(&mul(&phi, p), &phi) + self.process_noise(dt_s);
+        symmetrize(p);
     }
 
     /// Returns Phi A.
