@@ -36,6 +36,8 @@ pub struct InputConfig {
     /// Layout of headerless frames; needed for raw input only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawConfig>,
+    /// How a table of detections is read; of no effect on frames.
+    pub table: crate::io::TableOptions,
 }
 
 /// Which pixels are wanted.
@@ -82,7 +84,13 @@ pub enum RawPixel {
 impl Default for InputConfig {
     fn default() -> Self {
         let o = OpenOptions::default();
-        Self { colour: ColourConfig::Native, rate_hz: o.rate_hz, max_pixels: o.max_pixels, raw: None }
+        Self {
+            colour: ColourConfig::Native,
+            rate_hz: o.rate_hz,
+            max_pixels: o.max_pixels,
+            raw: None,
+            table: Default::default(),
+        }
     }
 }
 
@@ -112,6 +120,7 @@ impl InputConfig {
     }
 
     fn validate(&self, at: &str) -> Result<()> {
+        self.table.validate(&format!("{at}.table"))?;
         if !(self.rate_hz > 0.0 && self.rate_hz.is_finite()) {
             return Err(Error::new(ErrorKind::Config, "expected a rate above 0 frames/s")
                 .at(format!("{at}.rate-hz = {}", self.rate_hz))

@@ -2,7 +2,6 @@
 
 use anyhow::Context;
 use boresight::auto::{self, Replay};
-use boresight::io::tables::TableOptions;
 use boresight::pipeline::{Input, Summary};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
@@ -33,6 +32,12 @@ pub struct InputArgs {
     /// Rate of inputs without times of their own, frames/s.
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
+    /// Columns of a table of detections whose names are not understood: `x=cx,y=cy,frame=t`; numbers count columns from 1.
+    #[arg(long, value_name = "PAIRS")]
+    pub columns: Option<String>,
+    /// Leave out rows of a table that cannot be read, and count them.
+    #[arg(long)]
+    pub skip_bad_rows: bool,
     /// Print nothing but errors.
     #[arg(short, long)]
     pub quiet: bool,
@@ -65,7 +70,11 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
     }
-    if is_table(&args.input) {
+    // How the input is read must be settled before it is opened.
+    for set in args.sets.iter().filter(|s| s.starts_with("input.")) {
+        base = base.with(set)?;
+    }
+    if boresight::io::is_table(&args.input) {
         return plan_table(args, given, base);
     }
     let source = boresight::io::open(&args.input, &base.input.open_options())?;
@@ -96,15 +105,15 @@ fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     Ok(config)
 }
 
-/// Whether the input is a table of detections, by its ending.
-fn is_table(input: &str) -> bool {
-    let ending = Path::new(input).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    matches!(ending.as_str(), "csv" | "tsv" | "txt") && !input.contains("://")
-}
-
 fn plan_table(args: &InputArgs, given: Option<Config>, base: Config) -> anyhow::Result<Plan> {
-    let options = TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() };
-    let table = boresight::io::tables::read_detections(&args.input, &options)?;
+    let mut base = base;
+    let options = &mut base.input.table;
+    if let Some(columns) = &args.columns {
+        options.columns = boresight::io::Columns::parse(columns)?;
+    }
+    options.rate_hz = args.rate_hz.or(options.rate_hz);
+    options.skip_bad_rows |= args.skip_bad_rows;
+    let table = boresight::io::read_detections(&args.input, options)?;
     let mut reasons = vec![format!(
         "{} detections in {} frames at {} frames/s, read as {}.",
         table.n_rows - table.n_skipped,

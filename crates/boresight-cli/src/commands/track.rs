@@ -5,7 +5,7 @@ use crate::progress;
 use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Summary};
-use boresight::report::{HtmlReport, Notes, ReportNotes};
+use boresight::report::{HtmlReport, LateReport, Notes};
 use boresight::{Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,7 +53,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
     run_options::make_folder(&dir)?;
     let tracking = track::build(&plan.config.tracker)?;
-    let (sinks, notes) = sinks(&args, &plan, &dir)?;
+    let mut sinks = sinks(&args, &plan, &dir)?;
+    let report = if args.no_report { None } else { Some(report(&args, &plan, &dir, &mut sinks)?) };
     run_options::write_config(&dir, &plan)?;
     let quiet = args.input.quiet;
     if !quiet {
@@ -66,31 +67,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let started = std::time::Instant::now();
     let (summary, broken) = pipeline::run(plan.input, Some(tracking), sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
-        if let Some(notes) = &notes
-            && so_far.frames.is_multiple_of(16)
-        {
-            notes.edit(|n| tell(n, so_far));
-        }
         run_options::go_on(&stop)
     })?;
     bar.finish_and_clear();
+    if let Some(report) = report {
+        report.write(|notes| late_notes(notes, &summary, broken.as_ref()))?;
+    }
     if !quiet {
         print_summary(&summary, started.elapsed().as_secs_f64(), &dir);
     }
     run_options::outcome(&summary, broken)
 }
 
-/// Hands the report what is known only while the run goes on.
-fn tell(notes: &mut Notes, so_far: &Summary) {
-    let t = &so_far.times;
-    let named = [("read", t.read), ("detect", t.detect), ("track", t.track), ("write", t.write)];
-    notes.stages = named.iter().map(|(name, d)| ((*name).to_string(), d.as_secs_f64())).collect();
-    notes.warnings.clone_from(&so_far.warnings);
-}
-
-type Sinks = (Vec<Box<dyn Sink>>, Option<ReportNotes>);
-
-fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Sinks> {
+fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(dir.join("tracks.csv"))?),
@@ -108,17 +97,43 @@ fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<S
     if pictures && args.png {
         sinks.push(Box::new(PngFolder::create(dir.join("frames"), DrawOptions::default())?));
     }
-    let mut notes = None;
-    if !args.no_report {
-        let facts = plan.info.iter().map(|i| ("read as".to_string(), i.reader.clone())).collect();
-        let report = HtmlReport::create(
-            dir.join("report.html"),
-            Notes { input: args.input.input.clone(), facts, settings: plan.reasons.clone(), ..Notes::default() },
-        )?;
-        notes = Some(report.notes());
-        sinks.push(Box::new(report));
+    Ok(sinks)
+}
+
+/// Adds the report to the sinks; its page is written when the times of all stages are known.
+fn report(
+    args: &Args,
+    plan: &Plan,
+    dir: &std::path::Path,
+    sinks: &mut Vec<Box<dyn Sink>>,
+) -> anyhow::Result<LateReport> {
+    let mut facts = Vec::new();
+    if let Some(info) = &plan.info {
+        facts.push(("Read as".to_string(), info.reader.clone()));
+        let times = if info.true_times { "the input's own" } else { "made from the nominal rate" };
+        facts.push(("Times".to_string(), times.to_string()));
     }
-    Ok((sinks, notes))
+    let mut settings = plan.reasons.clone();
+    settings.push(String::new());
+    settings.push(plan.config.to_toml()?);
+    let notes = Notes { input: args.input.input.clone(), facts, settings, ..Default::default() };
+    let (sink, late) = HtmlReport::late(dir.join("report.html"), notes)?;
+    sinks.push(Box::new(sink));
+    Ok(late)
+}
+
+/// What the report says only at the end.
+fn late_notes(notes: &mut Notes, summary: &Summary, broken: Option<&boresight::Error>) {
+    let t = &summary.times;
+    let stages = [("read", t.read), ("detect", t.detect), ("track", t.track), ("write", t.write)];
+    notes.stages = stages.map(|(name, time)| (name.to_string(), time.as_secs_f64())).to_vec();
+    notes.warnings.extend(summary.warnings.iter().cloned());
+    if let Some(error) = broken {
+        notes.warnings.push(format!("The input broke off: {error}"));
+    }
+    if summary.interrupted {
+        notes.warnings.push("The run was interrupted; the results end there.".to_string());
+    }
 }
 
 /// The summary on the terminal.

@@ -19,7 +19,7 @@ mod y4m;
 pub use folder::ImageFiles;
 pub use gif_frames::GifFrames;
 pub use natural::natural_order;
-pub use open::open;
+pub use open::{is_table, open};
 pub use pixels::gray_of_rgb8;
 pub use raw::RawFrames;
 pub use tables::{

@@ -46,6 +46,13 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
         .hint("give a video, an image, a folder of images, a quoted glob such as 'frames/*.png', an address, or - for standard input"))
 }
 
+/// Whether an input is a file of text: a table of detections or tracks, not frames.
+pub fn is_table(input: &str) -> bool {
+    let path = Path::new(input);
+    let head = path.is_file().then(|| sniff::read_up_to(&mut File::open(path).ok()?, sniff::SNIFF_BYTES).ok());
+    head.flatten().is_some_and(|head| sniff(&head) == Format::Text)
+}
+
 fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     if let Some(format) = options.raw {
         return Ok(Box::new(RawFrames::files(input, vec![path.to_path_buf()], format, options)?));

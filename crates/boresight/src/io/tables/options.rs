@@ -12,6 +12,7 @@ pub struct TableOptions {
     pub columns: Columns,
     /// Rate, frames/s, above 0. Given, it makes all times (frame / rate); absent, the table's times count, then the
     /// `frameRate` of a `seqinfo.ini` beside it, then 25.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// Standard deviation of a position where the table has none, px, above 0. Larger values make tracks smoother.
     pub std_px: f64,
@@ -23,6 +24,7 @@ pub struct TableOptions {
     /// Number that the table gives to its first pixel in x and y (0 or 1). MOTChallenge text always counts from 1.
     pub first_pixel: f64,
     /// Number that the table gives to its first frame; absent: 1 in MOTChallenge text, else 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub first_frame: Option<u64>,
     /// Whether rows that cannot be read are counted and left out instead of ending the run.
     pub skip_bad_rows: bool,
