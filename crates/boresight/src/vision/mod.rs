@@ -7,6 +7,7 @@ pub mod background;
 pub mod camera;
 pub mod centroid;
 pub mod cluster;
+pub mod colour;
 pub mod config;
 pub mod detector;
 pub mod isolated;

@@ -1,6 +1,7 @@
 //! Integration tests: one binary, a module per matter.
 
 mod background;
+mod colour_real;
 mod golden;
 mod images;
 mod metrics;

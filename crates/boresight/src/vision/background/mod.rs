@@ -405,7 +405,7 @@ fn adapt<T: BackgroundPixel>(
 
 /// Packs bytes 0 and 1 into bits; `states` has 64 bytes for every word.
 #[inline(always)]
-fn pack<S: Simd>(simd: S, states: &[u8], bits: &mut [u64]) {
+pub(crate) fn pack<S: Simd>(simd: S, states: &[u8], bits: &mut [u64]) {
     let lanes = S::u8s::LEN;
     for (bytes, word) in states.chunks_exact(64).zip(bits) {
         let mut w = 0;

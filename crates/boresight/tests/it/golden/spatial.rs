@@ -3,6 +3,7 @@
 use super::{load, number, rows};
 use boresight::Image;
 use boresight::metrics::image::{compare, pfe_spectral};
+use boresight::vision::colour::{ColourMatch, ColourMatchConfig, distance, grey, hsi, matches};
 use boresight::vision::noise::{gaussian, salt_and_pepper};
 use boresight::vision::spatial::{
     Border, Kernel, SpatialConfig, SpatialFilter, WindowConfig, convolve_exact, mean_exact, median_exact,
@@ -89,6 +90,30 @@ fn the_image_metrics_give_the_golden_numbers() {
             ("pfe_spectral", pfe_spectral(&truth, &filtered).unwrap()),
         ] {
             golden.close(ours, number(&case["outputs"][name]), name);
+        }
+    }
+}
+
+#[test]
+fn grey_hue_saturation_and_match_are_the_golden_ones() {
+    let Some(golden) = load("colour") else { return };
+    for case in &golden.cases {
+        let colours: Vec<[u8; 3]> =
+            rows(&case["inputs"]["rgb"]).iter().map(|c| [c[0] as u8, c[1] as u8, c[2] as u8]).collect();
+        let out = &case["outputs"];
+        // Distances and matches are against pixel 1.
+        let config = ColourMatchConfig { reference: colours[1], ..ColourMatchConfig::default() };
+        let mut bits = [0];
+        ColourMatch::new(config).unwrap().row(&colours, &mut bits);
+        for (i, &rgb) in colours.iter().enumerate() {
+            let c = hsi(rgb);
+            assert_eq!(f64::from(grey(rgb)), number(&out["gray"][i]), "grey of {rgb:?}");
+            golden.close(c.hue_deg, number(&out["h"][i]), "hue");
+            golden.close(c.saturation, number(&out["s"][i]), "saturation");
+            golden.close(c.intensity, number(&out["i"][i]), "intensity");
+            golden.close(distance(&c, &hsi(colours[1])), number(&out["dist_vs_1"][i]), "distance");
+            let want = out["match_vs_1"][i].as_bool().unwrap();
+            assert_eq!((matches(&config, rgb), bits[0] >> i & 1 == 1), (want, want), "match of {rgb:?}");
         }
     }
 }
