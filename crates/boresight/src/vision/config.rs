@@ -5,6 +5,7 @@
 
 use super::spatial::SpatialConfig;
 use super::threshold::ThresholdConfig;
+use super::window::FollowConfig;
 use crate::{Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,9 @@ pub struct DetectorConfig {
     pub noise: NoiseConfig,
     /// Whether the camera's motion is followed, so that tracks live on steady ground.
     pub camera: CameraConfig,
+    /// Follow a single target: only the largest cluster in a window around the predicted place is kept. Absent: all are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub follow: Option<FollowConfig>,
     /// Most detections kept in a frame, those with the largest score; no limit if absent. Range 1...
     /// Protects what follows from a threshold that floods it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -162,6 +166,9 @@ impl DetectorConfig {
         self.cluster.validate(&format!("{at}.cluster"))?;
         self.centroid.validate(&format!("{at}.centroid"))?;
         self.noise.validate(&format!("{at}.noise"))?;
+        if let Some(follow) = &self.follow {
+            follow.validate(&format!("{at}.follow"))?;
+        }
         if self.max_detections == Some(0) {
             return Err(wrong(at, "max-detections", 0, "at least 1", "leave it out for no limit"));
         }

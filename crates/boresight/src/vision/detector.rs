@@ -3,19 +3,22 @@
 use super::camera::CameraMotion;
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
-use super::config::{CameraConfig, DetectorConfig, NoiseConfig, Weight};
+use super::config::{CameraConfig, CentroidMethod, DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
-use super::spatial::{SpatialConfig, SpatialFilter};
+use super::stage::{Motion, Stage};
 use super::threshold::band::{band_bits, words};
 use super::threshold::grid::BackgroundGrid;
 use super::threshold::local::LocalThreshold;
 use super::threshold::otsu::otsu_level;
 use super::threshold::spot::SpotDetector;
 use super::threshold::{LevelConfig, Side, ThresholdConfig};
+use super::window::Follower;
 use super::{Detector, region::Region};
-use crate::{Detection, Error, ErrorKind, Extent, Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo};
+use crate::{
+    Detection, Error, ErrorKind, Extent, Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo, Timestamp,
+};
 
 /// Cells of the background when the threshold itself does not name a size, px.
 const DEFAULT_CELL_PX: u32 = 32;
@@ -61,30 +64,12 @@ struct ThresholdDetector {
     samples: Vec<f32>,
     isolated: IsolatedDetector,
     spots: Option<SpotDetector>,
-    /// One per pixel type, so that a frame keeps its type; `None` if nothing is to be smoothed.
-    filter8: Option<Smoother<u8>>,
-    filter16: Option<Smoother<u16>>,
-    filter32: Option<Smoother<f32>>,
-}
-
-/// A spatial filter and its result.
-struct Smoother<T: Pixel> {
-    filter: SpatialFilter<T>,
-    out: Image<T>,
-}
-
-impl<T: Pixel> Smoother<T> {
-    fn new(config: SpatialConfig) -> Result<Option<Self>> {
-        if config == SpatialConfig::None {
-            return Ok(None);
-        }
-        Ok(Some(Self { filter: SpatialFilter::new(config)?, out: Image::default() }))
-    }
-
-    fn apply(&mut self, image: &Image<T>) -> &Image<T> {
-        self.filter.apply(image, &mut self.out);
-        &self.out
-    }
+    /// One per pixel type, so that a frame keeps its type.
+    stage8: Stage<u8>,
+    stage16: Stage<u16>,
+    stage32: Stage<f32>,
+    last: Option<Timestamp>,
+    follower: Option<Follower>,
 }
 
 impl ThresholdDetector {
@@ -101,9 +86,11 @@ impl ThresholdDetector {
             size,
             kind,
             spots,
-            filter8: Smoother::new(config.filter)?,
-            filter16: Smoother::new(config.filter)?,
-            filter32: Smoother::new(config.filter)?,
+            stage8: Stage::new(config.filter, &config.threshold)?,
+            stage16: Stage::new(config.filter, &config.threshold)?,
+            stage32: Stage::new(config.filter, &config.threshold)?,
+            last: None,
+            follower: config.follow.clone().map(Follower::new),
             grey: Image::default(),
             grid: BackgroundGrid::new(cell as usize),
             local: LocalThreshold::default(),
@@ -126,6 +113,8 @@ impl ThresholdDetector {
                 ThresholdConfig::Level(LevelConfig { side, .. }) => *side == Side::Dark,
                 ThresholdConfig::Otsu(c) => c.side == Side::Dark,
                 ThresholdConfig::Local(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Isolated(_) => true,
+                // Their pixels may be brighter or darker than the ground, so they count alike, see `method`.
+                ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) => false,
             },
         }
     }
@@ -139,16 +128,42 @@ impl ThresholdDetector {
         }
     }
 
-    fn run8(&mut self, image: &Image<u8>, scan: &mut Scan) {
-        let noise = self.pixel_noise(image);
-        let mut filter = self.filter8.take();
-        self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
-        self.filter8 = filter;
+    /// The centroid's method: where a pixel's value does not say how surely it is target, all pixels count alike.
+    fn method(&self) -> CentroidMethod {
+        let by_change = matches!(self.config.threshold, ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_));
+        match self.config.centroid.method {
+            CentroidMethod::Mask if by_change && self.config.centroid.weight == Weight::Auto => CentroidMethod::Binary,
+            method => method,
+        }
     }
 
-    /// `noise` is that of the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same sum over
-    /// the pixels before smoothing, whose noise is white.
-    fn run<T: Pixel>(&mut self, image: &Image<T>, (variance, gain): (f64, f64), scan: &mut Scan) {
+    fn run8(&mut self, image: &Image<u8>, scan: &mut Scan) -> Result<()> {
+        let mut stage = std::mem::take(&mut self.stage8);
+        let done = self.run_stage(image, &mut stage, scan);
+        self.stage8 = stage;
+        done
+    }
+
+    fn run_stage<T: Pixel>(&mut self, image: &Image<T>, stage: &mut Stage<T>, scan: &mut Scan) -> Result<()> {
+        // The noise is that of the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same
+        // sum over the pixels before smoothing, whose noise is white.
+        let noise = self.pixel_noise(image);
+        let image = stage.smoother.as_mut().map_or(image, |f| f.apply(image));
+        if let Some(motion) = &mut stage.motion {
+            motion.update(image, scan.time, self.last)?;
+        }
+        self.last = Some(scan.time);
+        self.run(image, noise, stage.motion.as_ref(), scan);
+        Ok(())
+    }
+
+    fn run<T: Pixel>(
+        &mut self,
+        image: &Image<T>,
+        (variance, gain): (f64, f64),
+        motion: Option<&Motion<T>>,
+        scan: &mut Scan,
+    ) {
         if let ThresholdConfig::Isolated(c) = &self.config.threshold {
             self.isolated.run(image, &self.config, c, scan);
             keep_strongest(&mut scan.detections, self.config.max_detections);
@@ -185,6 +200,11 @@ impl ThresholdDetector {
                     level = one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
                 }
             }
+            ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) => {
+                for (y, motion) in motion.iter().flat_map(|m| (0..image.height()).map(move |y| (y, m))) {
+                    self.bright.row(y, motion.row(y), image.row(y));
+                }
+            }
             // Ran above: they have no rows of bits of their own.
             ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) => {}
             ThresholdConfig::Local(c) => {
@@ -201,6 +221,7 @@ impl ThresholdDetector {
                 }
             }
         }
+        let method = self.method();
         let (min, max) = self.config.cluster.area_limits();
         for (clusters, dark) in [(&self.bright, false), (&self.dark, true)] {
             for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
@@ -209,6 +230,9 @@ impl ThresholdDetector {
                     self.grid.at(region.x / n, region.y / n)
                 });
                 let ground = local.map(|(median, _)| median);
+                // Moving pixels are not told apart by their sign: the region's mean tells.
+                let below = ground.is_some_and(|g| region.sum < g * f64::from(region.area));
+                let dark = if motion.is_some() { below } else { dark };
                 let sign = if dark { -1.0 } else { 1.0 };
                 let level = match (&self.config.threshold, local) {
                     (ThresholdConfig::Local(c), Some((median, deviation))) => {
@@ -224,7 +248,7 @@ impl ThresholdDetector {
                     level,
                     ground,
                 };
-                scan.detections.push(detection(region, image, &self.config, &around, dark));
+                scan.detections.push(detection(region, image, &self.config, method, &around, dark));
             }
         }
         keep_strongest(&mut scan.detections, self.config.max_detections);
@@ -277,10 +301,11 @@ fn detection<T: Pixel>(
     r: &Region,
     image: &Image<T>,
     config: &DetectorConfig,
+    method: CentroidMethod,
     around: &Surroundings,
     dark: bool,
 ) -> Detection {
-    let c = centroid(r, image, config.centroid.method, around);
+    let c = centroid(r, image, method, around);
     let extra = config.centroid.extra_sd_px * config.centroid.extra_sd_px;
     let noise = (around.variance.max(1e-12) * f64::from(r.area)).sqrt();
     let contrast = around.sign * (r.sum - around.background * f64::from(r.area));
@@ -337,18 +362,18 @@ impl Detector for ThresholdDetector {
             .hint("all frames of a sequence must have one size and one pixel type"));
         }
         match &frame.pixels {
-            Pixels::Gray8(image) => self.run8(image, scan),
+            Pixels::Gray8(image) => self.run8(image, scan)?,
             Pixels::Gray16(image) => {
-                let noise = self.pixel_noise(image);
-                let mut filter = self.filter16.take();
-                self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
-                self.filter16 = filter;
+                let mut stage = std::mem::take(&mut self.stage16);
+                let done = self.run_stage(image, &mut stage, scan);
+                self.stage16 = stage;
+                done?;
             }
             Pixels::GrayF32(image) => {
-                let noise = self.pixel_noise(image);
-                let mut filter = self.filter32.take();
-                self.run(filter.as_mut().map_or(image, |f| f.apply(image)), noise, scan);
-                self.filter32 = filter;
+                let mut stage = std::mem::take(&mut self.stage32);
+                let done = self.run_stage(image, &mut stage, scan);
+                self.stage32 = stage;
+                done?;
             }
             Pixels::Rgb8(image) => {
                 let mut grey = std::mem::take(&mut self.grey);
@@ -359,9 +384,13 @@ impl Detector for ThresholdDetector {
                     // SPEC I.1.
                     *g = ((9798 * u32::from(r) + 19235 * u32::from(green) + 3735 * u32::from(b) + 16384) >> 15) as u8;
                 }
-                self.run8(&grey, scan);
+                let done = self.run8(&grey, scan);
                 self.grey = grey;
+                done?;
             }
+        }
+        if let Some(follower) = &mut self.follower {
+            follower.pick(&mut scan.detections, self.size);
         }
         Ok(())
     }

@@ -18,6 +18,7 @@ pub mod pixel;
 pub mod probability;
 pub mod region;
 pub mod spatial;
+mod stage;
 pub mod tbd;
 pub mod threshold;
 pub mod window;

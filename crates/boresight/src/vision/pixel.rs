@@ -1,17 +1,19 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
+use super::background::BackgroundPixel;
 use super::region::RunSums;
-use super::spatial::SpatialPixel;
 use super::threshold::band;
 
 /// A grey pixel.
-pub trait Pixel: SpatialPixel + PartialOrd {
+pub trait Pixel: BackgroundPixel + PartialOrd {
     /// Distance between neighbouring values, counts; 0 for a float.
     const STEP: f32;
     /// The value, counts.
     fn value(self) -> f64;
     /// The value as f32; exact for every type here.
     fn value_f32(self) -> f32;
+    /// Writes 1 into `states` for every `row[x] >= level[x]` (`above`) or `row[x] <= level[x]`, else 0; NaN gives 0.
+    fn level_states(row: &[Self], level: &[f32], above: bool, states: &mut [u8]);
     /// Sums over the pixels of a run.
     fn run_sums(run: &[Self]) -> RunSums;
     /// The smallest and largest pixel inside the real band [`low`, `high`], or `None` if no pixel value lies in it.
@@ -21,12 +23,15 @@ pub trait Pixel: SpatialPixel + PartialOrd {
 }
 
 macro_rules! integer_pixel {
-    ($t:ty, $band_bits:ident) => {
+    ($t:ty, $band_bits:ident, $level_states:ident) => {
         impl Pixel for $t {
             fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
                 band::$band_bits(row, low, high, bits);
             }
             const STEP: f32 = 1.0;
+            fn level_states(row: &[Self], level: &[f32], above: bool, states: &mut [u8]) {
+                band::$level_states(row, level, above, states);
+            }
             #[inline(always)]
             fn run_sums(run: &[Self]) -> RunSums {
                 if let [only] = run {
@@ -57,14 +62,17 @@ macro_rules! integer_pixel {
         }
     };
 }
-integer_pixel!(u8, band_bits_u8);
-integer_pixel!(u16, band_bits_u16);
+integer_pixel!(u8, band_bits_u8, level_states_u8);
+integer_pixel!(u16, band_bits_u16, level_states_u16);
 
 impl Pixel for f32 {
     fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
         band::band_bits_f32(row, low, high, bits);
     }
     const STEP: f32 = 0.0;
+    fn level_states(row: &[Self], level: &[f32], above: bool, states: &mut [u8]) {
+        band::level_states_f32(row, level, above, states);
+    }
     #[inline(always)]
     fn run_sums(run: &[Self]) -> RunSums {
         let mut sums = RunSums { sum: 0.0, sum_i: 0.0, min: Self::INFINITY, max: Self::NEG_INFINITY };

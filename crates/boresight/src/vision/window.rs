@@ -3,10 +3,13 @@
 //! Source: SPEC I.2, I.3, I.6 (0-based pixels). One stray dark pixel ruins a box that is taken over a whole frame, so the
 //! box is taken inside a window around the predicted centre. Δ = d(t-1) - d(t-2), the last displacement per axis.
 
+use super::config::wrong;
 use super::pixel::Pixel;
 use super::probability::PixelRect;
-use crate::Image;
+use crate::{Detection, Image, Result};
 use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 impl PixelRect {
     /// The whole image, or `None` for an empty one.
@@ -62,6 +65,93 @@ pub fn search_window(
     };
     let ((left, right), (top, bottom)) = (side(0, width)?, side(1, height)?);
     Some(PixelRect { left, top, right, bottom })
+}
+
+/// How a single target is followed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FollowConfig {
+    /// Margin around the predicted box, px, 0...; it grows with every frame in which the target is missed.
+    pub margin_px: f64,
+    /// Frames without the target after which the whole frame is searched again, 1... .
+    pub max_missed: u32,
+}
+
+impl Default for FollowConfig {
+    fn default() -> Self {
+        Self { margin_px: 5.0, max_missed: 10 }
+    }
+}
+
+impl FollowConfig {
+    /// Checks every parameter; `at` is the path of this table.
+    /// # Errors
+    /// The first parameter out of its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        if !(self.margin_px >= 0.0 && self.margin_px.is_finite()) {
+            return Err(wrong(at, "margin-px", self.margin_px, "0 px or more", "5 px allows for a change of course"));
+        }
+        if self.max_missed == 0 {
+            return Err(wrong(at, "max-missed", 0, "at least 1 frame", "10 frames bridge a short gap"));
+        }
+        Ok(())
+    }
+}
+
+/// Keeps of each frame's detections the largest whose box reaches into the search window.
+///
+/// The place is predicted with the last displacement (SPEC I.5: coordinates extrapolated by `[2 -1]`).
+#[derive(Clone, Debug)]
+pub struct Follower {
+    config: FollowConfig,
+    /// Last place, displacement and half size.
+    last: Option<(Vector2<f64>, Vector2<f64>, Vector2<f64>)>,
+    missed: u32,
+}
+
+impl Follower {
+    /// Builds a follower that has seen nothing.
+    pub fn new(config: FollowConfig) -> Self {
+        Self { config, last: None, missed: 0 }
+    }
+
+    /// The window for the next frame, or `None` while the whole frame is searched.
+    pub fn window(&self, size: (usize, usize)) -> Option<PixelRect> {
+        let (place, displacement, semi) = self.last?;
+        let frames = f64::from(self.missed + 1);
+        search_window(place + displacement * frames, semi, displacement, self.config.margin_px * frames, size)
+    }
+
+    /// Leaves the target alone in `detections`.
+    pub fn pick(&mut self, detections: &mut Vec<Detection>, size: (usize, usize)) {
+        if let Some(w) = self.window(size) {
+            detections.retain(|d| {
+                let e = &d.extent;
+                e.left_px <= w.right as f64
+                    && e.left_px + e.width_px >= w.left as f64
+                    && e.top_px <= w.bottom as f64
+                    && e.top_px + e.height_px >= w.top as f64
+            });
+        }
+        // The first of the largest.
+        let best =
+            detections.iter().enumerate().max_by_key(|(i, d)| (d.area_px, std::cmp::Reverse(*i))).map(|(i, _)| i);
+        let Some(best) = best else {
+            self.missed += 1;
+            if self.missed > self.config.max_missed {
+                (self.last, self.missed) = (None, 0);
+            }
+            return;
+        };
+        detections.swap(0, best);
+        detections.truncate(1);
+        let found = &detections[0];
+        let displacement =
+            self.last.map_or(Vector2::zeros(), |(place, _, _)| (found.position - place) / f64::from(self.missed + 1));
+        let semi = Vector2::new(found.extent.width_px - 1.0, found.extent.height_px - 1.0) / 2.0;
+        self.last = Some((found.position, displacement, semi));
+        self.missed = 0;
+    }
 }
 
 #[cfg(test)]

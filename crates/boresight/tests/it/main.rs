@@ -9,5 +9,6 @@ mod reproduce;
 mod rooms;
 mod tables;
 mod video;
+mod vision_conformance;
 mod vision_covariance;
 mod vision_real;

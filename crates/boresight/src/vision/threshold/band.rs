@@ -2,8 +2,10 @@
 //!
 //! Bits, not bytes, leave this file: bit `x % 64` of word `x / 64` is pixel `x`; bits past the width are 0.
 
+use crate::vision::background::pack;
 use crate::vision::pixel::Pixel;
 use fearless_simd::{Simd, SimdBase, SimdMask};
+use multiversion::multiversion;
 
 /// Number of words for a row of `width` bits.
 pub fn words(width: usize) -> usize {
@@ -51,17 +53,37 @@ vector_band!(band_bits_u8, band_u8, u8, u8s);
 vector_band!(band_bits_u16, band_u16, u16, u16s);
 vector_band!(band_bits_f32, band_f32, f32, f32s);
 
-/// Writes bit `x` for every `row[x] >= level[x]` (`ABOVE`) or `row[x] <= level[x]`.
-pub fn level_bits<T: Pixel, const ABOVE: bool>(row: &[T], level: &[f32], bits: &mut [u64]) {
-    for ((word, chunk), levels) in bits.iter_mut().zip(row.chunks(64)).zip(level.chunks(64)) {
-        let mut w = 0u64;
-        for (i, (&v, &l)) in chunk.iter().zip(levels).enumerate() {
-            let v = v.value_f32();
-            w |= u64::from(if ABOVE { v >= l } else { v <= l }) << i;
-        }
-        *word = w;
-    }
+/// Writes bit `x` for every `row[x] >= level[x]` (`above`) or `row[x] <= level[x]`; `states` is scratch.
+pub fn level_bits<T: Pixel>(row: &[T], level: &[f32], above: bool, states: &mut Vec<u8>, bits: &mut [u64]) {
+    // Bytes first, then bits: both are plain loops over vectors.
+    states.resize(row.len().next_multiple_of(64), 0);
+    let n = row.len().min(level.len());
+    states[n..].fill(0);
+    T::level_states(&row[..n], &level[..n], above, &mut states[..n]);
+    fearless_simd::dispatch!(fearless_simd::Level::new(), simd => pack(simd, states, bits));
 }
+
+macro_rules! level_states {
+    ($name:ident, $t:ty) => {
+        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
+        pub(crate) fn $name(row: &[$t], level: &[f32], above: bool, states: &mut [u8]) {
+            let n = row.len().min(level.len()).min(states.len());
+            let (row, level, states) = (&row[..n], &level[..n], &mut states[..n]);
+            if above {
+                for x in 0..n {
+                    states[x] = u8::from(f32::from(row[x]) >= level[x]);
+                }
+            } else {
+                for x in 0..n {
+                    states[x] = u8::from(f32::from(row[x]) <= level[x]);
+                }
+            }
+        }
+    };
+}
+level_states!(level_states_u8, u8);
+level_states!(level_states_u16, u16);
+level_states!(level_states_f32, f32);
 
 #[cfg(test)]
 mod tests {

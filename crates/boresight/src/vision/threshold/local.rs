@@ -11,6 +11,7 @@ use crate::vision::pixel::Pixel;
 #[derive(Clone, Debug, Default)]
 pub struct LocalThreshold {
     level: Vec<f32>,
+    states: Vec<u8>,
 }
 
 impl LocalThreshold {
@@ -25,6 +26,6 @@ impl LocalThreshold {
     ) {
         let sign = if ABOVE { 1.0 } else { -1.0 };
         grid.level_row(y, config.k as f32, config.min_contrast as f32, sign, &mut self.level);
-        level_bits::<T, ABOVE>(row, &self.level, bits);
+        level_bits(row, &self.level, ABOVE, &mut self.states, bits);
     }
 }

@@ -6,6 +6,7 @@ pub mod local;
 pub mod otsu;
 pub mod spot;
 
+use super::background::{BackgroundConfig, DifferenceConfig};
 use super::config::wrong;
 use super::isolated::IsolatedConfig;
 use crate::Result;
@@ -24,6 +25,10 @@ pub enum ThresholdConfig {
     Otsu(OtsuConfig),
     /// Values that stand out from their local background by k robust standard deviations.
     Local(LocalConfig),
+    /// Pixels that differ from a running model of a fixed camera's background.
+    Moving(BackgroundConfig),
+    /// Pixels that differ from the frames just before.
+    Difference(DifferenceConfig),
     /// Closed blobs of any size that stand clear of the ring around them.
     Isolated(IsolatedConfig),
     /// Small targets by their contrast to what surrounds them: one detection for each peak, no clusters.
@@ -202,6 +207,8 @@ impl ThresholdConfig {
                 }
             }
             Self::Otsu(_) => {}
+            Self::Moving(c) => c.validate(&format!("{at}.moving"))?,
+            Self::Difference(c) => c.validate(&format!("{at}.difference"))?,
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
             Self::Local(c) => {

@@ -1,0 +1,207 @@
+//! Every detector, whatever its threshold: odd sizes, empty and full frames, NaN, the whole range of u16; finite positions
+//! inside the frame, covariances that can be inverted, the same answer twice.
+
+use boresight::vision::config::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
+use boresight::vision::spatial::{SpatialConfig, WindowConfig};
+use boresight::vision::threshold::{
+    BandConfig, LevelConfig, LocalConfig, OtsuConfig, Polarity, Side, SpotConfig, ThresholdConfig,
+};
+use boresight::vision::window::FollowConfig;
+use boresight::vision::{Detector, build};
+use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
+
+/// Every threshold; the match makes a new one fail to compile until it is here.
+fn thresholds() -> Vec<ThresholdConfig> {
+    let local = |polarity| ThresholdConfig::Local(LocalConfig { k: 2.0, polarity, cell_px: 8, min_contrast: 0.0 });
+    let spot = |polarity| ThresholdConfig::Spot(SpotConfig { size_px: 5.0, k: 2.0, polarity, ..Default::default() });
+    let all = vec![
+        ThresholdConfig::Band(BandConfig { low: 100.0, high: 60_000.0 }),
+        ThresholdConfig::Level(LevelConfig { level: 99.5, side: Side::Bright, exclusive: false }),
+        ThresholdConfig::Level(LevelConfig { level: 100.0, side: Side::Dark, exclusive: true }),
+        ThresholdConfig::Otsu(OtsuConfig { side: Side::Bright }),
+        ThresholdConfig::Otsu(OtsuConfig { side: Side::Dark }),
+        local(Polarity::Bright),
+        local(Polarity::Dark),
+        local(Polarity::Both),
+        spot(Polarity::Bright),
+        spot(Polarity::Both),
+        ThresholdConfig::Isolated(Default::default()),
+        ThresholdConfig::Moving(Default::default()),
+        ThresholdConfig::Difference(Default::default()),
+    ];
+    for t in &all {
+        match t {
+            ThresholdConfig::Band(_)
+            | ThresholdConfig::Level(_)
+            | ThresholdConfig::Otsu(_)
+            | ThresholdConfig::Local(_)
+            | ThresholdConfig::Spot(_)
+            | ThresholdConfig::Isolated(_)
+            | ThresholdConfig::Moving(_)
+            | ThresholdConfig::Difference(_) => {}
+        }
+    }
+    all
+}
+
+fn source(width: usize, height: usize, kind: PixelKind) -> SourceInfo {
+    SourceInfo {
+        label: "test".into(),
+        reader: "test".into(),
+        width,
+        height,
+        kind,
+        n_frames: None,
+        rate_hz: None,
+        true_times: true,
+    }
+}
+
+/// Frame `k`: all 0, all at the top of the range, noise over the whole range, a bright square that moves.
+fn frame(width: usize, height: usize, kind: PixelKind, k: u64) -> Frame {
+    let mut state = k.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut level = |i: usize| -> u16 {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        let (x, y) = (i % width.max(1), i / width.max(1));
+        let at = 3 + k as usize;
+        match k % 4 {
+            0 => 0,
+            1 => u16::MAX,
+            2 => state as u16,
+            _ if (at..at + 4).contains(&x) && (2..6).contains(&y) => 50_000,
+            _ => 5000 + (state % 512) as u16,
+        }
+    };
+    let n = width * height;
+    let pixels = match kind {
+        PixelKind::Gray8 => {
+            Pixels::Gray8(Image::from_vec(width, height, (0..n).map(|i| (level(i) >> 8) as u8).collect()).unwrap())
+        }
+        PixelKind::Gray16 => Pixels::Gray16(Image::from_vec(width, height, (0..n).map(&mut level).collect()).unwrap()),
+        PixelKind::GrayF32 => {
+            let value = |i: usize| match i % 7 {
+                3 if k.is_multiple_of(2) => f32::NAN,
+                5 if k % 8 == 2 => f32::INFINITY,
+                _ => f32::from(level(i)) - 1000.0,
+            };
+            Pixels::GrayF32(Image::from_vec(width, height, (0..n).map(value).collect()).unwrap())
+        }
+        PixelKind::Rgb8 => {
+            let value = |i: usize| {
+                let v = (level(i) >> 8) as u8;
+                [v, v / 2, 255 - v]
+            };
+            Pixels::Rgb8(Image::from_vec(width, height, (0..n).map(value).collect()).unwrap())
+        }
+    };
+    Frame { index: FrameIndex(k), time: Timestamp::from_ns(k as i64 * 40_000_000), pixels }
+}
+
+fn run(detector: &mut dyn Detector, width: usize, height: usize, kind: PixelKind) -> Vec<Scan> {
+    (0..9)
+        .map(|k| {
+            let mut scan = Scan::default();
+            detector.detect(&frame(width, height, kind, k), &mut scan).unwrap();
+            assert_eq!((scan.index, scan.time.ns), (FrameIndex(k), k as i64 * 40_000_000));
+            scan
+        })
+        .collect()
+}
+
+const KINDS: [PixelKind; 4] = [PixelKind::Gray8, PixelKind::Gray16, PixelKind::GrayF32, PixelKind::Rgb8];
+
+fn check(config: &DetectorConfig, what: &str) -> usize {
+    let mut n = 0;
+    for kind in KINDS {
+        for (width, height) in [(0, 0), (1, 1), (1, 9), (9, 1), (63, 5), (64, 12), (65, 12), (130, 20)] {
+            let what = format!("{what}, {kind:?} {width} x {height}");
+            let build = || build(config, &source(width, height, kind)).unwrap();
+            let scans = run(build().as_mut(), width, height, kind);
+            assert_eq!(scans, run(build().as_mut(), width, height, kind), "{what}: not the same twice");
+            for d in scans.iter().flat_map(|s| &s.detections) {
+                n += 1;
+                let (x, y) = (d.position.x, d.position.y);
+                assert!(
+                    (-0.5..width as f64 - 0.5).contains(&x) && (-0.5..height as f64 - 0.5).contains(&y),
+                    "{what}: {x} {y}"
+                );
+                assert!(d.cov.cholesky().is_some() && d.cov.iter().all(|v| v.is_finite()), "{what}: {}", d.cov);
+                assert!(d.area_px > 0 && d.extent.width_px >= 1.0 && d.extent.height_px >= 1.0, "{what}: {d:?}");
+                assert!(!d.score.is_nan(), "{what}: {d:?}");
+            }
+            let mut scan = Scan::default();
+            let wrong = build().detect(&frame(width + 1, height, kind, 0), &mut scan).unwrap_err().to_string();
+            assert!(wrong.contains("expected") && wrong.contains("hint"), "{wrong}");
+        }
+    }
+    n
+}
+
+#[test]
+fn every_threshold_takes_every_frame() {
+    for threshold in thresholds() {
+        let what = format!("{threshold:?}");
+        let found = check(&DetectorConfig { threshold, ..Default::default() }, &what);
+        assert!(found > 0, "{what} found nothing at all");
+    }
+}
+
+#[test]
+fn every_centroid_weight_filter_and_distance_takes_every_frame() {
+    for method in [CentroidMethod::Mask, CentroidMethod::Binary, CentroidMethod::Bbox, CentroidMethod::BoxCentre] {
+        for weight in [Weight::Auto, Weight::Intensity, Weight::AboveBackground] {
+            let config = DetectorConfig {
+                threshold: ThresholdConfig::Otsu(OtsuConfig { side: Side::Bright }),
+                centroid: CentroidConfig { method, weight, extra_sd_px: 0.1 },
+                ..Default::default()
+            };
+            check(&config, &format!("{method:?} {weight:?}"));
+        }
+    }
+    for (distance_px, inclusive) in [(0.5, false), (1.0, true), (2.0, false), (7.3, true)] {
+        let config = DetectorConfig {
+            filter: SpatialConfig::Median(WindowConfig::default()),
+            cluster: ClusterConfig { distance_px, inclusive, ..Default::default() },
+            max_detections: Some(5),
+            follow: Some(FollowConfig::default()),
+            ..Default::default()
+        };
+        check(&config, &format!("d_p {distance_px}"));
+    }
+}
+
+#[test]
+fn a_single_dark_target_is_followed_past_a_larger_dark_thing() {
+    let config = DetectorConfig {
+        threshold: ThresholdConfig::Level(LevelConfig { level: 150.0, side: Side::Dark, exclusive: false }),
+        follow: Some(FollowConfig { margin_px: 3.0, max_missed: 3 }),
+        ..Default::default()
+    };
+    let mut detector = build(&config, &source(80, 40, PixelKind::Gray8)).unwrap();
+    let mut scan = Scan::default();
+    for k in 0..20usize {
+        let mut image = Image::filled(80, 40, 200u8);
+        let mut square = |left: usize, top: usize, side: usize| {
+            (top..top + side).for_each(|y| image.row_mut(y)[left..left + side].fill(50));
+        };
+        square(5 + 2 * k, 10, 4);
+        // From frame 3 on something larger is dark elsewhere, and in frame 8 the target is hidden.
+        if k >= 3 {
+            square(60, 28, 9);
+        }
+        if k == 8 {
+            image.row_mut(10)[5 + 2 * k..].fill(200);
+            (10..14).for_each(|y| image.row_mut(y).fill(200));
+        }
+        let frame = Frame { index: FrameIndex(k as u64), time: Timestamp::default(), pixels: Pixels::Gray8(image) };
+        detector.detect(&frame, &mut scan).unwrap();
+        if k == 8 {
+            assert!(scan.detections.is_empty());
+            continue;
+        }
+        assert_eq!(scan.detections.len(), 1, "frame {k}");
+        assert_eq!(scan.detections[0].position, nalgebra::Vector2::new(6.5 + 2.0 * k as f64, 11.5), "frame {k}");
+    }
+}
