@@ -1,6 +1,9 @@
 //! Repository chores: `cargo xtask <NAME>`.
 
 mod bench_metrics;
+mod bench_track;
+mod clutter_table;
+mod crossing_table;
 mod ir_exam;
 mod mot_table;
 mod video_check;
@@ -21,6 +24,12 @@ enum Chore {
     BenchMetrics(bench_metrics::Args),
     /// Track the public infrared clips with no options and score the tracks.
     IrExam(ir_exam::Args),
+    /// Scale: scans per second from 10 to 100 000 targets, with GOSPA.
+    BenchTrack(bench_track::Args),
+    /// One target in clutter: share lost by each method, beside SPEC E.
+    ClutterTable(clutter_table::Args),
+    /// Crossing targets: share tracked and identity switches of each method.
+    CrossingTable(crossing_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
     MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
@@ -37,6 +46,9 @@ fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
         Chore::BenchMetrics(args) => bench_metrics::run(&args),
         Chore::IrExam(args) => ir_exam::exam(&args),
+        Chore::BenchTrack(args) => bench_track::run(&args),
+        Chore::ClutterTable(args) => clutter_table::run(&args),
+        Chore::CrossingTable(args) => crossing_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }

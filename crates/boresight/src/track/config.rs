@@ -1,7 +1,9 @@
 //! The tracker's configuration: every choice is an enum, every number has a unit and a range.
 
+use super::belief::Belief;
 use super::birth::BirthConfig;
 use super::clutter::ClutterConfig;
+use super::filter_config::FilterConfig;
 use super::life::LifeConfig;
 use super::mht::MhtConfig;
 use super::proof::ProofConfig;
@@ -9,7 +11,7 @@ use super::sharing::SharingConfig;
 use super::terms::TermsConfig;
 use crate::associate::AssociatorConfig;
 use crate::{Error, ErrorKind, Result};
-use boresight_filters::{Filter, Gaussian};
+use boresight_filters::{FilterError, Gaussian};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -123,44 +125,16 @@ impl Default for TwoStageConfig {
     }
 }
 
-/// The filter of each track.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FilterConfig {
-    /// Constant-velocity Kalman filter (Joseph form), kept in place in the tracker: the fastest.
-    Kf {},
-}
-
-impl Default for FilterConfig {
-    fn default() -> Self {
-        Self::Kf {}
-    }
-}
-
-/// A filter that can be copied behind its trait: what the tracker holds when the filter is not kept in place.
-pub trait TrackFilter: Filter + Send + Sync {
-    /// Copies the filter.
-    fn boxed_clone(&self) -> Box<dyn TrackFilter>;
-}
-
-impl<F: Filter + Clone + Send + Sync + 'static> TrackFilter for F {
-    fn boxed_clone(&self) -> Box<dyn TrackFilter> {
-        Box::new(self.clone())
-    }
-}
-
 impl TrackerConfig {
     /// Gate threshold on d²: γ = −2 ln(1 − P_G), the χ² quantile with 2 degrees of freedom (no unit).
     pub fn gate(&self) -> f64 {
         -2.0 * (1.0 - self.gate_probability).ln()
     }
 
-    /// Builds the filter of a new track.
-    pub(super) fn belief(&self, start: &Gaussian<4>, height_px: f64) -> super::belief::Belief {
+    /// Builds the filter of a new track of that height.
+    pub(super) fn belief(&self, start: &Gaussian<4>, height_px: f64) -> Result<Belief, FilterError> {
         let std = self.acceleration_std_px_per_s2.hypot(self.acceleration_of_size_per_s2 * height_px);
-        match self.filter {
-            FilterConfig::Kf {} => super::belief::Belief::Cv(super::cv::ConstantVelocity::new(start, std)),
-        }
+        self.filter.start(start, std)
     }
 
     /// Checks all values; `at` names the place in the configuration (`tracker`).
@@ -197,6 +171,7 @@ impl TrackerConfig {
             self.clutter_density_per_px2,
             "3 false detections in 640 x 512 px are 1e-5",
         )?;
+        self.filter.validate(&format!("{at}.filter"))?;
         self.associator.validate(&format!("{at}.associator"))?;
         if let Some(c) = &self.mht {
             c.validate(&format!("{at}.mht"))?;

@@ -93,7 +93,7 @@ impl Tracker {
         let (belief, ratio) = match (first, prior) {
             (Some(first), Some((velocity, variance))) => {
                 let start = from_one_point(&first.position, &first.noise.matrix(), velocity, variance);
-                let mut belief = config.belief(&start, d.extent.height_px);
+                let Ok(mut belief) = config.belief(&start, d.extent.height_px) else { return };
                 if belief.predict(dt_s).is_err() {
                     return;
                 }
@@ -112,14 +112,16 @@ impl Tracker {
             }
             (Some(first), None) => {
                 let start = from_two_points(&first.position, &first.noise.matrix(), &d.position, &n.matrix(), dt_s);
-                (
-                    config.belief(&start, d.extent.height_px),
-                    self.uniform_ratio(dt_s, self.clutter.at(d.position.x, d.position.y)),
-                )
+                let Ok(belief) = config.belief(&start, d.extent.height_px) else { return };
+                (belief, self.uniform_ratio(dt_s, self.clutter.at(d.position.x, d.position.y)))
             }
             (None, prior) => {
                 let (velocity, variance) = prior.unwrap_or_default();
-                (config.belief(&from_one_point(&d.position, &n.matrix(), velocity, variance), d.extent.height_px), 1.0)
+                {
+                    let start = from_one_point(&d.position, &n.matrix(), velocity, variance);
+                    let Ok(belief) = config.belief(&start, d.extent.height_px) else { return };
+                    (belief, 1.0)
+                }
             }
         };
         let n_points = if first.is_some() { 2 } else { 1 };

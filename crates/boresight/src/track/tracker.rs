@@ -132,6 +132,9 @@ impl Tracker {
     fn expire(&mut self, now: Timestamp) {
         let budget_s = self.coast_budget_s();
         let pace_s = self.pace.interval_s();
+        if pace_s <= 0.0 {
+            return; // after one scan nobody can say what a gap is
+        }
         self.tracks.retain(|t| {
             let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
             // The newest scan in which the track can still be seen ends the budget, not the gap itself.

@@ -137,8 +137,8 @@ impl Mht {
                 continue;
             }
             let noise = self.table.noise(j as u32);
-            let belief =
-                c.belief(&from_one_point(&d.position, &noise.matrix(), velocity, variance), d.extent.height_px);
+            let start = &from_one_point(&d.position, &noise.matrix(), velocity, variance);
+            let Ok(belief) = c.belief(start, d.extent.height_px) else { continue };
             let density = self.clutter.at(d.position.x, d.position.y).max(1e-200);
             let mut path = [NONE; WINDOW];
             path[0] = j as u32;

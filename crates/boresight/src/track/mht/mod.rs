@@ -161,6 +161,20 @@ impl Mht {
         self.config.coast_s.max(f64::from(self.config.coast_scans) * self.pace.interval_s())
     }
 
+    /// Cuts histories whose coasting budget ended during a gap before `now`.
+    fn expire(&mut self, now: Timestamp) {
+        let (pace_s, budget_s) = (self.pace.interval_s(), self.coast_budget_s());
+        if pace_s > 0.0 {
+            for tree in &mut self.trees {
+                tree.leaves.retain(|l| {
+                    let silent_s = now.seconds_since(Timestamp::from_ns(l.life.last_hit_ns));
+                    silent_s - pace_s < budget_s - 1e-9
+                });
+            }
+            self.trees.retain(|t| !t.leaves.is_empty());
+        }
+    }
+
     /// Cuts what disagrees with the answer `n_scan` scans back, and targets that were not part of it for as long.
     fn prune(&mut self) {
         let n = self.mht.n_scan as usize;
@@ -231,6 +245,7 @@ impl Tracking for Mht {
         }
         self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_of_size)?;
         if self.last.is_some() {
+            self.expire(scan.time);
             self.pace.note(dt_s);
         }
         self.last = Some(scan.time);

@@ -1,0 +1,207 @@
+//! Joins fragments of one target: the end of a track and the start of another that fits it after a gap.
+//!
+//! Method (ours): the earlier track is predicted over the gap with its own covariance and process noise, the later one is
+//! taken with the covariance of its first estimate; d² of the difference in position and velocity (4 numbers) must pass
+//! the gate. The cost is −ln of the density of that difference, so that sharp fits win over vague ones; all joins of a
+//! track table are chosen together (sparse assignment: each end joins at most one start), then chains are followed.
+//! Limits: constant velocity over the gap. Nothing is filled in between: rows stay as they are, only ids change; the
+//! smoother fills gaps.
+
+use super::config::{not_negative, positive, probability};
+use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, UniformGrid};
+use crate::{Result, Timestamp, TrackId};
+use boresight_filters::Gaussian;
+use nalgebra::{Matrix4, Vector4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How fragments are joined.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct StitchConfig {
+    /// Longest gap, s, above 0.
+    pub max_gap_s: f64,
+    /// Fragments may overlap by this much, s, 0 or more (a track that coasted on while its successor had begun).
+    pub max_overlap_s: f64,
+    /// Standard deviation of the acceleration during the gap, px/s², above 0.
+    pub acceleration_std_px_per_s2: f64,
+    /// Largest speed, px/s, above 0.
+    pub max_speed_px_per_s: f64,
+    /// Probability that true fragments pass the gate, in (0, 1).
+    pub gate_probability: f64,
+}
+
+impl Default for StitchConfig {
+    fn default() -> Self {
+        Self {
+            max_gap_s: 2.0,
+            max_overlap_s: 0.0,
+            acceleration_std_px_per_s2: 28.0,
+            max_speed_px_per_s: 300.0,
+            gate_probability: 0.99,
+        }
+    }
+}
+
+impl StitchConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        positive(at, "max-gap-s", self.max_gap_s, "2 s bridges a lamp post")?;
+        not_negative(at, "max-overlap-s", self.max_overlap_s, "0 if tracks end when their target does")?;
+        positive(at, "acceleration-std-px-per-s2", self.acceleration_std_px_per_s2, "as in the tracker")?;
+        positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "as in the tracker")?;
+        probability(at, "gate-probability", self.gate_probability, "0.99 joins 99 % of true fragments")
+    }
+}
+
+/// A finished track as the stitcher sees it: its two ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fragment {
+    /// The track.
+    pub id: TrackId,
+    /// Time of its first detection.
+    pub begin: Timestamp,
+    /// Estimate there, `[x, vx, y, vy]`.
+    pub first: Gaussian<4>,
+    /// Time of its last detection.
+    pub end: Timestamp,
+    /// Estimate there.
+    pub last: Gaussian<4>,
+}
+
+/// Returns for each fragment the id it gets: the id of the first fragment of its chain.
+/// # Errors
+/// A configuration value outside its range.
+pub fn stitch(fragments: &[Fragment], config: &StitchConfig) -> Result<Vec<TrackId>> {
+    config.validate("stitch")?;
+    // χ² with 4 degrees of freedom: P(d² ≤ g) = 1 − e^(−g/2) (1 + g/2), solved by bisection.
+    let (mut low, mut high) = (0.0, 1e3);
+    for _ in 0..80 {
+        let g = 0.5 * (low + high);
+        if 1.0 - (-0.5 * g).exp() * (1.0 + 0.5 * g) < config.gate_probability { low = g } else { high = g }
+    }
+    let gate = high;
+    let mut grid = UniformGrid::new();
+    grid.build(fragments.iter().map(|f| (finite(f.first.mean[0]), finite(f.first.mean[2]))));
+    let mut gates = Gates::new();
+    gates.reset(fragments.len(), 1.0);
+    // Joins cost what their density says; the worst join that passes the gate costs least than this.
+    let far = config.max_speed_px_per_s * config.max_gap_s;
+    for f in fragments {
+        let mut row = Vec::new();
+        let (x, y) = (finite(f.last.mean[0]), finite(f.last.mean[2]));
+        let mut looked_at = 0;
+        grid.near(x, y, far, far, |p| {
+            looked_at += 1;
+            let next = &fragments[p.index as usize];
+            let gap_s = next.begin.seconds_since(f.end);
+            let in_time = gap_s > -config.max_overlap_s && gap_s <= config.max_gap_s && next.begin > f.begin;
+            let reach = config.max_speed_px_per_s * gap_s.abs()
+                + 3.0 * (f.last.cov[(0, 0)] + next.first.cov[(0, 0)]).abs().sqrt();
+            if in_time
+                && next.id != f.id
+                && (p.x - x).hypot(p.y - y) <= reach
+                && let Some((d2, log_det)) = misfit(f, next, gap_s, config)
+                && d2 <= gate
+            {
+                row.push((p.index, d2 + log_det));
+            }
+            looked_at < super::gating::MOST_LOOKED_AT
+        });
+        row.sort_unstable_by_key(|r| r.0);
+        for (detection, cost) in row {
+            gates.push(Pair { detection, cost, log_likelihood: -0.5 * cost });
+        }
+        gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: 1e6 });
+    }
+    let mut answer = Assignment::new();
+    AssociatorConfig::default().build().associate(&gates, &mut answer);
+    let mut before: Vec<Option<u32>> = vec![None; fragments.len()];
+    for i in 0..fragments.len() {
+        if let [share] = answer.row(i) {
+            before[share.detection as usize] = Some(i as u32);
+        }
+    }
+    Ok((0..fragments.len())
+        .map(|mut i| {
+            // Each join goes back in time, so this ends.
+            while let Some(b) = before[i] {
+                i = b as usize;
+            }
+            fragments[i].id
+        })
+        .collect())
+}
+
+fn finite(v: f64) -> f64 {
+    if v.is_finite() { v } else { 0.0 }
+}
+
+/// d² and ln det S of the end of `a`, moved over the gap, against the start of `b`.
+fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Option<(f64, f64)> {
+    let t = gap_s;
+    let mut phi = Matrix4::identity();
+    phi[(0, 1)] = t;
+    phi[(2, 3)] = t;
+    let q = config.acceleration_std_px_per_s2.powi(2);
+    let t = t.abs();
+    let mut noise = Matrix4::zeros();
+    for k in [0, 2] {
+        noise[(k, k)] = 0.25 * q * t.powi(4);
+        noise[(k, k + 1)] = 0.5 * q * t.powi(3);
+        noise[(k + 1, k)] = 0.5 * q * t.powi(3);
+        noise[(k + 1, k + 1)] = q * t * t;
+    }
+    let s = phi * a.last.cov * phi.transpose() + noise + b.first.cov;
+    let difference: Vector4<f64> = b.first.mean - phi * a.last.mean;
+    let c = s.cholesky()?;
+    let d2 = difference.dot(&c.solve(&difference));
+    let log_det = 2.0 * c.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    (d2.is_finite() && log_det.is_finite()).then_some((d2, log_det))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fragment(id: u64, begin_s: f64, end_s: f64, at: impl Fn(f64) -> [f64; 4]) -> Fragment {
+        let belief = |s: f64| Gaussian { mean: Vector4::from(at(s)), cov: Matrix4::identity() * 0.5 };
+        Fragment {
+            id: TrackId(id),
+            begin: Timestamp::from_secs_f64(begin_s),
+            first: belief(begin_s),
+            end: Timestamp::from_secs_f64(end_s),
+            last: belief(end_s),
+        }
+    }
+
+    #[test]
+    fn two_crossing_targets_interrupted_at_the_crossing_keep_their_own_paths() {
+        let right = |s: f64| [100.0 + 30.0 * s, 30.0, 50.0, 0.0];
+        let left = |s: f64| [200.0 - 30.0 * s, -30.0, 50.0, 0.0];
+        let fragments = [
+            fragment(1, 0.0, 1.3, right),
+            fragment(2, 0.0, 1.3, left),
+            fragment(3, 2.0, 3.0, left),
+            fragment(4, 2.1, 3.0, right),
+            fragment(5, 2.0, 3.0, |_| [500.0, 0.0, 400.0, 0.0]),
+        ];
+        let ids: Vec<u64> = stitch(&fragments, &StitchConfig::default()).unwrap().iter().map(|i| i.0).collect();
+        assert_eq!(ids, [1, 2, 2, 1, 5]);
+    }
+
+    #[test]
+    fn chains_take_the_first_id_and_long_gaps_stay_open() {
+        let still = |_: f64| [10.0, 0.0, 10.0, 0.0];
+        let fragments = [
+            fragment(7, 0.0, 1.0, still),
+            fragment(8, 1.5, 2.0, still),
+            fragment(9, 3.0, 4.0, still),
+            fragment(10, 9.0, 10.0, still),
+        ];
+        let ids: Vec<u64> = stitch(&fragments, &StitchConfig::default()).unwrap().iter().map(|i| i.0).collect();
+        assert_eq!(ids, [7, 7, 7, 10]);
+    }
+}

@@ -1,0 +1,202 @@
+//! Scale: scans per second of the tracker itself from 10 to 100 000 targets, with GOSPA and links, and two threads' equality.
+//!
+//! Scene: that of W4 of the peers' bench (its own random numbers): speeds N(0, 1.5²) px/scan per axis, acceleration 0.1, a
+//! fifth born and a fifth ended on the way, P_D 0.9, noise 1 px, clutter of 10 % or 100 % of N, 100 scans, side 60 √N px.
+
+use anyhow::Result;
+use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
+use boresight::metrics::set::{SetDistance, SetOptions};
+use boresight::track::{self, BirthConfig, ExistenceConfig, LifeConfig, TrackerConfig, TwoPointConfig};
+use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
+use nalgebra::{Matrix2, Vector2};
+use rand::{RngExt, SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha12Rng;
+use rand_distr::{Distribution, Normal, Poisson};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Numbers of targets.
+    #[arg(long, value_delimiter = ',', default_values_t = [10, 100, 1000, 10_000, 100_000])]
+    sizes: Vec<usize>,
+    /// Associator: `gnn` or `jpda`.
+    #[arg(long, default_value = "gnn")]
+    associator: String,
+    /// Times each case is run; the fastest counts.
+    #[arg(long, default_value_t = 3)]
+    repeats: u32,
+}
+
+const FRAMES: usize = 100;
+
+/// One scene: for each scan the truth (target, position) and the detections.
+struct Scene {
+    truth: Vec<Vec<(u32, [f64; 2])>>,
+    scans: Vec<Scan>,
+    clutter_density: f64,
+}
+
+fn scene(n: usize, clutter: f64) -> Result<Scene> {
+    let mut rng = ChaCha12Rng::seed_from_u64(4_000_000 + n as u64 * 10 + (clutter * 10.0) as u64);
+    let side = (60.0 * (n as f64).sqrt()).max(400.0);
+    let (speed, accelerate, measure) = (Normal::new(0.0, 1.5)?, Normal::new(0.0, 0.1)?, Normal::new(0.0, 1.0)?);
+    let mut two = |d: &Normal<f64>, rng: &mut ChaCha12Rng| Vector2::new(d.sample(rng), d.sample(rng));
+    let place = |rng: &mut ChaCha12Rng| Vector2::new(rng.random_range(0.0..side), rng.random_range(0.0..side));
+    let mut targets: Vec<_> = (0..n)
+        .map(|_| {
+            let (p, v) = (place(&mut rng), two(&speed, &mut rng));
+            let born = if rng.random::<f64>() < 0.2 { rng.random_range(0..50) } else { 0 };
+            let ended = if rng.random::<f64>() < 0.2 { rng.random_range(50..FRAMES) } else { FRAMES };
+            (p, v, born, ended)
+        })
+        .collect();
+    let n_clutter = Poisson::new((clutter * n as f64).max(1e-9))?;
+    let (mut truth, mut scans) = (Vec::new(), Vec::new());
+    for k in 0..FRAMES {
+        let (mut now, mut points) = (Vec::new(), Vec::new());
+        for (i, (p, v, born, ended)) in targets.iter_mut().enumerate() {
+            if (*born..*ended).contains(&k) {
+                now.push((i as u32, [p.x, p.y]));
+                if rng.random::<f64>() < 0.9 {
+                    points.push(*p + two(&measure, &mut rng));
+                }
+            }
+            let a = two(&accelerate, &mut rng);
+            *p += *v + 0.5 * a;
+            *v += a;
+        }
+        for _ in 0..n_clutter.sample(&mut rng) as usize {
+            points.push(place(&mut rng));
+        }
+        points.shuffle(&mut rng);
+        let detection = |p: &Vector2<f64>| Detection {
+            position: *p,
+            cov: Matrix2::identity(),
+            extent: Extent { left_px: p.x - 10.0, top_px: p.y - 10.0, width_px: 20.0, height_px: 20.0 },
+            area_px: 400,
+            peak: 1.0,
+            sum: 1.0,
+            score: 1.0,
+            class: None,
+        };
+        truth.push(now);
+        scans.push(Scan {
+            index: FrameIndex(k as u64),
+            time: Timestamp::from_secs_f64(k as f64),
+            detections: points.iter().map(detection).collect(),
+            ..Scan::default()
+        });
+    }
+    Ok(Scene { truth, scans, clutter_density: clutter * n as f64 / (side * side) })
+}
+
+/// The tracker of the bench: existence by odds, two-point starts with a spread of velocities.
+pub fn tracker_config(clutter_density: f64, associator: AssociatorConfig) -> TrackerConfig {
+    TrackerConfig {
+        acceleration_std_px_per_s2: 0.1,
+        extra_noise_px: 0.0,
+        gate_probability: 0.9999,
+        max_speed_px_per_s: 8.0,
+        detection_probability: 0.9,
+        clutter_density_per_px2: clutter_density,
+        associator,
+        birth: BirthConfig::TwoPoint(TwoPointConfig { velocity_std_px_per_s: Some(2.0) }),
+        life: LifeConfig::Existence(ExistenceConfig {
+            birth_density_per_px2: 1e-6,
+            confirm_probability: 0.5,
+            doubt_probability: 0.5,
+            delete_probability: 0.001,
+            mean_life_s: 200.0,
+        }),
+        coast_s: 6.0,
+        coast_scans: 1,
+        sharing: None,
+        ..TrackerConfig::default()
+    }
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    println!("clutter       N      scans/s   exponent   B/track   GOSPA/√n   same id kept");
+    for clutter in [0.1, 1.0] {
+        let mut before: Option<(usize, f64)> = None;
+        for n in &args.sizes {
+            let scene = scene(*n, clutter)?;
+            let associator = match args.associator.as_str() {
+                "jpda" => AssociatorConfig::Jpda(JpdaConfig::default()),
+                _ => AssociatorConfig::default(),
+            };
+            let config = tracker_config(scene.clutter_density, associator);
+            let mut fastest = f64::INFINITY;
+            let mut memory = 0.0;
+            for _ in 0..args.repeats {
+                let rss = resident_bytes();
+                let mut tracker = track::build(&config)?;
+                let begin = Instant::now();
+                for scan in &scene.scans {
+                    tracker.step(scan)?;
+                }
+                fastest = fastest.min(begin.elapsed().as_secs_f64() / FRAMES as f64);
+                memory = (resident_bytes() - rss).max(memory);
+            }
+            let exponent = before.map(|(m, t)| (fastest / t).ln() / (*n as f64 / m as f64).ln());
+            before = Some((*n, fastest));
+            let (gospa, kept) = quality(&scene, &config)?;
+            println!(
+                "{:5.0} % {n:9} {:12.1}   {}   {:7.0}   {gospa:8.3}   {:6.2} %",
+                100.0 * clutter,
+                1.0 / fastest,
+                exponent.map_or("    -  ".to_string(), |e| format!("{e:7.2}")),
+                memory / *n as f64,
+                100.0 * kept
+            );
+        }
+    }
+    Ok(())
+}
+
+/// GOSPA per root target (c 10, p 2, as W4 samples it: ten scans from the fifth) and the share of links kept.
+fn quality(scene: &Scene, config: &TrackerConfig) -> Result<(f64, f64)> {
+    let mut tracker = track::build(config)?;
+    let options = SetOptions { cutoff_px: 10.0, order: 2.0, ..SetOptions::default() };
+    let mut distance = SetDistance::default();
+    let looked_at: Vec<usize> = (0..10).map(|i| 5 + i * (FRAMES - 6) / 9).collect();
+    let (mut gospa, mut n_truth) = (0.0, 0.0);
+    let mut last: std::collections::BTreeMap<u32, Option<u64>> = Default::default();
+    let (mut kept, mut links) = (0u64, 0u64);
+    for (k, scan) in scene.scans.iter().enumerate() {
+        let states = tracker.step(scan)?;
+        let shown: Vec<(u64, [f64; 2])> = states
+            .iter()
+            .filter(|s| s.status != TrackStatus::Tentative)
+            .map(|s| (s.id.0, [s.kinematics.mean[0], s.kinematics.mean[2]]))
+            .collect();
+        let truth: Vec<[f64; 2]> = scene.truth[k].iter().map(|t| t.1).collect();
+        let result: Vec<[f64; 2]> = shown.iter().map(|s| s.1).collect();
+        let g = distance.gospa(&truth, &result, &options);
+        if looked_at.contains(&k) {
+            gospa += g.distance / 10.0;
+            n_truth += truth.len() as f64 / 10.0;
+        }
+        let mut now: std::collections::BTreeMap<u32, Option<u64>> =
+            scene.truth[k].iter().map(|t| (t.0, None)).collect();
+        for (t, s) in distance.matched() {
+            now.insert(scene.truth[k][t as usize].0, Some(shown[s as usize].0));
+        }
+        if k > 5 {
+            for (t, id) in &now {
+                if let Some(before) = last.get(t) {
+                    links += 1;
+                    kept += u64::from(id.is_some() && id == before);
+                }
+            }
+        }
+        last = now;
+    }
+    Ok((gospa / n_truth.max(1.0).sqrt(), kept as f64 / links.max(1) as f64))
+}
+
+fn resident_bytes() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = text.lines().find(|l| l.starts_with("VmRSS"));
+    line.and_then(|l| l.split_whitespace().nth(1)?.parse::<f64>().ok()).unwrap_or(0.0) * 1024.0
+}
