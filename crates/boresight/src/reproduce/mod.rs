@@ -3,6 +3,7 @@
 //! [`ITEMS`] lists what can be reproduced; each item gives sections (a table under one reading, with a sentence that says what
 //! it means) and figures. Runs are spread over all cores and gathered in order: the same seed gives the same numbers.
 
+pub mod bench_scene;
 mod figures;
 pub mod follow;
 pub mod html;
