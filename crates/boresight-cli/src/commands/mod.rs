@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod reproduce;
 pub mod config;
 pub mod detect;
+pub mod fuse;
 pub mod reproduce;
 mod run_options;
 #[allow(dead_code)] // until the command line names it

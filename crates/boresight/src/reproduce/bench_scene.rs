@@ -46,7 +46,7 @@ impl BenchScene {
     pub fn run(&mut self, seed: u64, run: u64) -> Result<(f64, bool)> {
         let seed = Seed::new(seed).of_run(run);
         let mut source = named("montecarlo", seed)?.build(seed)?;
-        let around = Surroundings { background: 0.0, sign: 1.0, variance: 1.0, gain: 0.0 };
+        let around = Surroundings::plain();
         let phi = Matrix4::new(1., 1., 0., 0., 0., 1., 0., 0., 0., 0., 1., 1., 0., 0., 0., 1.);
         let (q, r) = (Matrix4::identity() * 1e-3, Matrix2::identity() * 0.5);
         let h = Matrix2x4::new(1., 0., 0., 0., 0., 0., 1., 0.);

@@ -77,7 +77,7 @@ pub struct Fragment {
 pub fn stitch(fragments: &[Fragment], config: &StitchConfig) -> Result<Vec<TrackId>> {
     config.validate("stitch")?;
     // χ² with 4 degrees of freedom: P(d² ≤ g) = 1 − e^(−g/2) (1 + g/2), solved by bisection.
-    let (mut low, mut high) = (0.0, 1e3);
+    let (mut low, mut high) = (0.0f64, 1e3);
     for _ in 0..80 {
         let g = 0.5 * (low + high);
         if 1.0 - (-0.5 * g).exp() * (1.0 + 0.5 * g) < config.gate_probability { low = g } else { high = g }

@@ -2,6 +2,7 @@
 
 mod background;
 mod colour_real;
+mod fuse;
 mod golden;
 mod images;
 mod metrics;

@@ -11,7 +11,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("vision", &[]),
     ("associate", &[]),
     ("track", &["associate"]),
-    ("fuse", &[]),
+    ("fuse", &["associate"]),
     ("metrics", &["associate"]),
     ("sim", &[]),
     ("io", &[]),
