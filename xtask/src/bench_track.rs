@@ -40,7 +40,7 @@ fn scene(n: usize, clutter: f64) -> Result<Scene> {
     let mut rng = ChaCha12Rng::seed_from_u64(4_000_000 + n as u64 * 10 + (clutter * 10.0) as u64);
     let side = (60.0 * (n as f64).sqrt()).max(400.0);
     let (speed, accelerate, measure) = (Normal::new(0.0, 1.5)?, Normal::new(0.0, 0.1)?, Normal::new(0.0, 1.0)?);
-    let mut two = |d: &Normal<f64>, rng: &mut ChaCha12Rng| Vector2::new(d.sample(rng), d.sample(rng));
+    let two = |d: &Normal<f64>, rng: &mut ChaCha12Rng| Vector2::new(d.sample(rng), d.sample(rng));
     let place = |rng: &mut ChaCha12Rng| Vector2::new(rng.random_range(0.0..side), rng.random_range(0.0..side));
     let mut targets: Vec<_> = (0..n)
         .map(|_| {

@@ -22,6 +22,12 @@ enum Command {
     Track(commands::track::Args),
     /// Detect what stands out in a video or an image sequence.
     Detect(commands::detect::Args),
+    /// Score tracks, detections or centroids against a truth.
+    Evaluate(commands::evaluate::Args),
+    /// Fuse the tracks of two sensors into one table.
+    Fuse(commands::fuse::Args),
+    /// Convert tables of tracks between formats.
+    Convert(commands::convert::Args),
     /// Print, check and explain configurations.
     Config(commands::config::Args),
     /// Reproduce the papers' tables and figures.
@@ -37,6 +43,9 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
         Command::Detect(args) => commands::detect::run(args),
+        Command::Evaluate(args) => commands::evaluate::run(args),
+        Command::Fuse(args) => commands::fuse::run(args),
+        Command::Convert(args) => commands::convert::run(args),
         Command::Config(args) => commands::config::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(args),
         Command::Simulate(args) => commands::simulate::run(args),

@@ -94,8 +94,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let fused = fuse_tables(&a, &b, &config)?;
     let mut out = TracksCsv::create(&args.output)?;
     for (k, (time_s, tracks)) in fused.frames.iter().enumerate() {
-        let scan =
-            Scan { index: FrameIndex(k as u64), time: Timestamp::from_secs_f64(*time_s), detections: Vec::new() };
+        let scan = Scan { index: FrameIndex(k as u64), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
         out.put(&View { frame: None, scan: &scan, tracks })?;
     }
     Box::new(out).finish()?;

@@ -1,18 +1,13 @@
 //! One file a command: its arguments and what it does.
 
 pub mod completions;
-#[allow(dead_code)] // until the command line names it
-pub mod convert;
-#[allow(dead_code)] // until the command line names it
-pub mod evaluate;
-#[allow(dead_code)] // until the command line names it
-pub mod reproduce;
 pub mod config;
+pub mod convert;
 pub mod detect;
+pub mod evaluate;
 pub mod fuse;
 pub mod reproduce;
 mod run_options;
-#[allow(dead_code)] // until the command line names it
 pub mod simulate;
 pub mod track;
 

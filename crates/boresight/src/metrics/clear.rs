@@ -5,7 +5,7 @@
 //! threshold on; pairs that continue the match of the frame before go first (they get a bonus of 1000), then the sum of
 //! similarities decides. A switch is counted against the truth's last match, however long ago. Frames in which one side is
 //! empty leave the memory of the frame before as it is.
-//! The older convention of py-motmetrics and the MATLAB kit is [`super::clear_classic`].
+//! The older convention of py-motmetrics and the MATLAB kit is [`mod@super::clear_classic`].
 //! Symbols: TP, FN, FP pairs, misses, false alarms; IDSW switches; MOTA = (TP − FP − IDSW) / (TP + FN).
 
 use super::assignment::{Matcher, NONE, Pair};

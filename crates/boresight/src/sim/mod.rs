@@ -1,6 +1,6 @@
 //! Simulated scenes: targets, noise, background, sensors, radar; never sees the tracker.
 //!
-//! A [`SceneConfig`] (from TOML or by [`named`] name) builds a [`SceneSource`], which is a [`crate::FrameSource`] and knows the
+//! A [`SceneConfig`] (from TOML or by [`named()`] name) builds a [`SceneSource`], which is a [`crate::FrameSource`] and knows the
 //! truth of the frame it handed out last. Nothing is held but one frame: scenes of any length stream. The same seed gives the
 //! same bits on every machine of the architecture and for any number of threads.
 

@@ -4,7 +4,7 @@
 //! Inside: first-order propagation, Σ σ² (p - c)(p - c)ᵀ / (Σ w)².
 //! Edge: noise and the pixel grid decide which pixels pass the threshold T. With the width δ = σ / slope over which
 //! the edge is undecided (px), a pixel of the edge adds the variance of f = (v - b)[v >= T], per length of edge
-//! δ (J²/√π + Jσ + A₁σ²), and the grid J² Q(δ) per row or column crossed; J = T - b, A₁ = ∫ Var(X⁺) - [u > 0] du = -0.3761 for
+//! δ (J²/√π + Jσ + A₁σ²), and the grid J² Q(δ) per row or column crossed; J = T - b, A₁ = ∫ Var(X⁺) - 1(u > 0) du = -0.3761 for
 //! X ~ N(u, 1), Q(δ) = Σ_k exp(-4π²k²δ²) / (2π²k²) (1/12 for a sharp edge). The edge is taken as a circle stretched like the region, the
 //! slope as that of a Gaussian spot with the region's area and mean height over T (a paraboloid where the ground is unknown).
 //! Sides (`bbox`, `box-centre`): each side of the rectangle has the variance 1/12 + 0.75 δ²; 0.75 is fitted to simulated spots.

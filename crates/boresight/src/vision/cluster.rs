@@ -4,7 +4,7 @@
 //! A row becomes runs. Row offset dy is reached by horizontal distances up to `reach[dy]`, so two runs are linked iff the
 //! gap between them is at most that reach; runs are joined by union-find, their moments added as they come.
 //! Distances are compared as correctly rounded square roots, so d_p = √2 given as the nearest f64 means √2.
-//! Symbols: d_p proximity distance (px); reach[dy] whole px. Cost: one pass over the runs per reached row offset.
+//! Symbols: d_p proximity distance (px); reach\[dy\] whole px. Cost: one pass over the runs per reached row offset.
 //! Regions come out in raster order of their first pixel: the smaller number wins a union, and numbers are given in raster order.
 
 use super::config::ClusterConfig;

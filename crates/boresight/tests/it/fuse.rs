@@ -11,6 +11,7 @@ use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{Gaussian, GaussianFilter, Kf, Measurement, Start};
 use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2, Vector4};
 use rand_distr::{Distribution, StandardNormal};
+use std::slice::from_ref;
 
 /// A turning, accelerating path: a registration can tell its time from its place.
 fn truth(t: f64) -> Vector4<f64> {
@@ -62,7 +63,7 @@ fn rmse(points: impl Iterator<Item = (f64, Vector4<f64>)>) -> f64 {
         sum += d[0] * d[0] + d[2] * d[2];
         n += 1.0;
     }
-    (sum / n as f64).sqrt()
+    (sum / n).sqrt()
 }
 
 #[test]
@@ -76,7 +77,7 @@ fn fusing_two_unbiased_independent_sensors_is_never_worse_than_the_better_one_on
         a += error(&x);
         b += error(&y);
         for (rule, sum) in [(Rule::Independent, &mut independent), (Rule::CovarianceIntersection, &mut intersection)] {
-            let f = fuse_tables(&[x.clone()], &[y.clone()], &FuseConfig { rule, ..FuseConfig::default() }).unwrap();
+            let f = fuse_tables(from_ref(&x), from_ref(&y), &FuseConfig { rule, ..FuseConfig::default() }).unwrap();
             assert_eq!(f.pairs, [(TrackId(1), TrackId(2))]);
             *sum += rmse(f.frames.iter().map(|(t, s)| (*t, s[0].kinematics.mean)));
         }

@@ -1,6 +1,6 @@
 //! Tables of tracks in the formats of the field: MOTChallenge, KITTI, CSV with named columns, Cell Tracking Challenge.
 //!
-//! [`read`] finds the format by the look of the file; [`write`] says what the target cannot hold.
+//! [`read`] finds the format by the look of the file; [`write()`] says what the target cannot hold.
 
 pub mod ctc;
 pub mod kitti;

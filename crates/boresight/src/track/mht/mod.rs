@@ -6,7 +6,7 @@
 //! Method: each target is a tree whose leaves are its possible histories; every scan each leaf grows by a miss and by its
 //! gated detections, and every detection may be a new target. The best set of compatible leaves (no detection used
 //! twice within the window) is the answer; leaves that disagree with it `n_scan` scans back are cut.
-//! Memory is bounded: `max_leaves` a tree and `max_hypotheses` in all; the selection has a budget of steps ([`select`]).
+//! Memory is bounded: `max_leaves` a tree and `max_hypotheses` in all; the selection has a budget of steps (`select`).
 //! Symbols: score = Σ ln(P_D l / λ) over hits + Σ ln(1 − P_D P_G) over misses, from ln(β / λ) at the start.
 //! Limits: `n_scan` ≤ 7.
 

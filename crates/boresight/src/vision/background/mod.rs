@@ -1,7 +1,7 @@
 //! Moving pixels of a fixed camera: a running background with shadows, changing light, ghosts and slight shake.
 //!
 //! [`Background`] keeps mean and deviation of every pixel ([`model`]) and gives one bit a pixel: moving or not. In a frame:
-//! 1. the light of the frame against the model's is estimated on a grid and taken off ([`light`]);
+//! 1. the light of the frame against the model's is estimated on a grid and taken off (`light`);
 //! 2. a pixel moves if it is farther than `threshold-sd` deviations from its mean;
 //! 3. moving pixels that are shadow ([`shadow`]) or, with `shake`, fit a neighbour's background, are background after all;
 //! 4. the model follows: still pixels with `time-constant-s`, moving ones with `standing-time-s`, so that a standing
