@@ -375,7 +375,7 @@ mod tests {
         let mut bare = Vec::new();
         ["input", "detector", "tracker"].iter().for_each(|table| walk(table, 0, &mut bare));
         assert!(bare.is_empty(), "keys without a meaning: {bare:?}");
-        assert!(explain("tracker.gate-probability").unwrap().meaning.contains("probability"));
+        assert!(explain("tracker.gate-probability").unwrap().meaning.contains("χ²"));
         assert!(explain("tracker.filter").unwrap().entries.iter().any(|(name, _)| name == "kf"));
         assert!(explain("tracker.nonsense").unwrap_err().to_string().contains("coast-s"));
     }

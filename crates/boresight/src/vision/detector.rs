@@ -309,6 +309,8 @@ fn detection<T: Pixel>(
     let extra = config.centroid.extra_sd_px * config.centroid.extra_sd_px;
     let noise = (around.variance.max(1e-12) * f64::from(r.area)).sqrt();
     let contrast = around.sign * (r.sum - around.background * f64::from(r.area));
+    // Pixels that are no numbers tell nothing: no score is better than one that compares with none.
+    let score = Some((contrast / noise) as f32).filter(|s| s.is_finite()).unwrap_or(0.0);
     Detection {
         position: c.position,
         cov: c.cov + nalgebra::Matrix2::identity() * extra,
@@ -321,7 +323,7 @@ fn detection<T: Pixel>(
         area_px: r.area,
         peak: if dark { r.min } else { r.max },
         sum: c.sum,
-        score: (contrast / noise) as f32,
+        score,
         class: None,
     }
 }
