@@ -6,6 +6,7 @@
 //! Differs from it: R is kept positive (no axis below `floor` times the given variance), and NIS is clipped at 9 so that
 //! an outlier does not open the filter. R and Q explain the same innovations: learn one at a time unless both are
 //! well excited. Off by default: without [`Adaptive`] around it a filter uses what it is given.
+//! Symbols: ν 2 x 1 (px); H P Hᵀ, R 2 x 2 (px²); s no unit. Cost: about 60 flops an update, and W sums if windowed.
 //! Limits: needs some 30 updates to say anything; PDA updates do not teach, they mix in clutter.
 
 use crate::linalg::invert_pair;
@@ -49,10 +50,9 @@ impl<T: Real> Default for AdaptiveConfig<T> {
     }
 }
 
-/// A filter around a [`Scaled`] model that learns its noise; W is the window of [`Memory::Windowed`].
+/// What the innovations taught so far; W is the window of [`Memory::Windowed`], 0 is enough without one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Adaptive<F, const W: usize, T: Real = f64> {
-    filter: F,
+pub struct NoiseLearner<const W: usize, T: Real = f64> {
     config: AdaptiveConfig<T>,
     samples: [Matrix2<T>; W],
     sum: Matrix2<T>,
@@ -60,11 +60,11 @@ pub struct Adaptive<F, const W: usize, T: Real = f64> {
     scale: T,
 }
 
-impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
-    /// Wraps a filter.
+impl<const W: usize, T: Real> NoiseLearner<W, T> {
+    /// Starts knowing nothing.
     /// # Errors
     /// [`FilterError::OutOfRange`] for a memory of 1 or less, an empty window, or fractions outside 0..=1.
-    pub fn new(filter: F, config: AdaptiveConfig<T>) -> Result<Self, FilterError> {
+    pub fn new(config: AdaptiveConfig<T>) -> Result<Self, FilterError> {
         let unit = |v: T| v >= T::zero() && v <= T::one();
         match config.memory {
             Memory::Recursive(m) if !(m > T::one() && m <= T::MAX) => {
@@ -76,12 +76,7 @@ impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
         if !(unit(config.floor) && unit(config.scale_rate)) {
             return Err(FilterError::OutOfRange("floor and scale rate in 0..=1"));
         }
-        Ok(Self { filter, config, samples: [Matrix2::zeros(); W], sum: Matrix2::zeros(), n: 0, scale: T::one() })
-    }
-
-    /// Returns the filter inside.
-    pub fn inner(&self) -> &F {
-        &self.filter
+        Ok(Self { config, samples: [Matrix2::zeros(); W], sum: Matrix2::zeros(), n: 0, scale: T::one() })
     }
 
     /// Returns the learnt factor on Q (no unit).
@@ -97,7 +92,10 @@ impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
         }
     }
 
-    fn learn(&mut self, predicted: &Gaussian<2, T>, m: &Measurement<T>) -> Result<(), FilterError> {
+    /// Takes the innovation of an update: what was predicted and the measurement as it was used.
+    /// # Errors
+    /// [`FilterError::NotPositiveDefinite`] if the innovation covariance cannot be factored.
+    pub fn learn(&mut self, predicted: &Gaussian<2, T>, m: &Measurement<T>) -> Result<(), FilterError> {
         let nu = m.position - predicted.mean;
         let sample = nu * nu.transpose() - predicted.cov;
         match self.config.memory {
@@ -127,7 +125,7 @@ impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
     }
 
     /// Returns the measurement with the learnt covariance.
-    fn with_learnt_noise(&self, m: &Measurement<T>) -> Measurement<T> {
+    pub fn with_learnt_noise(&self, m: &Measurement<T>) -> Measurement<T> {
         let Some(r) = self.measurement_noise().filter(|_| self.config.measurement_noise) else { return *m };
         let least = |i: usize| m.cov[(i, i)] * self.config.floor;
         let (a, c) = (r[(0, 0)].max(least(0)), r[(1, 1)].max(least(1)));
@@ -135,6 +133,32 @@ impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
         let limit = (a * c).sqrt() * T::of(0.9);
         let b = r[(1, 0)].max(-limit).min(limit);
         Measurement { position: m.position, cov: Matrix2::new(a, b, b, c) }
+    }
+}
+
+/// A filter around a [`Scaled`] model that learns its noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive<F, const W: usize, T: Real = f64> {
+    filter: F,
+    learner: NoiseLearner<W, T>,
+}
+
+impl<F, const W: usize, T: Real> Adaptive<F, W, T> {
+    /// Wraps a filter.
+    /// # Errors
+    /// As [`NoiseLearner::new`].
+    pub fn new(filter: F, config: AdaptiveConfig<T>) -> Result<Self, FilterError> {
+        Ok(Self { filter, learner: NoiseLearner::new(config)? })
+    }
+
+    /// Returns the filter inside.
+    pub fn inner(&self) -> &F {
+        &self.filter
+    }
+
+    /// Returns what was learnt.
+    pub fn learner(&self) -> &NoiseLearner<W, T> {
+        &self.learner
     }
 }
 
@@ -171,11 +195,11 @@ where
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         crate::filter::check_measurement(m)?;
         let predicted = self.filter.predicted();
-        let used = self.with_learnt_noise(m);
+        let used = self.learner.with_learnt_noise(m);
         let mut next = self.clone();
         next.filter.correct(&used)?;
-        next.learn(&predicted, &used)?;
-        next.filter.set_noise_scale(next.scale)?;
+        next.learner.learn(&predicted, &used)?;
+        next.filter.set_noise_scale(next.learner.noise_scale())?;
         *self = next;
         Ok(())
     }
@@ -184,9 +208,10 @@ where
     where
         I: Iterator<Item = Weighted<T>> + Clone,
     {
-        let this = self.clone();
+        let learner = self.learner;
         self.filter.correct_weighted(
-            hypotheses.map(move |h| Weighted { measurement: this.with_learnt_noise(&h.measurement), weight: h.weight }),
+            hypotheses
+                .map(move |h| Weighted { measurement: learner.with_learnt_noise(&h.measurement), weight: h.weight }),
         )
     }
 

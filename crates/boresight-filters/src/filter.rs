@@ -146,7 +146,7 @@ impl<F: GaussianFilter<N>, const N: usize> Filter for Tracked<F, N> {
             [] => Ok(()),
             // Exactly one sure hypothesis is the common case of the fast path.
             [only] if only.weight == 1.0 => self.0.correct(&only.measurement.cast()),
-            several => self.0.correct_weighted(several.iter().map(|w| w.cast())),
+            several => self.0.correct_weighted(several.iter().map(cast_weighted)),
         }
     }
 
@@ -158,6 +158,11 @@ impl<F: GaussianFilter<N>, const N: usize> Filter for Tracked<F, N> {
     fn log_likelihood(&self, measurement: &Measurement) -> Result<f64, FilterError> {
         self.0.log_likelihood(&measurement.cast()).map(Real::as_f64)
     }
+}
+
+/// A function, not a closure: what is generic over the iterator is then compiled once for all filters.
+fn cast_weighted<T: Real>(w: &Weighted) -> Weighted<T> {
+    w.cast()
 }
 
 /// Returns the marginal of a belief at the two position states.

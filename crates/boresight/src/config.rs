@@ -205,7 +205,8 @@ impl Config {
 }
 
 /// Keys whose table holds exactly one entry, the chosen variant of an enum: setting a variant replaces the old one.
-const CHOICES: [&str; 6] = ["threshold", "associator", "life", "birth", "filter", "noise"];
+const CHOICES: [&str; 9] =
+    ["threshold", "associator", "life", "birth", "filter", "noise", "model", "innovation", "rule"];
 
 fn set(tree: &mut toml::Value, key: &str, value: toml::Value) -> Option<()> {
     let parts: Vec<&str> = key.split('.').collect();

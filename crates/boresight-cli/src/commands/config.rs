@@ -12,7 +12,8 @@ use std::process::ExitCode;
   boresight config --check my.toml                     exit code 0 if it is sound
   boresight config --explain tracker.gate-probability  what a key means
   boresight config --explain tracker                   what a table holds
-  boresight config --list filters                      the filters, a sentence each
+  boresight config --list filters                      the filters: what each is, when to take it, its source
+  boresight config --list models                       the motion models that a filter can be given
   boresight config --schema                            a JSON schema for editors")]
 pub struct Args {
     /// Check a file and say what is wrong with it.
@@ -21,7 +22,7 @@ pub struct Args {
     /// Explain a key or a table: `tracker.coast-s`, `detector.threshold`.
     #[arg(long, value_name = "KEY")]
     explain: Option<String>,
-    /// List what can be chosen: filters, thresholds, associators, lives, births.
+    /// List what can be chosen: filters, models, innovations, thresholds, associators, lives, births.
     #[arg(long, value_name = "WHAT")]
     list: Option<String>,
     /// Print a JSON schema of the configuration.
@@ -50,14 +51,19 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn list(what: &str) -> anyhow::Result<String> {
     let key = match what {
         "filters" => "tracker.filter",
+        "models" => "tracker.filter.kf.model",
+        "innovations" => "tracker.filter.kf.innovation",
         "thresholds" => "detector.threshold",
         "associators" => "tracker.associator",
         "lives" => "tracker.life",
         "births" => "tracker.birth",
         _ => {
-            return Err(Error::new(ErrorKind::Config, "expected filters, thresholds, associators, lives or births")
-                .at(format!("--list {what}"))
-                .into());
+            return Err(Error::new(
+                ErrorKind::Config,
+                "expected filters, models, innovations, thresholds, associators, lives or births",
+            )
+            .at(format!("--list {what}"))
+            .into());
         }
     };
     explain(key)

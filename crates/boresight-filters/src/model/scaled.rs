@@ -1,6 +1,6 @@
 //! A model whose process noise is multiplied by a factor that can change from step to step (for adaptive noise).
 
-use super::{Model, NoiseVisitor, check_strength};
+use super::{Dense, Model, NoiseVisitor, check_strength};
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 
@@ -57,6 +57,28 @@ impl<const N: usize, T: Real, M: Model<N, T>> Model<N, T> for Scaled<M, T> {
     }
     fn moved(&self, dt_s: T, x: &SVector<T, N>) -> SVector<T, N> {
         self.model.moved(dt_s, x)
+    }
+    // At factor 1 the model's own shortcuts are taken; at another its noise cannot be told apart inside them.
+    fn propagate(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        if self.scale == T::one() {
+            self.model.propagate(dt_s, x, p)
+        } else {
+            Dense(self.clone()).propagate(dt_s, x, p)
+        }
+    }
+    fn propagate_apart(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        if self.scale == T::one() { self.model.propagate_apart(dt_s, x, p) } else { self.propagate(dt_s, x, p) }
+    }
+    fn transition_times(&self, dt_s: T, at: &SVector<T, N>, a: &SMatrix<T, N, N>) -> SMatrix<T, N, N> {
+        self.model.transition_times(dt_s, at, a)
+    }
+    fn times_inverse_transition(
+        &self,
+        dt_s: T,
+        at: &SVector<T, N>,
+        a: &SMatrix<T, N, N>,
+    ) -> Result<SMatrix<T, N, N>, FilterError> {
+        self.model.times_inverse_transition(dt_s, at, a)
     }
     fn with_noise_factor<V: NoiseVisitor<N, T>>(&self, dt_s: T, visitor: V) -> Result<V::Out, FilterError> {
         self.model.with_noise_factor(dt_s, ScaledVisitor(visitor, self.scale))

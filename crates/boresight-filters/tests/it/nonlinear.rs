@@ -180,10 +180,10 @@ fn adaptive_noise_finds_the_true_variances_and_scale() {
             learns_q.predict(0.5).unwrap();
             learns_q.correct(&Measurement::isotropic(x, y, 0.5)).unwrap();
             if k >= 1000 {
-                ln_scale += learns_q.noise_scale().ln() / 2000.0;
+                ln_scale += learns_q.learner().noise_scale().ln() / 2000.0;
             }
         }
-        let r = learns_r.measurement_noise().unwrap();
+        let r = learns_r.learner().measurement_noise().unwrap();
         assert!((0.12..0.5).contains(&r[(0, 0)]) && (0.12..0.5).contains(&r[(1, 1)]), "R {r}, truth 0.25");
         let scale = ln_scale.exp();
         assert!((5.0..20.0).contains(&scale), "scale {scale}, truth 10");

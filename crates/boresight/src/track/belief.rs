@@ -26,7 +26,11 @@ impl Filter for Belief {
     fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
         match self {
             Self::Cv(f) => f.predict(dt_s),
-            Self::Boxed(f) => f.predict(dt_s),
+            // A filter that has diverged (LMS as printed) refuses the step and stays as it is: its own track is lost and
+            // ends by its life's rule, the others go on.
+            Self::Boxed(f) => {
+                f.predict(dt_s).or_else(|e| if dt_s >= 0.0 && dt_s.is_finite() { Ok(()) } else { Err(e) })
+            }
         }
     }
 
