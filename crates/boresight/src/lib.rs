@@ -34,3 +34,10 @@ pub use record::{TrackId, TrackState, TrackStatus};
 pub use time::{FrameIndex, Timestamp};
 pub use tracks::{PixelOrigin, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
+
+/// The README's and the chapters' examples are compiled and run with the tests.
+#[cfg(doctest)]
+mod chapters {
+    #[doc = include_str!("../../../README.md")]
+    mod readme {}
+}

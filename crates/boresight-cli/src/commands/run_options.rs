@@ -1,7 +1,7 @@
 //! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
 
 use anyhow::Context;
-use boresight::auto::{self, Replay};
+use boresight::auto::{self, PROBE_FRAMES, Replay};
 use boresight::pipeline::{Input, Summary};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
@@ -9,9 +9,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Frames looked at by the automatic choice.
-const PROBE_FRAMES: usize = 48;
 
 /// Where frames come from and how they are treated.
 #[derive(Debug, clap::Args)]

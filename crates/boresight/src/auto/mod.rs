@@ -4,10 +4,12 @@
 //! the same configuration given back gives the identical result.
 
 mod detections;
+mod open;
 mod replay;
 mod spots;
 
 pub use detections::for_detections;
+pub use open::{Opened, PROBE_FRAMES, open};
 pub use replay::Replay;
 
 use crate::{Config, Frame, Result, SourceInfo};

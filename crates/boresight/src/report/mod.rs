@@ -26,7 +26,7 @@ pub struct Notes {
     pub input: String,
     /// Further lines of the summary: name and value.
     pub facts: Vec<(String, String)>,
-    /// The settings chosen, each with its reason, one line each.
+    /// The settings chosen, each with its reason, one line each; what follows an empty line is the configuration in full.
     pub settings: Vec<String>,
     /// Warnings, each a whole sentence.
     pub warnings: Vec<String>,

@@ -123,12 +123,22 @@ fn settings(out: &mut String, notes: &Notes) {
     if notes.settings.is_empty() {
         return;
     }
-    out.push_str("<section><h2>Settings and why</h2><pre>");
-    for line in &notes.settings {
-        out.push_str(&escape(line));
-        out.push('\n');
+    // Reasons come first; what follows an empty line is the configuration in full, long and seldom read.
+    let mut parts = notes.settings.splitn(2, String::is_empty);
+    out.push_str("<section><h2>Settings and why</h2><ul>");
+    for reason in parts.next().unwrap_or_default() {
+        let _ = write!(out, "<li>{}</li>", escape(reason));
     }
-    out.push_str("</pre></section>");
+    out.push_str("</ul>");
+    if let Some(config) = parts.next() {
+        out.push_str("<details><summary>The whole configuration</summary><pre>");
+        for line in config {
+            out.push_str(&escape(line));
+            out.push('\n');
+        }
+        out.push_str("</pre></details>");
+    }
+    out.push_str("</section>");
 }
 
 fn short(v: f64, digits: i32) -> String {

@@ -100,3 +100,19 @@ fn the_arrow_test_sees_a_forbidden_arrow() {
     assert_eq!(rooms_used("use crate::{Image, track::{A, B}};", &rooms), ["track"]);
     assert!(rooms_used("use crate::Image;\n#[cfg(test)]\nmod tests { use crate::track::X; }", &rooms).is_empty());
 }
+
+/// The table of arrows in ARCHITECTURE.md is the one of this file.
+#[test]
+fn the_architecture_chapter_draws_the_same_arrows() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let text = std::fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
+    let names = |cell: &str| -> Vec<String> {
+        cell.split('`').skip(1).step_by(2).map(ToString::to_string).collect() // what stands between back quotes
+    };
+    for (room, allowed) in ARROWS {
+        let start = format!("| `{room}` |");
+        let row = text.lines().find(|l| l.starts_with(&start)).unwrap_or_else(|| panic!("no row for {room}"));
+        let cells: Vec<&str> = row.split('|').collect();
+        assert_eq!(names(cells[2]), allowed, "arrows of {room} in ARCHITECTURE.md");
+    }
+}

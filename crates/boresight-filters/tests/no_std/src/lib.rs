@@ -4,6 +4,10 @@
 //! build would fail; there is no allocator, so a heap would not link either.
 #![no_std]
 
+/// The proof that this check can fail: with `--cfg with_std` it must not build.
+#[cfg(with_std)]
+extern crate std;
+
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{GaussianFilter, Measurement, Start, Ud};
 
