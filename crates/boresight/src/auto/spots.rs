@@ -118,6 +118,7 @@ pub fn configure(
     }
     tracker.proof.sure_score = 11.0;
     tracker.proof.sure_travel_px = 1.2;
+    tracker.proof.camera_share = 0.05;
     tracker.proof.travel_px = 2.5;
     reasons.push(format!(
         "A track starts from a score of {} or more and is reported once it has moved {} px against the background ({} px if its mean score \

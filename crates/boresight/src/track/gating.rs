@@ -6,6 +6,7 @@
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
 //! in one pixel cost bounded time and memory.
 
+use super::proof::CameraWay;
 use crate::associate::{Gates, Pair, UniformGrid};
 use crate::{Detection, Error, ErrorKind, Result, Scan};
 use nalgebra::{Matrix2, Vector2};
@@ -58,6 +59,8 @@ pub struct ScanTable {
     max_yy: f64,
     /// Half of the widest and of the tallest box, px.
     pub largest_half_px: [f64; 2],
+    /// What the camera did over all scans so far.
+    pub camera: CameraWay,
     grid: UniformGrid,
 }
 
@@ -97,6 +100,7 @@ impl ScanTable {
             }
             self.noise.push(n);
         }
+        self.camera.step(scan.camera_shift_px);
         Ok(())
     }
 

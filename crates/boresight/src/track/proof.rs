@@ -10,6 +10,7 @@
 
 use super::config::not_negative;
 use crate::Result;
+use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,9 @@ pub struct ProofConfig {
     pub sure_score: f64,
     /// Distance from its start that proves a sure track, px, 0 or more, at most `travel-px`.
     pub sure_travel_px: f64,
+    /// What the camera's way since a track's start adds to the distances asked for, times that way, 0 or more: where the camera
+    /// turns, its motion is known less exactly, and near things pass far ones.
+    pub camera_share: f64,
     /// Distance from its start that proves any other track, px, 0 or more; 0 asks for no proof.
     pub travel_px: f64,
 }
@@ -35,6 +39,7 @@ impl ProofConfig {
         not_negative(at, "start-score", self.start_score, "0 lets every detection start a track")?;
         not_negative(at, "sure-score", self.sure_score, "0 proves every track at once")?;
         not_negative(at, "sure-travel-px", self.sure_travel_px, "0 proves sure tracks at once")?;
+        not_negative(at, "camera-share", self.camera_share, "0.05 allows for the error of the camera's motion")?;
         not_negative(at, "travel-px", self.travel_px, "0 asks for no proof")
     }
 
@@ -45,19 +50,49 @@ impl ProofConfig {
     }
 }
 
+/// What the camera did so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraWay {
+    /// Length of its way, px.
+    pub way_px: f64,
+    /// Times that a background which was followed for some scans was lost: another view, or a jerk.
+    pub cuts: u32,
+    known: u32,
+}
+
+impl CameraWay {
+    /// Scans that a background must have been followed before its loss is a cut.
+    const FOLLOWED: u32 = 10;
+
+    /// Takes the next scan's shift in.
+    pub fn step(&mut self, shift_px: Option<Vector2<f64>>) {
+        match shift_px.map(|s| s.norm()).filter(|way| way.is_finite()) {
+            Some(way) => {
+                self.way_px += way;
+                self.known = self.known.saturating_add(1);
+            }
+            None => {
+                self.cuts = self.cuts.saturating_add(u32::from(self.known >= Self::FOLLOWED));
+                self.known = 0;
+            }
+        }
+    }
+}
+
 /// What a track has shown so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Proof {
     start: [f64; 2],
+    camera: CameraWay,
     score_sum: f64,
     hits: u32,
     proven: bool,
 }
 
 impl Proof {
-    /// Begins at a position (px) with the first detection's score.
-    pub fn begin(position: [f64; 2], score: f32) -> Self {
-        Self { start: position, score_sum: f64::from(score), hits: 1, proven: false }
+    /// Begins at a position (px) with the first detection's score; `camera` is what the camera did before.
+    pub fn begin(position: [f64; 2], camera: CameraWay, score: f32) -> Self {
+        Self { start: position, camera, score_sum: f64::from(score), hits: 1, proven: false }
     }
 
     /// Takes the score of a detection of the track in.
@@ -67,13 +102,19 @@ impl Proof {
         self.hits = self.hits.saturating_add(1);
     }
 
-    /// Whether the track is proven; `position` is the estimate (px) after a scan with (`hit`) or without a detection.
+    /// Whether the track is proven; `position` is the estimate (px) after a scan with (`hit`) or without a detection,
+    /// `camera` what the camera did by then.
     #[inline]
-    pub fn holds(&mut self, config: &ProofConfig, position: [f64; 2], hit: bool) -> bool {
+    pub fn holds(&mut self, config: &ProofConfig, position: [f64; 2], camera: CameraWay, hit: bool) -> bool {
+        if hit && self.camera.cuts != camera.cuts {
+            // What is seen now may be another thing at another place.
+            (self.start, self.camera) = (position, camera);
+        }
         if !self.proven && (hit || config.travel_px <= 0.0) {
             let travel = (position[0] - self.start[0]).hypot(position[1] - self.start[1]);
             let sure = self.score_sum >= config.sure_score * f64::from(self.hits);
-            self.proven = travel >= config.travel_px || (sure && travel >= config.sure_travel_px);
+            let least = if sure { config.sure_travel_px.min(config.travel_px) } else { config.travel_px };
+            self.proven = travel >= least + config.camera_share * (camera.way_px - self.camera.way_px);
         }
         self.proven
     }
@@ -83,25 +124,48 @@ impl Proof {
 mod tests {
     use super::*;
 
+    fn way(way_px: f64) -> CameraWay {
+        CameraWay { way_px, ..CameraWay::default() }
+    }
+
+    #[test]
+    fn a_cut_asks_for_the_proof_anew() {
+        let config = ProofConfig { sure_score: 9.0, sure_travel_px: 0.5, travel_px: 3.0, ..ProofConfig::default() };
+        let mut camera = CameraWay::default();
+        let mut lamp = Proof::begin([10.0, 10.0], camera, 20.0);
+        (0..12).for_each(|_| camera.step(Some(Vector2::zeros())));
+        assert!(!lamp.holds(&config, [10.1, 10.0], camera, true));
+        camera.step(None);
+        assert!(!lamp.holds(&config, [40.0, 10.0], camera, true), "another lamp in another view");
+        assert!(lamp.holds(&config, [40.9, 10.0], camera, true));
+    }
+
     #[test]
     fn a_clear_target_is_proven_by_a_small_step_and_a_dim_one_by_a_longer_way() {
-        let config = ProofConfig { start_score: 5.0, sure_score: 9.0, sure_travel_px: 0.5, travel_px: 3.0 };
-        let mut clear = Proof::begin([10.0, 10.0], 12.0);
+        let config =
+            ProofConfig { start_score: 5.0, sure_score: 9.0, sure_travel_px: 0.5, camera_share: 0.1, travel_px: 3.0 };
+        let mut clear = Proof::begin([10.0, 10.0], way(7.0), 12.0);
         clear.seen(11.0);
-        assert!(!clear.holds(&config, [10.0, 10.0], true), "a lamp is clear, but stands still");
-        assert!(clear.holds(&config, [10.6, 10.0], true));
-        let mut dim = Proof::begin([10.0, 10.0], 6.0);
+        assert!(!clear.holds(&config, [10.0, 10.0], way(7.0), true), "a lamp is clear, but stands still");
+        assert!(clear.holds(&config, [10.6, 10.0], way(7.0), true));
+        let mut dim = Proof::begin([10.0, 10.0], way(7.0), 6.0);
         dim.seen(6.0);
-        assert!(!dim.holds(&config, [11.0, 10.0], true));
-        assert!(!dim.holds(&config, [13.5, 10.0], false), "a prediction proves nothing");
-        assert!(dim.holds(&config, [13.5, 10.0], true));
-        assert!(dim.holds(&config, [10.0, 10.0], true), "a proof is kept");
+        assert!(!dim.holds(&config, [11.0, 10.0], way(7.0), true));
+        assert!(!dim.holds(&config, [13.5, 10.0], way(7.0), false), "a prediction proves nothing");
+        assert!(dim.holds(&config, [13.5, 10.0], way(7.0), true));
+        assert!(dim.holds(&config, [10.0, 10.0], way(7.0), true), "a proof is kept");
+        let mut turned = Proof::begin([10.0, 10.0], way(7.0), 12.0);
+        assert!(
+            !turned.holds(&config, [10.6, 10.0], way(27.0), true),
+            "the camera turned by 20 px: its motion may be 2 px wrong"
+        );
+        assert!(turned.holds(&config, [12.6, 10.0], way(27.0), true));
         assert!(config.may_start(5.0) && !config.may_start(4.9));
     }
 
     #[test]
     fn without_demands_every_track_is_proven() {
         let config = ProofConfig::default();
-        assert!(Proof::begin([0.0, 0.0], 0.0).holds(&config, [0.0, 0.0], false));
+        assert!(Proof::begin([0.0, 0.0], way(0.0), 0.0).holds(&config, [0.0, 0.0], way(5.0), false));
     }
 }

@@ -39,6 +39,7 @@ impl Tracking for Stabilised {
         let camera = self.camera + shift;
         self.steady.index = scan.index;
         self.steady.time = scan.time;
+        self.steady.camera_shift_px = scan.camera_shift_px;
         self.steady.detections.clone_from(&scan.detections);
         for d in &mut self.steady.detections {
             d.position -= camera;

@@ -132,10 +132,10 @@ impl Tracker {
             look: Look::of(d),
             twin_since_ns: None,
             anchor: [d.position.x, d.position.y, n.xx.max(n.yy).sqrt()],
-            proof: Proof::begin([d.position.x, d.position.y], d.score),
+            proof: Proof::begin([d.position.x, d.position.y], self.table.camera, d.score),
         };
         let outcome = Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() };
-        self.states.push(track.state(&outcome, config));
+        self.states.push(track.state(&outcome, config, self.table.camera));
         self.tracks.push(track);
         self.next_id += 1;
     }

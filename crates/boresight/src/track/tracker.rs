@@ -16,7 +16,7 @@ use super::correct::{Scratch, shared};
 use super::gating::{Noise, Predicted, ScanTable};
 use super::life::{Evidence, Life, Verdict};
 use super::pace::Pace;
-use super::proof::Proof;
+use super::proof::{CameraWay, Proof};
 use super::sharing::Sharing;
 use super::stage::Stage;
 use super::starts::LeftOver;
@@ -302,7 +302,7 @@ impl Tracker {
                 verdict = Verdict::Delete;
             }
             if verdict == Verdict::Keep {
-                self.states.push(t.state(&outcome, &self.config));
+                self.states.push(t.state(&outcome, &self.config, self.table.camera));
                 if kept != i {
                     self.tracks.swap(kept, i);
                 }
@@ -335,9 +335,9 @@ impl Track {
 
     /// What is said of the track after a scan.
     #[inline]
-    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig) -> TrackState {
+    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
         let kinematics = self.belief.kinematics();
-        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], outcome.hit);
+        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], camera, outcome.hit);
         let [width_px, height_px] = self.look.size;
         TrackState {
             id: TrackId(self.id),

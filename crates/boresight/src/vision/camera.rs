@@ -3,7 +3,8 @@
 //! Source: our own; block matching against a key frame with a consensus, as every video stabiliser does it in some form.
 //! How: the frame is reduced to about 320 px. In the key frame the best-textured 12 x 12 patch of every cell of an 8 x 6 grid is
 //! kept. In each new frame every patch is looked for near where the consensus was (sum of absolute differences, sub-pixel by a
-//! parabola); the shift that most patches agree on within 1 px is the background's, targets and trees in the wind are outvoted.
+//! parabola) and votes with its texture above the noise; the shift that has most of the weight is the background's, targets
+//! and trees in the wind are outvoted.
 //! Against a key frame errors do not add up; a shift within 0.2 px of the last one is the last one, so a fixed camera is exactly fixed.
 //! Symbols: reduction f; shift (px of the full frame).
 //! Limits: translation only, at most 10 reduced px a frame; less than 6 textured patches, or no majority, says nothing (`None`).
@@ -17,8 +18,12 @@ const SEARCH: i64 = 10;
 const CELLS: (usize, usize) = (8, 6);
 const MIN_PATCHES: usize = 6;
 const REDUCED_PX: usize = 320;
-/// A patch needs this many times the texture of the image's quiet quarter.
-const QUIET_TIMES: f32 = 5.0;
+/// Texture below this many times that of the image's quiet quarter has no vote.
+const QUIET_TIMES: f32 = 2.0;
+/// Votes within this distance agree, reduced px.
+const AGREE: f64 = 0.7;
+/// Share of all weight that the winner needs.
+const MAJORITY: f64 = 0.4;
 /// Shifts nearer than this to the last one are the last one, reduced px.
 const STILL: f64 = 0.2;
 
@@ -26,6 +31,15 @@ const STILL: f64 = 0.2;
 struct Patch {
     x: usize,
     y: usize,
+    /// Weight of its vote: the texture above the noise, capped.
+    weight: f64,
+}
+
+/// Where one patch was found, relative to the key frame, reduced px.
+#[derive(Clone, Copy, Debug)]
+struct Vote {
+    shift: Vector2<f64>,
+    weight: f64,
 }
 
 /// Follows the background from frame to frame.
@@ -37,7 +51,7 @@ pub struct CameraMotion {
     /// Shift of the key frame since the first frame, and of the last frame since the key frame, reduced px.
     key_at: Vector2<f64>,
     from_key: Vector2<f64>,
-    shifts: Vec<Vector2<f64>>,
+    votes: Vec<Vote>,
     textures: Vec<f32>,
 }
 
@@ -82,12 +96,12 @@ impl CameraMotion {
             return;
         }
         self.textures.clear();
-        let mut best: Vec<(f32, Patch)> = Vec::with_capacity(CELLS.0 * CELLS.1);
+        let mut best: Vec<(f32, usize, usize)> = Vec::with_capacity(CELLS.0 * CELLS.1);
         for cy in 0..CELLS.1 {
             for cx in 0..CELLS.0 {
                 let (x0, x1) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
                 let (y0, y1) = (h * cy / CELLS.1, h * (cy + 1) / CELLS.1);
-                let mut top: Option<(f32, Patch)> = None;
+                let mut top: Option<(f32, usize, usize)> = None;
                 for y in (y0..y1).step_by(4) {
                     for x in (x0..x1).step_by(4) {
                         if x + PATCH + 1 >= w || y + PATCH + 1 >= h {
@@ -97,7 +111,7 @@ impl CameraMotion {
                         if texture.is_finite() {
                             self.textures.push(texture);
                             if top.as_ref().is_none_or(|t| texture > t.0) {
-                                top = Some((texture, Patch { x, y }));
+                                top = Some((texture, x, y));
                             }
                         }
                     }
@@ -109,36 +123,41 @@ impl CameraMotion {
             return;
         }
         self.textures.sort_unstable_by(f32::total_cmp);
-        let at = |share: usize| self.textures[(self.textures.len() - 1) * share / 100];
-        // Before a sky the quiet quarter is noise, whose fixed pattern stands still whatever the camera does: it must not vote. Where
-        // all is ground there is no quiet quarter, and a third of the strong texture is enough.
-        let least = (QUIET_TIMES * at(25)).min(at(90) / 3.0);
-        self.patches.extend(best.iter().filter(|(t, _)| *t > least).map(|b| b.1));
+        // Before a sky the quiet quarter is noise, whose fixed pattern stands still whatever the camera does, and the most textured
+        // of many patches of noise has a little more of it: only what is above has a vote, and the more the stronger.
+        let quiet = QUIET_TIMES * self.textures[(self.textures.len() - 1) / 4];
+        best.retain(|b| b.0 > quiet);
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // A few outstanding things may be targets: they count no more than the next. The square holds down the many weak ones, which
+        // in a compressed video are often mere copies of the frame before.
+        let Some(cap) = best.get(MIN_PATCHES - 1).map(|b| b.0 - quiet) else { return };
+        self.patches.extend(best.iter().map(|&(t, x, y)| Patch {
+            x,
+            y,
+            weight: f64::from((t - quiet).min(cap) / cap).powi(2),
+        }));
     }
 
-    /// The shift from the key frame that most patches agree on, reduced px.
+    /// The shift from the key frame that has most of the weight, reduced px.
     fn consensus(&mut self) -> Option<Vector2<f64>> {
         let around = (self.from_key.x.round() as i64, self.from_key.y.round() as i64);
-        self.shifts.clear();
+        self.votes.clear();
         for p in &self.patches {
-            self.shifts.extend(find(&self.key, &self.now, *p, around));
+            let found = find(&self.key, &self.now, *p, around);
+            self.votes.extend(found.map(|shift| Vote { shift, weight: p.weight }));
         }
-        let n = self.shifts.len();
-        if n < MIN_PATCHES {
-            return None;
-        }
-        let near = |a: &Vector2<f64>, b: &Vector2<f64>| (a - b).norm() <= 1.0;
-        let votes = |s: &Vector2<f64>| self.shifts.iter().filter(|o| near(s, o)).count();
-        let (winner, count) = self
-            .shifts
+        let near = |s: Vector2<f64>| self.votes.iter().filter(move |v| (v.shift - s).norm() <= AGREE);
+        let weight = |s: Vector2<f64>| near(s).map(|v| v.weight).sum::<f64>();
+        let (winner, won) = self
+            .votes
             .iter()
-            .map(|s| (s, votes(s)))
-            .fold((&self.shifts[0], 0), |best, one| if one.1 > best.1 { one } else { best });
-        if count < MIN_PATCHES || 2 * count <= n {
+            .map(|v| (v.shift, weight(v.shift)))
+            .fold((Vector2::zeros(), 0.0), |best, one| if one.1 > best.1 { one } else { best });
+        let all: f64 = self.votes.iter().map(|v| v.weight).sum();
+        if near(winner).count() < MIN_PATCHES || won <= MAJORITY * all {
             return None;
         }
-        let sum: Vector2<f64> = self.shifts.iter().filter(|s| near(winner, s)).sum();
-        Some(sum / count as f64)
+        Some(near(winner).map(|v| v.shift * v.weight).sum::<Vector2<f64>>() / won)
     }
 }
 
