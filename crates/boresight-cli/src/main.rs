@@ -26,6 +26,8 @@ enum Command {
     Evaluate(commands::evaluate::Args),
     /// Fuse the tracks of two sensors into one table.
     Fuse(commands::fuse::Args),
+    /// Smooth a table of tracks: each row given all the others.
+    Smooth(commands::smooth::Args),
     /// Convert tables of tracks between formats.
     Convert(commands::convert::Args),
     /// Print, check and explain configurations.
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
         Command::Detect(args) => commands::detect::run(args),
         Command::Evaluate(args) => commands::evaluate::run(args),
         Command::Fuse(args) => commands::fuse::run(args),
+        Command::Smooth(args) => commands::smooth::run(args),
         Command::Convert(args) => commands::convert::run(args),
         Command::Config(args) => commands::config::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(args),

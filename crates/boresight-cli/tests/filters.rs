@@ -1,4 +1,4 @@
-//! Every filter by name through the command: listed, explained, run over the sample clip, its errors in words.
+//! Every filter by name through the command: listed, explained, run over the sample clip; smoothing; errors in words.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -130,6 +130,63 @@ fn a_filter_that_diverges_costs_its_track_not_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let input = detections(dir.path());
     tracks(&input, dir.path(), &["--set", "tracker.filter.lms.rule.as-printed.step-factor=1"]);
+}
+
+/// Frames, distance of each row from the target, and deviation of each row, of the longest track.
+fn longest(table: &str, truth: &BTreeMap<u64, [f64; 2]>) -> Vec<(u64, f64, f64)> {
+    let mut tracks: BTreeMap<u64, Vec<(u64, f64, f64)>> = BTreeMap::new();
+    for row in table.lines().skip(1) {
+        let c: Vec<&str> = row.split(',').collect();
+        let number = |at: usize| c[at].parse::<f64>().unwrap();
+        let frame: u64 = c[0].parse().unwrap();
+        let off = truth.get(&frame).map_or(f64::NAN, |t| (number(4) - t[0]).hypot(number(5) - t[1]));
+        tracks.entry(c[2].parse().unwrap()).or_default().push((frame, off, number(8).sqrt()));
+    }
+    tracks.into_values().max_by_key(Vec::len).unwrap()
+}
+
+#[test]
+fn smoothing_sharpens_tracks_fills_gaps_and_takes_tables_from_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let truth = truth();
+    let input = detections(dir.path());
+    let run = Path::new(&input).parent().unwrap();
+    let filtered = std::fs::read_to_string(run.join("tracks.csv")).unwrap();
+    let smooth = |input: &Path, more: &[&str]| {
+        let out = dir.path().join("smoothed.csv");
+        let mut args = vec!["smooth", input.to_str().unwrap(), "-o", out.to_str().unwrap()];
+        args.extend(more);
+        let done = boresight(&args);
+        assert!(done.status.success(), "{more:?}: {}", text(&done.stderr));
+        (std::fs::read_to_string(&out).unwrap(), text(&done.stderr))
+    };
+    let (table, said) = smooth(&run.join("tracks.csv"), &[]);
+    assert!(said.contains("config.toml") && said.contains("median deviation"), "{said}");
+    assert_eq!(table.lines().count(), filtered.lines().count());
+    let (before, after) = (longest(&filtered, &truth), longest(&table, &truth));
+    assert_eq!(before.iter().map(|r| r.0).collect::<Vec<_>>(), after.iter().map(|r| r.0).collect::<Vec<_>>());
+    // The newest row has nothing to gain; every other knows more than before.
+    assert!(before.iter().zip(&after).all(|(b, a)| a.2 <= b.2 * (1.0 + 1e-9)));
+    let deviation = |rows: &[(u64, f64, f64)]| rows.iter().map(|r| r.2).sum::<f64>() / rows.len() as f64;
+    assert!(deviation(&after) < 0.9 * deviation(&before), "{} {}", deviation(&before), deviation(&after));
+    let (roots, _) = smooth(&run.join("tracks.csv"), &["--method", "square-root"]);
+    for (a, b) in longest(&table, &truth).iter().zip(longest(&roots, &truth)) {
+        assert!((a.1 - b.1).abs() < 1e-6 || a.1.is_nan(), "frame {}: {} {}", a.0, a.1, b.1);
+    }
+    let (lagged, _) = smooth(&run.join("tracks.csv"), &["--lag", "5"]);
+    let lagged = deviation(&longest(&lagged, &truth));
+    assert!(deviation(&after) < lagged && lagged < deviation(&before));
+    // Every fifth row is taken out of a MOTChallenge table; --fill puts one in for each.
+    let mot = std::fs::read_to_string(run.join("mot.txt")).unwrap();
+    let holed = dir.path().join("holed.txt");
+    let keep = |l: &&str| l.split(',').next().and_then(|f| f.parse::<u64>().ok()).is_some_and(|f| f % 5 != 0);
+    std::fs::write(&holed, mot.lines().filter(keep).collect::<Vec<_>>().join("\n")).unwrap();
+    let (table, said) = smooth(&holed, &["--fill", "--rate-hz", "30", "--acceleration", "28"]);
+    assert!(said.contains("filtered first"), "{said}");
+    let frames: Vec<u64> = longest(&table, &truth).iter().map(|r| r.0).collect();
+    assert!(frames.windows(2).all(|w| w[1] == w[0] + 1), "{frames:?}");
+    let missing = boresight(&["smooth", "no-such.csv"]);
+    assert!(!missing.status.success() && text(&missing.stderr).contains("no-such.csv"));
 }
 
 #[test]

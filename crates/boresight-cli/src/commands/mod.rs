@@ -9,6 +9,7 @@ pub mod fuse;
 pub mod reproduce;
 mod run_options;
 pub mod simulate;
+pub mod smooth;
 pub mod track;
 
 use std::io::Write;

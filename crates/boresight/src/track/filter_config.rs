@@ -5,20 +5,15 @@
 //! `boresight config --list filters` prints: what it is, when to take it, its source.
 
 use super::belief::Belief;
-use super::config::{check, not_negative, positive};
 use super::cv;
 use super::filter_forms::{self, Form};
 use super::filter_model::{ModelConfig, SingerConfig, WhiteNoiseConfig};
 use super::filter_options::{
     CorrelatorConfig, FormConfig, HuberConfig, InnovationConfig, StudentTConfig, TurningConfig,
 };
+use super::filter_whole::{Ar1Config, DisplacementConfig, ImmConfig, LmsConfig};
 use crate::Result;
-use boresight_filters::model::ConstantVelocity;
-use boresight_filters::{
-    Ar1, Displacement, Filter, FilterError, Gaussian, Imm, Information, Kf, Lms, LmsRule, Measurement, SquareRoot,
-    Srif, Start, Tracked, Ud, Ukf,
-};
-use nalgebra::{Matrix2, Vector2};
+use boresight_filters::{Filter, FilterError, Gaussian};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -92,122 +87,6 @@ pub struct FuzzySrifConfig {
     pub correlator: Box<CorrelatorConfig>,
 }
 
-/// Interacting multiple model of two constant-velocity filters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct ImmConfig {
-    /// Form of both filters.
-    pub form: ImmForm,
-    /// Acceleration of the manoeuvring model over that of the quiet one, above 0.
-    pub manoeuvre_factor: f64,
-    /// How long a target stays quiet, s, above 0.
-    pub quiet_s: f64,
-    /// How long a manoeuvre lasts, s, above 0.
-    pub manoeuvre_s: f64,
-}
-
-/// Form of the filters of an IMM.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ImmForm {
-    /// Kalman filter (Joseph).
-    #[default]
-    Kf,
-    /// U-D factors.
-    Ud,
-    /// Square-root information filter.
-    Srif,
-    /// Information filter.
-    Information,
-    /// Square-root covariance filter.
-    SquareRoot,
-    /// Unscented filter.
-    Ukf,
-}
-
-impl Default for ImmConfig {
-    fn default() -> Self {
-        Self { form: ImmForm::Kf, manoeuvre_factor: 10.0, quiet_s: 5.0, manoeuvre_s: 1.0 }
-    }
-}
-
-/// LMS acceleration weights.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct LmsConfig {
-    /// N, the measured accelerations reach back this many frames, 2..=5; the filter has N + 3 states an axis.
-    pub window: u32,
-    /// How the weights learn.
-    pub rule: LmsRuleConfig,
-}
-
-impl Default for LmsConfig {
-    fn default() -> Self {
-        Self { window: 2, rule: LmsRuleConfig::default() }
-    }
-}
-
-/// How the weights learn.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum LmsRuleConfig {
-    /// Normalised step, leak, row limit and watchdog: did not diverge in 400 runs.
-    Guarded {},
-    /// The paper's corrected equations.
-    AsPrinted(AsPrintedConfig),
-}
-
-impl Default for LmsRuleConfig {
-    fn default() -> Self {
-        Self::Guarded {}
-    }
-}
-
-/// The paper's learning rule.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct AsPrintedConfig {
-    /// Step factor α, 0 or more. At 25 frames/s: 1e-14 does nothing, 1e-12 diverges in a quarter of the runs, 1e-8 in all.
-    pub step_factor: f64,
-}
-
-impl Default for AsPrintedConfig {
-    fn default() -> Self {
-        Self { step_factor: 1e-14 }
-    }
-}
-
-/// AR(1) recursion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Ar1Config {
-    /// Expected time between frames, s, above 0.
-    pub frame_s: f64,
-}
-
-impl Default for Ar1Config {
-    fn default() -> Self {
-        Self { frame_s: 0.04 }
-    }
-}
-
-/// Displacement model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct DisplacementConfig {
-    /// Expected time between frames, s, above 0.
-    pub frame_s: f64,
-    /// Standard deviation of the noise of a frame, px, 0 or more; left out: acceleration × frame time².
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_px: Option<f64>,
-}
-
-impl Default for DisplacementConfig {
-    fn default() -> Self {
-        Self { frame_s: 0.04, noise_px: None }
-    }
-}
-
 /// A filter that can be copied behind its trait: what the tracker holds when the filter is not kept in place.
 pub trait TrackFilter: Filter + Send + Sync {
     /// Copies the filter.
@@ -244,12 +123,27 @@ impl FilterConfig {
         ]
     }
 
+    /// Whether its belief is that of a constant-velocity model, as the smoother takes it.
+    pub fn is_constant_velocity(&self) -> bool {
+        let cv = |model: &ModelConfig| matches!(model, ModelConfig::ConstantVelocity(_));
+        match self {
+            Self::Kf(c)
+            | Self::KfShort(c)
+            | Self::Ud(c)
+            | Self::Srif(c)
+            | Self::Information(c)
+            | Self::SquareRoot(c) => cv(&c.model),
+            Self::FuzzySrif(c) => cv(&c.model),
+            Self::Ekf(c) | Self::Ukf(c) => cv(&c.model),
+            Self::Huber(_) | Self::StudentT(_) => true,
+            _ => false,
+        }
+    }
+
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
-        let frame =
-            |name: &str, s: f64| positive(&format!("{at}.{name}"), "frame-s", s, "the frame time, 0.04 s at 25 Hz");
         match self {
             Self::Kf(c) => c.validate(&format!("{at}.kf")),
             Self::KfShort(c) => c.validate(&format!("{at}.kf-short")),
@@ -267,31 +161,10 @@ impl FilterConfig {
             Self::StudentT(c) => c.validate(&format!("{at}.student-t")),
             Self::ConstantAcceleration(c) => ModelConfig::ConstantAcceleration(c.clone()).validate(at),
             Self::Singer(c) => ModelConfig::Singer(c.clone()).validate(at),
-            Self::Imm(c) => {
-                let at = format!("{at}.imm");
-                positive(&at, "manoeuvre-factor", c.manoeuvre_factor, "10 is usual")?;
-                positive(&at, "quiet-s", c.quiet_s, "5 s is usual")?;
-                positive(&at, "manoeuvre-s", c.manoeuvre_s, "1 s is usual")
-            }
-            Self::Lms(c) => {
-                let at = format!("{at}.lms");
-                check((2..=5).contains(&c.window), &at, "window", c.window, "2..=5", "2 is the paper's")?;
-                match &c.rule {
-                    LmsRuleConfig::Guarded {} => Ok(()),
-                    LmsRuleConfig::AsPrinted(c) => not_negative(
-                        &format!("{at}.rule.as-printed"),
-                        "step-factor",
-                        c.step_factor,
-                        "1e-14 is harmless",
-                    ),
-                }
-            }
-            Self::Ar1(c) => frame("ar1", c.frame_s),
-            Self::Displacement(c) => {
-                frame("displacement", c.frame_s)?;
-                c.noise_px
-                    .map_or(Ok(()), |v| not_negative(&format!("{at}.displacement"), "noise-px", v, "0.3 is usual"))
-            }
+            Self::Imm(c) => c.validate(&format!("{at}.imm")),
+            Self::Lms(c) => c.validate(&format!("{at}.lms")),
+            Self::Ar1(c) => c.validate(&format!("{at}.ar1")),
+            Self::Displacement(c) => c.validate(&format!("{at}.displacement")),
         }
     }
 
@@ -320,16 +193,8 @@ impl FilterConfig {
             Self::Singer(c) => with(ModelConfig::Singer(c.clone()), InnovationConfig::default()),
             Self::Imm(c) => c.start(start, acceleration_std),
             Self::Lms(c) => c.start(start, acceleration_std),
-            Self::Ar1(c) => {
-                let p = &start.cov;
-                let cov = Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]);
-                let position = Vector2::new(start.mean[0], start.mean[2]);
-                Ok(boxed(Ar1::new(&Measurement { position, cov }, c.frame_s)?))
-            }
-            Self::Displacement(c) => {
-                let noise = c.noise_px.unwrap_or(acceleration_std * c.frame_s * c.frame_s);
-                Ok(boxed(Tracked(Displacement::from_kinematics(start, noise * noise, c.frame_s)?)))
-            }
+            Self::Ar1(c) => c.start(start),
+            Self::Displacement(c) => c.start(start, acceleration_std),
         }
     }
 }
@@ -339,46 +204,4 @@ impl FuzzySrifConfig {
         let innovation = InnovationConfig::Fuzzy(self.correlator.clone());
         FormConfig { model: self.model.clone(), innovation, adaptive: None }
     }
-}
-
-impl ImmConfig {
-    fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
-        let quiet = ConstantVelocity::discrete(acceleration_std)?;
-        let fast = ConstantVelocity::discrete(acceleration_std * self.manoeuvre_factor)?;
-        let stays = [self.quiet_s, self.manoeuvre_s];
-        macro_rules! imm {
-            ($form:ident) => {{
-                let filters = [$form::<_, 4>::from_kinematics(quiet, start)?, $form::from_kinematics(fast, start)?];
-                boxed(Tracked(Imm::new(filters, stays)?))
-            }};
-        }
-        Ok(match self.form {
-            ImmForm::Kf => imm!(Kf),
-            ImmForm::Ud => imm!(Ud),
-            ImmForm::Srif => imm!(Srif),
-            ImmForm::Information => imm!(Information),
-            ImmForm::SquareRoot => imm!(SquareRoot),
-            ImmForm::Ukf => imm!(Ukf),
-        })
-    }
-}
-
-impl LmsConfig {
-    fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
-        let rule = match &self.rule {
-            LmsRuleConfig::Guarded {} => LmsRule::Guarded,
-            LmsRuleConfig::AsPrinted(c) => LmsRule::AsPrinted { alpha: c.step_factor },
-        };
-        Ok(match self.window {
-            2 => boxed(Lms::<5>::from_kinematics(start, acceleration_std, rule)?),
-            3 => boxed(Lms::<6>::from_kinematics(start, acceleration_std, rule)?),
-            4 => boxed(Lms::<7>::from_kinematics(start, acceleration_std, rule)?),
-            5 => boxed(Lms::<8>::from_kinematics(start, acceleration_std, rule)?),
-            _ => return Err(FilterError::OutOfRange("a window of 2..=5")),
-        })
-    }
-}
-
-fn boxed(filter: impl TrackFilter + 'static) -> Belief {
-    Belief::Boxed(Box::new(filter))
 }

@@ -1,0 +1,244 @@
+//! Smooths finished tracks: the belief of each row given all rows, by Rauch-Tung-Striebel, in roots, or with a fixed lag.
+//!
+//! Source: H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3(8), 1965; the recursions are in
+//! `boresight_filters::smooth`. The rows of a tracker are filtered beliefs, which is all a smoother needs: measurements are
+//! not looked at again. Rows without velocity (tables from elsewhere) are positions: [`filter_track`] comes first.
+//! Symbols: state `[x, vx, y, vy]` (px, px/s). Model: constant velocity with white acceleration, as in the tracker.
+//! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
+//! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
+
+use super::config::{check, positive};
+use crate::{Error, ErrorKind, Result, Timestamp};
+use boresight_filters::model::ConstantVelocity;
+use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};
+use boresight_filters::{Gaussian, GaussianFilter, Measurement, Start, Ud};
+use nalgebra::{Matrix2, Vector2};
+
+/// How tracks are smoothed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothConfig {
+    /// Standard deviation of the acceleration, px/s², above 0: that of the tracker which made the tracks.
+    pub acceleration_std_px_per_s2: f64,
+    /// Noise in continuous time, its density std² × this, s, above 0; `None`: discrete noise, as the tracker's default.
+    pub hold_s: Option<f64>,
+    /// Which rows tell of which.
+    pub method: SmoothMethod,
+}
+
+/// Which rows tell of which, and how it is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SmoothMethod {
+    /// All rows of each row, in covariance form.
+    #[default]
+    Rts,
+    /// The same in square roots: for covariances of very different size.
+    SquareRoot,
+    /// Each row is told of this many later ones only, at least 1: what a live display with that delay would show.
+    FixedLag(u32),
+}
+
+impl Default for SmoothConfig {
+    fn default() -> Self {
+        Self { acceleration_std_px_per_s2: 28.0, hold_s: None, method: SmoothMethod::Rts }
+    }
+}
+
+impl SmoothConfig {
+    /// Checks all values; `at` names the place.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        positive(at, "acceleration-std-px-per-s2", self.acceleration_std_px_per_s2, "as in the tracker")?;
+        if let Some(s) = self.hold_s {
+            positive(at, "hold-s", s, "the frame time, 0.04 s at 25 Hz")?;
+        }
+        match self.method {
+            SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
+            _ => Ok(()),
+        }
+    }
+
+    fn model(&self) -> Result<ConstantVelocity> {
+        let std = self.acceleration_std_px_per_s2;
+        Ok(match self.hold_s {
+            None => ConstantVelocity::discrete(std)?,
+            Some(s) => ConstantVelocity::continuous(std * std * s)?,
+        })
+    }
+}
+
+/// Replaces the beliefs of one track, in the order of their times, by the smoothed ones.
+/// # Errors
+/// Times that do not ascend; a covariance that cannot be factored.
+pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &SmoothConfig) -> Result<()> {
+    config.validate("smooth")?;
+    let model = config.model()?;
+    let mut scans = scans_of(times, beliefs)?;
+    match config.method {
+        SmoothMethod::Rts => rts(&model, &mut scans)?,
+        SmoothMethod::SquareRoot => rts_square_root(&model, &mut scans)?,
+        SmoothMethod::FixedLag(lag) => {
+            // Row k is overwritten only after all rows before it have been told of it.
+            for k in 0..scans.len() {
+                let end = k.saturating_add(lag as usize).min(scans.len() - 1);
+                let mut smoothed = scans[end].belief;
+                for j in (k..end).rev() {
+                    smoothed = rts_step(&model, &scans[j].belief, &smoothed, scans[j + 1].dt_s)?;
+                }
+                scans[k].belief = smoothed;
+            }
+        }
+    }
+    for (belief, scan) in beliefs.iter_mut().zip(&scans) {
+        *belief = scan.belief;
+    }
+    Ok(())
+}
+
+/// Pairs each belief with the time since the one before.
+fn scans_of(times: &[Timestamp], beliefs: &[Gaussian<4>]) -> Result<Vec<Filtered<4>>> {
+    let mut scans = Vec::with_capacity(beliefs.len());
+    let mut last = times.first().copied().unwrap_or_default();
+    for (time, belief) in times.iter().zip(beliefs.iter()) {
+        let dt_s = time.seconds_since(last);
+        if dt_s < 0.0 {
+            return Err(Error::new(ErrorKind::Damaged, "the rows of a track run back in time")
+                .at(format!("{} s after {} s", time.as_secs_f64(), last.as_secs_f64()))
+                .hint("sort the table by frame"));
+        }
+        last = *time;
+        scans.push(Filtered { dt_s, belief: *belief });
+    }
+    Ok(scans)
+}
+
+/// Returns the belief predicted `dt_s` seconds ahead: a row for a frame in which the track has none.
+/// # Errors
+/// A time that is negative or not finite; a covariance that cannot be factored.
+pub fn predict(belief: &Gaussian<4>, dt_s: f64, config: &SmoothConfig) -> Result<Gaussian<4>> {
+    let mut filter = boresight_filters::Kf::<_, 4>::start(config.model()?, *belief)?;
+    filter.predict(dt_s)?;
+    Ok(filter.belief())
+}
+
+/// Replaces the positions of one track by the beliefs of a filter that is given one after the other; the first velocity
+/// is 0 px/s, known to `velocity_std_px_per_s`, above 0.
+/// # Errors
+/// Times that do not ascend; a value that is not finite; a covariance that cannot be factored.
+pub fn filter_track(
+    times: &[Timestamp],
+    beliefs: &mut [Gaussian<4>],
+    velocity_std_px_per_s: f64,
+    config: &SmoothConfig,
+) -> Result<()> {
+    let measured = |b: &Gaussian<4>| Measurement {
+        position: Vector2::new(b.mean[0], b.mean[2]),
+        cov: Matrix2::new(b.cov[(0, 0)], b.cov[(0, 2)], b.cov[(2, 0)], b.cov[(2, 2)]),
+    };
+    let scans = scans_of(times, beliefs)?;
+    let [first, rest @ ..] = beliefs else { return Ok(()) };
+    let mut filter = Ud::<_, 4>::from_point(config.model()?, &measured(first), velocity_std_px_per_s)?;
+    *first = filter.belief();
+    for (belief, scan) in rest.iter_mut().zip(&scans[1..]) {
+        filter.predict(scan.dt_s)?;
+        filter.correct(&measured(belief))?;
+        *belief = filter.belief();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix4, Vector4};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const STD: f64 = 20.0;
+
+    /// Times, positions with noise of 0.5 px as rows, and the truth of a target that accelerates at random.
+    fn run(seed: u64) -> (Vec<Timestamp>, Vec<Gaussian<4>>, Vec<Vector4<f64>>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let (mut truth, dt) = (Vector4::new(100.0, 40.0 * normal(), 50.0, 40.0 * normal()), 0.04);
+        let (mut times, mut rows, mut truths) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..120 {
+            for axis in [0, 2] {
+                let a = STD * normal();
+                truth[axis] += dt * truth[axis + 1] + 0.5 * dt * dt * a;
+                truth[axis + 1] += dt * a;
+            }
+            let mean = Vector4::new(truth[0] + 0.5 * normal(), 0.0, truth[2] + 0.5 * normal(), 0.0);
+            times.push(Timestamp::from_secs_f64(f64::from(k) * dt));
+            rows.push(Gaussian { mean, cov: Matrix4::from_diagonal(&Vector4::new(0.25, 1.0, 0.25, 1.0)) });
+            truths.push(truth);
+        }
+        (times, rows, truths)
+    }
+
+    fn config(method: SmoothMethod) -> SmoothConfig {
+        SmoothConfig { acceleration_std_px_per_s2: STD, method, ..SmoothConfig::default() }
+    }
+
+    #[test]
+    fn smoothing_positions_more_than_halves_their_error_and_is_honest() {
+        let (mut raw, mut smooth, mut nees, mut n) = (0.0, 0.0, 0.0, 0.0);
+        for seed in 0..40 {
+            let (times, rows, truth) = run(seed);
+            let mut beliefs = rows.clone();
+            filter_track(&times, &mut beliefs, 60.0, &config(SmoothMethod::Rts)).unwrap();
+            smooth_track(&times, &mut beliefs, &config(SmoothMethod::Rts)).unwrap();
+            for k in [30, 60, 90] {
+                raw += (rows[k].mean - truth[k]).component_mul(&Vector4::new(1.0, 0.0, 1.0, 0.0)).norm_squared();
+                let e = beliefs[k].mean - truth[k];
+                smooth += e[0] * e[0] + e[2] * e[2];
+                nees += (e.transpose() * beliefs[k].cov.try_inverse().unwrap() * e)[0] / 4.0;
+                n += 1.0;
+            }
+        }
+        assert!(smooth < 0.25 * raw, "{smooth} of {raw}");
+        // The mean of 120 samples of χ²(4)/4, 99.9 %.
+        assert!((nees / n - 1.0).abs() < 3.3 * (2.0 / (4.0 * n)).sqrt(), "NEES/4 {}", nees / n);
+    }
+
+    #[test]
+    fn all_methods_agree_where_they_know_the_same() {
+        let (times, rows, _) = run(7);
+        let by = |method| {
+            let mut beliefs = rows.clone();
+            filter_track(&times, &mut beliefs, 60.0, &config(method)).unwrap();
+            smooth_track(&times, &mut beliefs, &config(method)).unwrap();
+            beliefs
+        };
+        let (all, roots, lag) = (by(SmoothMethod::Rts), by(SmoothMethod::SquareRoot), by(SmoothMethod::FixedLag(500)));
+        for k in 0..rows.len() {
+            assert!(
+                (all[k].mean - roots[k].mean).norm() < 1e-8 && (all[k].mean - lag[k].mean).norm() < 1e-8,
+                "row {k}"
+            );
+        }
+        // A lag of 4 rows knows less than all, more than none.
+        let (few, none) = (by(SmoothMethod::FixedLag(4)), by(SmoothMethod::FixedLag(1)));
+        assert!(all[60].cov.trace() < few[60].cov.trace() && few[60].cov.trace() < none[60].cov.trace());
+    }
+
+    #[test]
+    fn a_predicted_row_lies_within_its_own_uncertainty() {
+        let (times, rows, truth) = run(3);
+        let config = config(SmoothMethod::Rts);
+        let mut filtered = rows;
+        filter_track(&times, &mut filtered, 60.0, &config).unwrap();
+        let ahead = predict(&filtered[40], 0.04, &config).unwrap();
+        assert!((ahead.mean[0] - truth[41][0]).abs() < 4.0 * ahead.cov[(0, 0)].sqrt());
+        assert!(predict(&filtered[40], f64::NAN, &config).is_err());
+    }
+
+    #[test]
+    fn rows_that_run_back_in_time_are_refused() {
+        let (mut times, mut rows, _) = run(1);
+        times.swap(3, 4);
+        let e = smooth_track(&times, &mut rows, &config(SmoothMethod::Rts)).unwrap_err().to_string();
+        assert!(e.contains("run back in time"), "{e}");
+    }
+}
