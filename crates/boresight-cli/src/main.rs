@@ -28,6 +28,8 @@ enum Command {
     Fuse(commands::fuse::Args),
     /// Smooth a table of tracks: each row given all the others.
     Smooth(commands::smooth::Args),
+    /// Join fragments of tracks after gaps; smooth them.
+    Stitch(commands::stitch::Args),
     /// Convert tables of tracks between formats.
     Convert(commands::convert::Args),
     /// Print, check and explain configurations.
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => commands::evaluate::run(args),
         Command::Fuse(args) => commands::fuse::run(args),
         Command::Smooth(args) => commands::smooth::run(args),
+        Command::Stitch(args) => commands::stitch::run(args),
         Command::Convert(args) => commands::convert::run(args),
         Command::Config(args) => commands::config::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(args),

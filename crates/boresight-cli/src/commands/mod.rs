@@ -10,6 +10,7 @@ pub mod reproduce;
 mod run_options;
 pub mod simulate;
 pub mod smooth;
+pub mod stitch;
 pub mod track;
 
 use std::io::Write;

@@ -99,6 +99,22 @@ impl UniformGrid {
         (((y - self.origin_y) * self.per_px_y) as usize).min(self.rows - 1)
     }
 
+    /// Fetches what [`Self::near`] will read of this rectangle into the cache and returns a number that depends on it.
+    /// Called for a batch of rectangles before they are searched, it lets the fetches overlap.
+    #[inline]
+    pub fn touch(&self, x: f64, y: f64, half_width: f64, half_height: f64) -> u32 {
+        if self.points.is_empty() {
+            return 0;
+        }
+        let c0 = self.column_of(x - half_width);
+        let (r0, r1) = (self.row_of(y - half_height), self.row_of(y + half_height));
+        // A wide gate is not worth fetching ahead.
+        (r0..=r1.min(r0 + 3)).fold(0, |sum: u32, r| {
+            let at = self.starts[r * self.columns + c0] as usize;
+            sum.wrapping_add(self.points.get(at).map_or(0, |p| p.index))
+        })
+    }
+
     /// Calls `visit` with every point of the cells that the rectangle touches (so also with some outside of it), in the
     /// order of the cells; stops early when `visit` returns `false`.
     #[inline]

@@ -4,7 +4,7 @@ use super::belief::Belief;
 use super::birth::BirthConfig;
 use super::clutter::ClutterConfig;
 use super::filter_config::FilterConfig;
-use super::life::LifeConfig;
+use super::life_config::LifeConfig;
 use super::mht::MhtConfig;
 use super::proof::ProofConfig;
 use super::sharing::SharingConfig;

@@ -6,9 +6,9 @@
 
 use super::config::TrackerConfig;
 use super::gating::{Predicted, ScanTable, innovation_cov, normalised_square};
-use super::life::LifeConfig;
+use super::life_config::LifeConfig;
+use super::living::{Outcome, Track};
 use super::sharing::Part;
-use super::tracker::{Outcome, Track};
 use crate::Scan;
 use crate::associate::{Gates, Share};
 use crate::record::Innovation;

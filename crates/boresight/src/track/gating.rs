@@ -121,6 +121,24 @@ impl ScanTable {
         &self.grid
     }
 
+    /// Half the sides of the rectangle that holds a track's gate, px.
+    #[inline]
+    fn half_sides(&self, track: &Predicted, gate: f64) -> (f64, f64) {
+        let half = |own: f64, largest: f64| (gate * (own + largest)).sqrt().min(track.reach);
+        (half(track.cov.xx, self.max_xx), half(track.cov.yy, self.max_yy))
+    }
+
+    /// Fetches ahead what gating a batch of tracks will read.
+    #[inline]
+    pub fn touch(&self, batch: &[Predicted], gate: f64) {
+        let mut sum = 0u32;
+        for track in batch {
+            let (half_x, half_y) = self.half_sides(track, gate);
+            sum = sum.wrapping_add(self.grid.touch(track.x, track.y, half_x, half_y));
+        }
+        std::hint::black_box(sum);
+    }
+
     /// Adds the pairs of one track to the open row of `gates`: those with d² ≤ `gate` that `free` lets pass.
     /// `terms` returns what a pair costs beside position (0 if nothing).
     #[inline]
@@ -134,9 +152,8 @@ impl ScanTable {
         terms: impl Fn(u32) -> f64,
         gates: &mut Gates,
     ) {
-        let (reach, reach2) = (track.reach, track.reach * track.reach);
-        let half_x = (gate * (track.cov.xx + self.max_xx)).sqrt().min(reach);
-        let half_y = (gate * (track.cov.yy + self.max_yy)).sqrt().min(reach);
+        let reach2 = track.reach * track.reach;
+        let (half_x, half_y) = self.half_sides(track, gate);
         let mut looked_at = 0;
         let mut gated = 0;
         self.grid.near(track.x, track.y, half_x, half_y, |p| {

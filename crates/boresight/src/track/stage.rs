@@ -7,7 +7,7 @@ use super::clutter::Clutter;
 use super::config::TrackerConfig;
 use super::correct::Scratch;
 use super::gating::{Predicted, ScanTable};
-use super::tracker::{Outcome, Track};
+use super::living::{Outcome, Track};
 use crate::Scan;
 use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior, Share};
 
@@ -42,6 +42,20 @@ impl Stage {
     /// The rows, each with its track and its shares.
     pub fn rows(&self) -> impl Iterator<Item = (u32, &[Share])> {
         self.rows.iter().enumerate().map(|(row, i)| (*i, self.answer.row(row)))
+    }
+
+    /// Fetches ahead the detections that the next `n` rows took.
+    #[inline]
+    pub fn touch(&self, scan: &Scan, n: usize) {
+        let mut sum = 0.0;
+        for row in self.cursor..self.rows.len().min(self.cursor + n) {
+            for share in self.answer.row(row) {
+                // The first and the last field: a detection spans two cache lines.
+                let d = &scan.detections[share.detection as usize];
+                sum += d.position.x + f64::from(d.score);
+            }
+        }
+        std::hint::black_box(sum);
     }
 
     /// Passes over the row of track `i`, if it has one here.

@@ -8,9 +8,10 @@
 use super::birth::{BirthConfig, from_one_point, from_two_points};
 use super::config::TrackerConfig;
 use super::gating::{MOST_LOOKED_AT, Noise, normalised_square};
+use super::living::{Outcome, Track};
 use super::proof::Proof;
 use super::terms::Look;
-use super::tracker::{Outcome, Track, Tracker};
+use super::tracker::{BATCH, Tracker};
 use crate::Scan;
 use boresight_filters::{Filter, Measurement, Weighted};
 use nalgebra::Vector2;
@@ -55,9 +56,15 @@ impl Tracker {
         let dt_s = scan.time.seconds_since(self.left_over_time);
         let left_over = std::mem::take(&mut self.left_over);
         if dt_s > 0.0 {
-            for first in &left_over {
+            let far = self.config.max_speed_px_per_s * dt_s;
+            for (k, first) in left_over.iter().enumerate() {
                 if !self.has_room() {
                     break;
+                }
+                if k % BATCH == 0 {
+                    let batch = left_over[k..].iter().take(BATCH).map(|l| l.position);
+                    let grid = self.table.grid();
+                    std::hint::black_box(batch.fold(0, |sum, p| sum ^ grid.touch(p.x, p.y, far, far)));
                 }
                 if let Some(j) = self.partner(scan, first, dt_s) {
                     self.used[j] = true;

@@ -9,54 +9,27 @@
 //! Limits: detections of a scan share its time; `max_tracks` tracks.
 
 use super::Tracking;
-use super::belief::Belief;
 use super::clutter::Clutter;
 use super::config::TrackerConfig;
 use super::correct::{Scratch, shared};
 use super::gating::{Noise, Predicted, ScanTable};
-use super::life::{Evidence, Life, Verdict};
+use super::life::{Evidence, Verdict};
+use super::living::{Outcome, Track};
 use super::pace::Pace;
-use super::proof::{CameraWay, Proof};
 use super::sharing::Sharing;
 use super::stage::Stage;
 use super::starts::LeftOver;
-use super::terms::{Look, Terms};
+use super::terms::Terms;
 use crate::associate::AssociatorConfig;
-use crate::record::Innovation;
-use crate::{Detection, Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
+use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackState};
 use boresight_filters::Filter;
 use nalgebra::Vector2;
 
-/// One living track.
-#[derive(Clone)]
-pub(super) struct Track {
-    pub id: u64,
-    pub belief: Belief,
-    pub life: Life,
-    pub look: Look,
-    /// Since when it follows the same detections as an older track, ns.
-    pub twin_since_ns: Option<i64>,
-    /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
-    pub anchor: [f64; 3],
-    /// What it has shown beside its life's rule.
-    pub proof: Proof,
-}
-
-/// What one scan brought a track.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Outcome {
-    pub hit: bool,
-    /// The detection is shared, and mainly another track's.
-    pub shared: bool,
-    /// The detection of the largest weight.
-    pub detection: Option<u32>,
-    /// Λ of the scan.
-    pub ratio: f64,
-    pub innovation: Option<Innovation>,
-}
-
 /// No track took it.
 const NONE: u32 = u32::MAX;
+
+/// Tracks whose neighbourhoods are fetched together, so that the waits for memory overlap.
+pub(super) const BATCH: usize = 16;
 
 /// The tracker.
 pub struct Tracker {
@@ -136,7 +109,7 @@ impl Tracker {
             return; // after one scan nobody can say what a gap is
         }
         self.tracks.retain(|t| {
-            let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
+            let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_seen_ns()));
             // The newest scan in which the track can still be seen ends the budget, not the gap itself.
             silent_s - pace_s < budget_s - 1e-9 || silent_s <= 1e-9
         });
@@ -156,35 +129,41 @@ impl Tracker {
         self.tentative.clear();
         let speed = self.config.max_speed_px_per_s;
         let survival = self.config.life.survival(dt_s);
-        for (i, t) in self.tracks.iter_mut().enumerate() {
-            t.belief.predict(dt_s)?;
-            self.config.life.fade(&mut t.life, survival);
-            let p = t.belief.predicted();
-            let elapsed_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
-            // From where it was last seen the target came at most this far; the prediction may already lie off it.
-            let [ax, ay, std] = t.anchor;
-            let far = speed * elapsed_s + 3.0 * std;
-            let off = (p.mean - Vector2::new(ax, ay)).norm();
-            let predicted = Predicted {
-                x: p.mean.x,
-                y: p.mean.y,
-                cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
-                reach: if self.config.gate_within_max_speed { far + off } else { f64::INFINITY },
-            };
-            self.predicted.push(predicted);
-            if t.life.confirmed {
+        for (batch, tracks) in self.tracks.chunks_mut(BATCH).enumerate() {
+            let first = batch * BATCH;
+            for t in tracks.iter_mut() {
+                t.belief.predict(dt_s)?;
+                self.config.life.fade(&mut t.life, survival);
+                let p = t.belief.predicted();
+                let elapsed_s = now.seconds_since(Timestamp::from_ns(t.life.last_seen_ns()));
+                // From where it was last seen the target came at most this far; the prediction may already lie off it.
+                let [ax, ay, std] = t.anchor;
+                let far = speed * elapsed_s + 3.0 * std;
+                let off = (p.mean - Vector2::new(ax, ay)).norm();
+                self.predicted.push(Predicted {
+                    x: p.mean.x,
+                    y: p.mean.y,
+                    cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
+                    reach: if self.config.gate_within_max_speed { far + off } else { f64::INFINITY },
+                });
+            }
+            self.table.touch(&self.predicted[first..], self.gate);
+            for (k, t) in tracks.iter().enumerate() {
+                if !t.life.confirmed {
+                    self.tentative.push((first + k) as u32);
+                    continue;
+                }
+                let predicted = &self.predicted[first + k];
                 let existence = self.config.life.existence(&t.life);
-                let stage = &mut self.stages[0];
+                let (stage, table, config) = (&mut self.stages[0], &self.table, &self.config);
                 if plain {
-                    stage.add(i, &predicted, existence, &self.table, self.gate, &self.config, |_| true, |_| 0.0);
+                    stage.add(first + k, predicted, existence, table, self.gate, config, |_| true, |_| 0.0);
                 } else {
                     let (terms, look) = (&self.terms, &t.look);
                     let strong = |j: u32| scan.detections[j as usize].score >= high;
                     let cost = |j: u32| terms.cost(predicted.x, predicted.y, look, &scan.detections[j as usize]);
-                    stage.add(i, &predicted, existence, &self.table, self.gate, &self.config, strong, cost);
+                    stage.add(first + k, predicted, existence, table, self.gate, config, strong, cost);
                 }
-            } else {
-                self.tentative.push(i as u32);
             }
         }
         Ok(())
@@ -267,9 +246,12 @@ impl Tracker {
         self.states.clear();
         self.owner.clear();
         self.owner.resize(if self.is_soft { scan.detections.len() } else { 0 }, false);
-        let (mut kept, mut part) = (0, 0);
-        for i in 0..self.tracks.len() {
-            let t = &mut self.tracks[i];
+        let (mut i, mut part) = (0, 0);
+        let mut tracks = std::mem::take(&mut self.tracks);
+        tracks.retain_mut(|t| {
+            if i % BATCH == 0 {
+                self.stages[0].touch(scan, BATCH);
+            }
             let mut outcome = Outcome { ratio: 1.0, ..Outcome::default() };
             if self.sharing.parts.get(part).is_some_and(|p| p.track as usize == i) {
                 outcome = shared(t, &self.predicted[i], &self.sharing.parts[part]);
@@ -286,77 +268,33 @@ impl Tracker {
                     }
                 }
             }
+            i += 1;
             if learn && let (true, Some(j)) = (outcome.hit, outcome.detection) {
                 self.terms.learn(&t.look, &scan.detections[j as usize]);
             }
             let evidence = Evidence { hit: outcome.hit, shared: outcome.shared, ratio: outcome.ratio };
             let mut verdict = self.config.life.advance(&mut t.life, evidence, now.ns);
             if t.life.misses > 0 || outcome.shared {
-                let silent_s = now.seconds_since(Timestamp::from_ns(t.life.last_hit_ns));
-                let longest_s = if outcome.shared { budget_s.max(share_s) } else { budget_s };
-                if silent_s >= longest_s - 1e-9 {
+                // On shared detections a track lives so long; without any it coasts from the last, shared or not.
+                let (since_ns, longest_s) = if outcome.shared {
+                    (t.life.last_hit_ns, budget_s.max(share_s))
+                } else {
+                    (t.life.last_seen_ns(), budget_s)
+                };
+                if now.seconds_since(Timestamp::from_ns(since_ns)) >= longest_s - 1e-9 {
                     verdict = Verdict::Delete;
                 }
             }
             if self.is_soft && verdict == Verdict::Keep && t.is_lasting_twin(&mut self.owner, &outcome, now, twin_s) {
                 verdict = Verdict::Delete;
             }
-            if verdict == Verdict::Keep {
+            let keep = verdict == Verdict::Keep;
+            if keep {
                 self.states.push(t.state(&outcome, &self.config, self.table.camera));
-                if kept != i {
-                    self.tracks.swap(kept, i);
-                }
-                kept += 1;
             }
-        }
-        self.tracks.truncate(kept);
-    }
-}
-
-impl Track {
-    /// Whether the track has followed the same detections as an older one for `longest_s`.
-    fn is_lasting_twin(&mut self, owner: &mut [bool], outcome: &Outcome, now: Timestamp, longest_s: f64) -> bool {
-        let Some(j) = outcome.detection else { return false };
-        if !std::mem::replace(&mut owner[j as usize], true) {
-            self.twin_since_ns = None;
-            return false;
-        }
-        let since = *self.twin_since_ns.get_or_insert(now.ns);
-        now.seconds_since(Timestamp::from_ns(since)) >= longest_s
-    }
-
-    /// Takes in the box and place of a detection that is (most likely) its own.
-    #[inline]
-    pub(super) fn seen(&mut self, d: &Detection, noise: &Noise, look_gain: f64) {
-        self.look.follow(d, look_gain);
-        self.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
-        self.proof.seen(d.score);
-    }
-
-    /// What is said of the track after a scan.
-    #[inline]
-    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
-        let kinematics = self.belief.kinematics();
-        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], camera, outcome.hit);
-        let [width_px, height_px] = self.look.size;
-        TrackState {
-            id: TrackId(self.id),
-            status: match (self.life.confirmed && proven, outcome.hit) {
-                (false, _) => TrackStatus::Tentative,
-                (true, true) => TrackStatus::Confirmed,
-                (true, false) => TrackStatus::Coasting,
-            },
-            extent: Extent {
-                left_px: kinematics.mean[0] - 0.5 * width_px,
-                top_px: kinematics.mean[2] - 0.5 * height_px,
-                width_px,
-                height_px,
-            },
-            kinematics,
-            detection: outcome.detection,
-            innovation: outcome.innovation,
-            score: config.life.confidence(&self.life),
-        }
+            keep
+        });
+        self.tracks = tracks;
     }
 }
 

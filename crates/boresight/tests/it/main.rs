@@ -9,6 +9,7 @@ mod metrics;
 mod reproduce;
 mod rooms;
 mod tables;
+mod track;
 mod video;
 mod vision_conformance;
 mod vision_covariance;

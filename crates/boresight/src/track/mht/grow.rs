@@ -6,8 +6,9 @@
 use super::super::birth::{BirthConfig, from_one_point};
 use super::super::gating::{Noise, Predicted, innovation_cov, normalised_square};
 use super::super::life::{Evidence, Verdict};
+use super::super::living::Outcome;
+use super::super::proof::Proof;
 use super::super::terms::Look;
-use super::super::tracker::Outcome;
 use super::{Leaf, Mht, NONE, Tree, WINDOW};
 use crate::associate::{Pair, Prior};
 use crate::record::Innovation;
@@ -51,7 +52,7 @@ impl Mht {
 
     fn predicted(&self, leaf: &Leaf, now: Timestamp) -> Predicted {
         let p = leaf.belief.predicted();
-        let elapsed_s = now.seconds_since(Timestamp::from_ns(leaf.life.last_hit_ns));
+        let elapsed_s = now.seconds_since(Timestamp::from_ns(leaf.life.last_seen_ns()));
         let [ax, ay, std] = leaf.anchor;
         let far = self.config.max_speed_px_per_s * elapsed_s + 3.0 * std;
         let off = (p.mean - Vector2::new(ax, ay)).norm();
@@ -71,7 +72,7 @@ impl Mht {
         let miss = 1.0 - c.detection_probability * c.gate_probability;
         let mut missed = Leaf { path, outcome: Outcome { ratio: miss, ..Outcome::default() }, ..leaf.clone() };
         missed.score += miss.max(1e-300).ln();
-        let silent_s = scan.time.seconds_since(Timestamp::from_ns(leaf.life.last_hit_ns));
+        let silent_s = scan.time.seconds_since(Timestamp::from_ns(leaf.life.last_seen_ns()));
         let evidence = Evidence { hit: false, shared: false, ratio: miss };
         if c.life.advance(&mut missed.life, evidence, scan.time.ns) == Verdict::Keep && silent_s < budget_s - 1e-9 {
             out.push(missed);
@@ -80,7 +81,9 @@ impl Mht {
         self.gates.reset(scan.detections.len(), 1.0);
         let (terms, p) = (&self.terms, &leaf.predicted);
         let cost = |j: u32| terms.cost(p.x, p.y, &leaf.look, &scan.detections[j as usize]);
-        self.table.gate_row(p, self.gate, c.max_gated as usize, true, |_| true, cost, &mut self.gates);
+        let low = c.two_stage.as_ref().map_or(f32::NEG_INFINITY, |t| t.low_score);
+        let free = |j: u32| scan.detections[j as usize].score >= low;
+        self.table.gate_row(p, self.gate, c.max_gated as usize, true, free, cost, &mut self.gates);
         self.gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: self.gate });
         for pair in self.gates.row(0) {
             if let Some(mut child) = self.hit(scan, leaf, pair) {
@@ -110,6 +113,7 @@ impl Mht {
         let cov = innovation_cov(&leaf.predicted, &noise);
         let nis = normalised_square(&residual, &cov);
         child.look.follow(d, c.look_gain);
+        child.proof.seen(d.score);
         child.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
         child.outcome = Outcome {
             hit: true,
@@ -133,7 +137,7 @@ impl Mht {
             BirthConfig::OnePoint(_) | BirthConfig::TwoPoint(_) | BirthConfig::VelocityBounds(_)
         ));
         for (j, d) in scan.detections.iter().enumerate() {
-            if d.score < weak || self.trees.len() >= c.max_tracks as usize {
+            if d.score < weak || !c.proof.may_start(d.score) || self.trees.len() >= c.max_tracks as usize {
                 continue;
             }
             let noise = self.table.noise(j as u32);
@@ -149,6 +153,7 @@ impl Mht {
                 path,
                 life: c.life.begin(1, scan.time.ns, density, 1.0),
                 look: Look::of(d),
+                proof: Proof::begin([d.position.x, d.position.y], self.table.camera, d.score),
                 anchor: [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()],
                 outcome: Outcome { hit: true, detection: Some(j as u32), ..Outcome::default() },
             };

@@ -8,7 +8,8 @@
 //! twice within the window) is the answer; leaves that disagree with it `n_scan` scans back are cut.
 //! Memory is bounded: `max_leaves` a tree and `max_hypotheses` in all; the selection has a budget of steps (`select`).
 //! Symbols: score = Σ ln(P_D l / λ) over hits + Σ ln(1 − P_D P_G) over misses, from ln(β / λ) at the start.
-//! Limits: `n_scan` ≤ 7.
+//! Limits: `n_scan` ≤ 7. Targets start from one point whatever `birth` says (its velocities hold); `sharing` and `duplicate-s` have no
+//! effect here: compatible histories share nothing.
 
 mod grow;
 mod select;
@@ -19,9 +20,10 @@ use super::clutter::Clutter;
 use super::config::{TrackerConfig, check, positive};
 use super::gating::{Predicted, ScanTable};
 use super::life::Life;
+use super::living::Outcome;
 use super::pace::Pace;
+use super::proof::Proof;
 use super::terms::{Look, Terms};
-use super::tracker::Outcome;
 use crate::associate::Gates;
 use crate::{Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
 use boresight_filters::Filter;
@@ -94,6 +96,7 @@ struct Leaf {
     path: [u32; WINDOW],
     life: Life,
     look: Look,
+    proof: Proof,
     anchor: [f64; 3],
     predicted: Predicted,
     outcome: Outcome,
@@ -205,16 +208,18 @@ impl Mht {
     fn report(&mut self) {
         self.states.clear();
         for tree in &mut self.trees {
-            let Some(leaf) = tree.chosen.map(|c| &tree.leaves[c]) else { continue };
+            let Some(leaf) = tree.chosen.map(|c| &mut tree.leaves[c]) else { continue };
             if tree.id == 0 {
                 tree.id = self.next_id;
                 self.next_id += 1;
             }
             let kinematics = leaf.belief.kinematics();
+            let at = [kinematics.mean[0], kinematics.mean[2]];
+            let proven = leaf.proof.holds(&self.config.proof, at, self.table.camera, leaf.outcome.hit);
             let [width_px, height_px] = leaf.look.size;
             self.states.push(TrackState {
                 id: TrackId(tree.id),
-                status: match (leaf.life.confirmed, leaf.outcome.hit) {
+                status: match (leaf.life.confirmed && proven, leaf.outcome.hit) {
                     (false, _) => TrackStatus::Tentative,
                     (true, true) => TrackStatus::Confirmed,
                     (true, false) => TrackStatus::Coasting,

@@ -1,0 +1,101 @@
+//! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
+
+use boresight::io::tables::{MotWriter, TableOptions, TracksCsv, read_tracks};
+use boresight::track::{StitchConfig, TrackScan, join};
+use boresight::{FrameIndex, Scan, Sink, Timestamp, View};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Join fragments of one target after gaps; with --smooth fill the gaps and smooth all tracks.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  boresight stitch flight.tracks/tracks.csv -o stitched.csv
+      fragments at most 2 s apart that fit each other get one id; rows stay as they are
+  boresight stitch tracks.csv --smooth -o smooth.csv
+      also fills the gaps and gives every row the estimate of the whole track
+  boresight stitch mot.txt --max-gap 1 --acceleration 100 -o mot_stitched.txt
+      MOTChallenge in and out")]
+pub struct Args {
+    /// Table of tracks: tracks.csv, MOTChallenge, any table with a column that names the track.
+    tracks: PathBuf,
+    /// The new table; `.txt` is written as MOTChallenge, everything else as tracks.csv.
+    #[arg(short, long, default_value = "stitched.csv")]
+    output: PathBuf,
+    /// Smooth all tracks (Rauch-Tung-Striebel) and put rows into the gaps.
+    #[arg(long)]
+    smooth: bool,
+    /// Longest gap, s.
+    #[arg(long, default_value_t = StitchConfig::default().max_gap_s)]
+    max_gap: f64,
+    /// Fragments may overlap by this much, s.
+    #[arg(long, default_value_t = StitchConfig::default().max_overlap_s)]
+    max_overlap: f64,
+    /// Standard deviation of the targets' acceleration, px/s²; as in the tracker.
+    #[arg(long, default_value_t = StitchConfig::default().acceleration_std_px_per_s2)]
+    acceleration: f64,
+    /// Largest speed, px/s.
+    #[arg(long, default_value_t = StitchConfig::default().max_speed_px_per_s)]
+    max_speed: f64,
+    /// Probability that true fragments pass the gate, in (0, 1).
+    #[arg(long, default_value_t = StitchConfig::default().gate_probability)]
+    gate_probability: f64,
+    /// Rate of tables without times, frames/s.
+    #[arg(long)]
+    rate_hz: Option<f64>,
+}
+
+/// Runs the command.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let config = StitchConfig {
+        max_gap_s: args.max_gap,
+        max_overlap_s: args.max_overlap,
+        acceleration_std_px_per_s2: args.acceleration,
+        max_speed_px_per_s: args.max_speed,
+        gate_probability: args.gate_probability,
+    };
+    config.validate("stitch")?;
+    let table = read_tracks(&args.tracks, &TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() })?;
+    table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", args.tracks.display()));
+    let rate_hz = table.rate_hz;
+    let mut scans: Vec<TrackScan> = Vec::new();
+    for frame in table.frames {
+        // Frames without any track have no rows in a table; a gap needs them.
+        if let Some(last) = scans.last()
+            && args.smooth
+        {
+            let (from, time) = (last.index.0, last.time);
+            let n = frame.index.0.saturating_sub(from);
+            // Beyond the longest gap nothing is filled: no need to make room for it.
+            let step_s = frame.time.seconds_since(time) / n.max(1) as f64;
+            for k in (1..n).filter(|_| n as f64 <= args.max_gap * rate_hz + 1.0) {
+                let time = Timestamp::from_ns(time.ns + (step_s * k as f64 * 1e9).round() as i64);
+                scans.push(TrackScan { index: FrameIndex(from + k), time, tracks: Vec::new() });
+            }
+        }
+        scans.push(TrackScan { index: frame.index, time: frame.time, tracks: frame.tracks });
+    }
+    let done = join(&mut scans, &config, args.smooth)?;
+    let mut out: Box<dyn Sink> = if args.output.extension().is_some_and(|e| e == "txt") {
+        Box::new(MotWriter::create(&args.output)?.with_coasting(args.smooth))
+    } else {
+        Box::new(TracksCsv::create(&args.output)?)
+    };
+    for s in scans.iter().filter(|s| !s.tracks.is_empty()) {
+        let scan = Scan { index: s.index, time: s.time, ..Scan::default() };
+        out.put(&View { frame: None, scan: &scan, tracks: &s.tracks })?;
+    }
+    out.finish()?;
+    if done.filtered {
+        eprintln!("the table has no velocities: its positions were filtered first");
+    }
+    eprintln!(
+        "{} tracks -> {} ({} joined), {} rows filled, {} coasting rows dropped: {}",
+        done.before,
+        done.after,
+        done.before - done.after,
+        done.filled,
+        done.dropped,
+        args.output.display()
+    );
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,92 @@
+//! One living track: what it carries from scan to scan, and what is said of it after each.
+
+use super::belief::Belief;
+use super::config::TrackerConfig;
+use super::gating::Noise;
+use super::life::Life;
+use super::proof::{CameraWay, Proof};
+use super::terms::Look;
+use crate::record::Innovation;
+use crate::{Detection, Extent, Timestamp, TrackId, TrackState, TrackStatus};
+use boresight_filters::Filter;
+
+/// One living track.
+#[derive(Clone)]
+pub(super) struct Track {
+    pub id: u64,
+    pub belief: Belief,
+    pub life: Life,
+    pub look: Look,
+    /// Since when it follows the same detections as an older track, ns.
+    pub twin_since_ns: Option<i64>,
+    /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
+    pub anchor: [f64; 3],
+    /// What it has shown beside its life's rule.
+    pub proof: Proof,
+}
+
+/// What one scan brought a track.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Outcome {
+    pub hit: bool,
+    /// The detection is shared, and mainly another track's.
+    pub shared: bool,
+    /// The detection of the largest weight.
+    pub detection: Option<u32>,
+    /// Λ of the scan.
+    pub ratio: f64,
+    pub innovation: Option<Innovation>,
+}
+
+impl Track {
+    /// Whether the track has followed the same detections as an older one for `longest_s`.
+    pub(super) fn is_lasting_twin(
+        &mut self,
+        owner: &mut [bool],
+        outcome: &Outcome,
+        now: Timestamp,
+        longest_s: f64,
+    ) -> bool {
+        let Some(j) = outcome.detection else { return false };
+        if !std::mem::replace(&mut owner[j as usize], true) {
+            self.twin_since_ns = None;
+            return false;
+        }
+        let since = *self.twin_since_ns.get_or_insert(now.ns);
+        now.seconds_since(Timestamp::from_ns(since)) >= longest_s
+    }
+
+    /// Takes in the box and place of a detection that is (most likely) its own.
+    #[inline]
+    pub(super) fn seen(&mut self, d: &Detection, noise: &Noise, look_gain: f64) {
+        self.look.follow(d, look_gain);
+        self.anchor = [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()];
+        self.proof.seen(d.score);
+    }
+
+    /// What is said of the track after a scan.
+    #[inline]
+    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
+        let kinematics = self.belief.kinematics();
+        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], camera, outcome.hit);
+        let [width_px, height_px] = self.look.size;
+        TrackState {
+            id: TrackId(self.id),
+            status: match (self.life.confirmed && proven, outcome.hit) {
+                (false, _) => TrackStatus::Tentative,
+                (true, true) => TrackStatus::Confirmed,
+                (true, false) => TrackStatus::Coasting,
+            },
+            extent: Extent {
+                left_px: kinematics.mean[0] - 0.5 * width_px,
+                top_px: kinematics.mean[2] - 0.5 * height_px,
+                width_px,
+                height_px,
+            },
+            kinematics,
+            detection: outcome.detection,
+            innovation: outcome.innovation,
+            score: config.life.confidence(&self.life),
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Merged targets: what two tracks predict is shared, for longer than they may coast, and split on exit.
+
+use super::{detection, scan};
+use boresight::track::{self, SharingConfig, TrackerConfig};
+use boresight::{Extent, TrackStatus};
+
+#[test]
+fn two_targets_that_pass_through_each_other_keep_their_ids_however_long_they_are_one_blob() {
+    // They close at 2 px a scan and touch when 8 px apart: one blob for 9 scans, the coasting budget is 5.
+    let config = TrackerConfig {
+        acceleration_std_px_per_s2: 10.0,
+        coast_s: 0.1,
+        coast_scans: 5,
+        sharing: Some(SharingConfig { longest_s: 1.0, ..SharingConfig::default() }),
+        ..TrackerConfig::default()
+    };
+    let mut tracker = track::build(&config).unwrap();
+    let mut ids = Vec::new();
+    for k in 0..50u64 {
+        let (a, b) = (20.0 + k as f64, 70.0 - k as f64);
+        let mut now = scan(k, &[(a, 30.0), (b, 30.0)]);
+        if (a - b).abs() <= 8.0 {
+            let (left, right) = (a.min(b) - 4.0, a.max(b) + 4.0);
+            let mut blob = detection(0.5 * (a + b), 30.0);
+            blob.extent = Extent { left_px: left, top_px: 26.0, width_px: right - left, height_px: 8.0 };
+            now.detections = vec![blob];
+        }
+        let states = tracker.step(&now).unwrap();
+        if k >= 5 {
+            let confirmed: Vec<_> = states.iter().filter(|s| s.status != TrackStatus::Tentative).collect();
+            assert_eq!(confirmed.len(), 2, "scan {k}");
+            let mut places: Vec<_> = confirmed.iter().map(|s| (s.id.0, s.kinematics.mean[0])).collect();
+            places.sort_by_key(|p| p.0);
+            if ids.is_empty() {
+                ids = places.iter().map(|p| (p.0, (p.1 - a).abs() < (p.1 - b).abs())).collect();
+            }
+            for (place, (id, is_a)) in places.iter().zip(&ids) {
+                let truth = if *is_a { a } else { b };
+                assert!(place.0 == *id && (place.1 - truth).abs() < 1.5, "scan {k}: {places:?}, truth {a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_target_that_ends_inside_another_is_given_up_after_the_longest_time() {
+    let config = TrackerConfig {
+        sharing: Some(SharingConfig { longest_s: 0.8, ..SharingConfig::default() }),
+        ..TrackerConfig::default()
+    };
+    let mut tracker = track::build(&config).unwrap();
+    let mut alive = Vec::new();
+    for k in 0..60u64 {
+        // The second stops inside the first and is seen no more.
+        let b = 40.0 - k.min(15) as f64;
+        let points = if k < 14 { vec![(20.0, 30.0), (b, 30.0)] } else { vec![(20.0, 30.0)] };
+        let mut now = scan(k, &points);
+        if k >= 14 {
+            now.detections[0].extent = Extent { left_px: 14.0, top_px: 24.0, width_px: 14.0, height_px: 12.0 };
+        }
+        alive.push(tracker.step(&now).unwrap().len());
+    }
+    assert_eq!((alive[10], alive[59]), (2, 1), "{alive:?}");
+}

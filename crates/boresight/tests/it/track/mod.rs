@@ -1,0 +1,81 @@
+//! Robustness of association and tracking: random gates and scans, bad input, extremes.
+
+mod associators;
+mod extremes;
+mod merged;
+mod random_scans;
+
+use boresight::associate::{AssociatorConfig, jpda::Coalescence, jpda::JpdaConfig};
+use boresight::track::{
+    BirthConfig, ClutterConfig, ExistenceConfig, LifeConfig, MhtConfig, OverlapConfig, ScoreConfig, TermsConfig,
+    TrackerConfig, TwoStageConfig,
+};
+use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};
+use nalgebra::{Matrix2, Vector2};
+
+/// A detection with a box of 8 px and a score that tells it from its neighbours.
+pub fn detection(x: f64, y: f64) -> Detection {
+    Detection {
+        position: Vector2::new(x, y),
+        cov: Matrix2::identity() * 0.25,
+        extent: Extent { left_px: x - 4.0, top_px: y - 4.0, width_px: 8.0, height_px: 8.0 },
+        area_px: 64,
+        peak: 100.0,
+        sum: 6400.0,
+        score: 0.9,
+        class: None,
+    }
+}
+
+/// A scan at 25 scans a second.
+pub fn scan(k: u64, points: &[(f64, f64)]) -> Scan {
+    Scan {
+        index: FrameIndex(k),
+        time: Timestamp::from_ns(k as i64 * 40_000_000),
+        detections: points.iter().map(|p| detection(p.0, p.1)).collect(),
+        ..Scan::default()
+    }
+}
+
+/// Every associator.
+pub fn associators() -> Vec<AssociatorConfig> {
+    use boresight::associate::global_nearest::{CostKind, GlobalNearestConfig};
+    vec![
+        AssociatorConfig::Nearest(Default::default()),
+        AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Distance }),
+        AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Likelihood }),
+        AssociatorConfig::Pda(Default::default()),
+        AssociatorConfig::Jpda(JpdaConfig::default()),
+        AssociatorConfig::Jpda(JpdaConfig { coalescence: Coalescence::None, ..JpdaConfig::default() }),
+        AssociatorConfig::Jpda(JpdaConfig { coalescence: Coalescence::None, max_states: 1 }),
+    ]
+}
+
+/// Trackers that between them use every associator, life, birth, clutter estimate and term, and MHT.
+pub fn trackers() -> Vec<TrackerConfig> {
+    let base = TrackerConfig { max_speed_px_per_s: 300.0, ..TrackerConfig::default() };
+    let mut out: Vec<TrackerConfig> =
+        associators().into_iter().map(|associator| TrackerConfig { associator, ..base.clone() }).collect();
+    for life in [LifeConfig::Score(ScoreConfig::default()), LifeConfig::Existence(ExistenceConfig::default())] {
+        let associator = AssociatorConfig::Jpda(JpdaConfig::default());
+        out.push(TrackerConfig { life: life.clone(), ..base.clone() });
+        out.push(TrackerConfig { life, associator, ..base.clone() });
+    }
+    for birth in [BirthConfig::OnePoint(Default::default()), BirthConfig::VelocityBounds(Default::default())] {
+        out.push(TrackerConfig { birth, ..base.clone() });
+    }
+    for clutter in [ClutterConfig::PerScan(Default::default()), ClutterConfig::Map(Default::default())] {
+        let associator = AssociatorConfig::Pda(Default::default());
+        out.push(TrackerConfig { clutter, associator, ..base.clone() });
+    }
+    let terms = TermsConfig {
+        size_log_std: Some(0.3),
+        intensity_log_std: Some(0.3),
+        class_cost: Some(10.0),
+        overlap: Some(OverlapConfig { buffer: 0.3, ..OverlapConfig::default() }),
+        learn: true,
+    };
+    out.push(TrackerConfig { terms, two_stage: Some(TwoStageConfig::default()), ..base.clone() });
+    out.push(TrackerConfig { mht: Some(MhtConfig::default()), ..base });
+    out
+}
