@@ -1,8 +1,6 @@
 //! Golden vectors, read from the folder named by `BORESIGHT_GOLDEN` (default `../shared/spec/golden` beside the repository).
 //! One submodule a room; each reads its own files with [`cases`].
 
-#![allow(dead_code)] // until every room reads its vectors
-
 mod fuse;
 mod sim;
 mod spatial;

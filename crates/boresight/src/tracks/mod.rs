@@ -4,8 +4,13 @@
 //! differently from the official kits); [`PixelOrigin`] says how to get to boresight's own pixel coordinates.
 //! Columns that hold one value throughout take no memory: a million rows of boxes fit into 36 MB.
 
+mod builder;
+mod column;
+
+pub use builder::TrackTableBuilder;
+pub use column::Column;
+
 use crate::{Error, ErrorKind, Extent, Result};
-use std::collections::HashMap;
 use std::ops::Range;
 
 /// What a table's coordinates count from.
@@ -36,49 +41,6 @@ impl PixelOrigin {
             Self::Centre0 | Self::Pixel0 => 0.0,
             Self::Pixel1 => 1.0,
         }
-    }
-}
-
-/// A column of values that takes no memory while all of them are equal.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Column<T> {
-    /// Every row holds this value.
-    Constant(T),
-    /// One value a row.
-    Values(Vec<T>),
-}
-
-impl<T: Copy + PartialEq> Column<T> {
-    /// The value of a row.
-    pub fn get(&self, row: usize) -> T {
-        match self {
-            Self::Constant(v) => *v,
-            Self::Values(v) => v[row],
-        }
-    }
-
-    /// Adds a row's value; `n_before` is the number of rows already there.
-    pub fn push(&mut self, value: T, n_before: usize) {
-        match self {
-            Self::Constant(v) if n_before == 0 => *v = value,
-            Self::Constant(v) if *v == value => {}
-            Self::Constant(v) => {
-                let mut all = vec![*v; n_before];
-                all.push(value);
-                *self = Self::Values(all);
-            }
-            Self::Values(all) => all.push(value),
-        }
-    }
-
-    fn reorder(&mut self, order: &[u32]) {
-        if let Self::Values(v) = self {
-            *v = order.iter().map(|&i| v[i as usize]).collect();
-        }
-    }
-
-    fn keep(&mut self, rows: &[u32]) {
-        self.reorder(rows);
     }
 }
 
@@ -311,154 +273,6 @@ impl TrackTable {
             }
         }
         None
-    }
-}
-
-/// Collects the rows of a [`TrackTable`].
-#[derive(Debug)]
-pub struct TrackTableBuilder {
-    table: TrackTable,
-    frames: Vec<u32>,
-    of_id: HashMap<i64, u32>,
-    last: (i64, u32),
-    sorted: bool,
-}
-
-impl TrackTableBuilder {
-    /// An empty table.
-    pub fn new(label: impl Into<String>, origin: PixelOrigin) -> Self {
-        let table = TrackTable {
-            label: label.into(),
-            origin,
-            is_points: false,
-            boxes: Vec::new(),
-            tracks: Vec::new(),
-            ids: Vec::new(),
-            score: Column::Constant(1.0),
-            class: Column::Constant(1),
-            visibility: Column::Constant(1.0),
-            truncation: Column::Constant(0.0),
-            occlusion: Column::Constant(0),
-            ignore: Vec::new(),
-            extra: Vec::new(),
-            starts: vec![0],
-        };
-        Self { table, frames: Vec::new(), of_id: HashMap::new(), last: (i64::MIN, u32::MAX), sorted: true }
-    }
-
-    /// Makes room for rows to come.
-    pub fn reserve(&mut self, rows: usize) {
-        self.table.boxes.reserve(rows);
-        self.table.tracks.reserve(rows);
-        self.frames.reserve(rows);
-    }
-
-    /// Says that the rows are points.
-    pub fn points(&mut self) {
-        self.table.is_points = true;
-    }
-
-    /// Adds a region that does not count.
-    pub fn push_ignore(&mut self, frame: u32, bbox: [f64; 4]) {
-        self.table.ignore.push((frame, bbox));
-    }
-
-    /// Adds a further column; its values are given with [`TrackTableBuilder::push_extra`].
-    pub fn add_extra(&mut self, name: impl Into<String>) {
-        self.table.extra.push((name.into(), Vec::new()));
-    }
-
-    /// Adds the value of a further column for the row pushed last.
-    pub fn push_extra(&mut self, column: usize, value: &str) {
-        if let Some((_, values)) = self.table.extra.get_mut(column) {
-            values.push(value.to_string());
-        }
-    }
-
-    /// Number of rows so far.
-    pub fn n_rows(&self) -> usize {
-        self.frames.len()
-    }
-
-    /// Adds a row.
-    /// # Errors
-    /// A box or score that is not finite; more rows than 2³² − 1.
-    pub fn push(&mut self, row: &TrackRow) -> Result<()> {
-        if !row.bbox.iter().all(|v| v.is_finite()) {
-            return Err(Error::new(ErrorKind::Damaged, "expected finite coordinates"));
-        }
-        let n = self.frames.len();
-        if n >= u32::MAX as usize {
-            return Err(Error::new(ErrorKind::Unsupported, "more than 4 294 967 295 rows"));
-        }
-        self.sorted &= self.frames.last().is_none_or(|&f| f <= row.frame);
-        if self.last.0 != row.id || self.last.1 == u32::MAX {
-            let next = self.table.ids.len() as u32;
-            let t = *self.of_id.entry(row.id).or_insert(next);
-            if t == next {
-                self.table.ids.push(row.id);
-            }
-            self.last = (row.id, t);
-        }
-        self.frames.push(row.frame);
-        self.table.tracks.push(self.last.1);
-        self.table.boxes.push(row.bbox);
-        self.table.score.push(row.score, n);
-        self.table.class.push(row.class, n);
-        self.table.visibility.push(row.visibility, n);
-        self.table.truncation.push(row.truncation, n);
-        self.table.occlusion.push(row.occlusion, n);
-        Ok(())
-    }
-
-    /// Sorts the rows by frame and the ids by number; the table is at least `min_frames` long.
-    /// # Errors
-    /// A frame number above 10⁸, which no sequence reaches and which would eat the memory.
-    pub fn finish(mut self, min_frames: usize) -> Result<TrackTable> {
-        let n_frames = self.frames.iter().max().map_or(0, |&f| f as usize + 1).max(min_frames);
-        if n_frames > 100_000_000 {
-            return Err(Error::new(ErrorKind::Damaged, format!("frame number {} is above 100 000 000", n_frames - 1))
-                .at(&self.table.label)
-                .hint("is the frame column really the frame?"));
-        }
-        let mut starts = vec![0_u32; n_frames + 1];
-        for &f in &self.frames {
-            starts[f as usize + 1] += 1;
-        }
-        for f in 0..n_frames {
-            starts[f + 1] += starts[f];
-        }
-        let t = &mut self.table;
-        if !self.sorted {
-            let mut next = starts.clone();
-            let mut order = vec![0_u32; self.frames.len()];
-            for (i, &f) in self.frames.iter().enumerate() {
-                order[next[f as usize] as usize] = i as u32;
-                next[f as usize] += 1;
-            }
-            t.boxes = order.iter().map(|&i| t.boxes[i as usize]).collect();
-            t.tracks = order.iter().map(|&i| t.tracks[i as usize]).collect();
-            t.score.reorder(&order);
-            t.class.reorder(&order);
-            t.visibility.reorder(&order);
-            t.truncation.reorder(&order);
-            t.occlusion.reorder(&order);
-            for (_, v) in &mut t.extra {
-                *v = order.iter().map(|&i| std::mem::take(&mut v[i as usize])).collect();
-            }
-        }
-        let mut by_id: Vec<u32> = (0..t.ids.len() as u32).collect();
-        by_id.sort_unstable_by_key(|&i| t.ids[i as usize]);
-        let mut rank = vec![0_u32; by_id.len()];
-        for (new, &old) in by_id.iter().enumerate() {
-            rank[old as usize] = new as u32;
-        }
-        t.ids.sort_unstable();
-        for track in &mut t.tracks {
-            *track = rank[*track as usize];
-        }
-        t.starts = starts;
-        Ok(self.table)
     }
 }
 
