@@ -1,16 +1,26 @@
 //! `boresight convert`: a table of tracks from one format into another, saying what is lost.
 
-use boresight::io::tracks::{Format, ReadOptions, read, write};
+use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc_write, read, write};
 use boresight::{Error, ErrorKind};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Converts a table of tracks into another format.
 #[derive(Debug, clap::Args)]
+#[command(
+    long_about = "Converts a table of tracks into another format, and says what the other one cannot hold.\n\n\
+Frames and pixels are counted as each format does (MOTChallenge from 1, all others from 0): the same place in the image \
+stays the same place.",
+    after_help = "Examples:
+  boresight convert out/tracks.csv result.txt --to mot         for a MOTChallenge evaluation
+  boresight convert 0006.txt cars.csv --to csv                 KITTI labels, all columns kept
+  boresight convert spots.csv RES --to ctc --size 1024x1024    a folder of label images and res_track.txt
+  boresight convert gt.txt - --to trackpy --lossless           fails if a column would be lost"
+)]
 pub struct Args {
     /// The table: MOTChallenge, KITTI, CSV with named columns, or a Cell Tracking Challenge folder.
     input: PathBuf,
-    /// Where to write; - is standard output.
+    /// Where to write: a file, a folder for ctc, or - for standard output.
     output: PathBuf,
     /// Format to write.
     #[arg(long, value_parser = super::evaluate::format)]
@@ -27,6 +37,9 @@ pub struct Args {
     /// Frames of a MOTChallenge input count from 0 in the file.
     #[arg(long)]
     from_zero: bool,
+    /// Size of the label images of ctc as WIDTHxHEIGHT, px; without it they reach to the last row.
+    #[arg(long, value_parser = super::evaluate::size)]
+    size: Option<(f64, f64)>,
     /// Fail if anything would be lost.
     #[arg(long)]
     lossless: bool,
@@ -42,7 +55,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         eprintln!("note: {} malformed rows left out; the first: {first}", file.bad.count);
     }
     let mut bytes = Vec::new();
-    let dropped = write(&file.table, args.to, &mut bytes)?;
+    let to_folder = args.to == Format::Ctc;
+    let dropped = if to_folder { to_ctc(&args, &file)? } else { write(&file.table, args.to, &mut bytes)? };
     if !dropped.is_empty() {
         let what = format!("{} does not hold: {}", args.to.name(), dropped.join(", "));
         if args.lossless {
@@ -55,17 +69,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if args.output.as_os_str() == "-" {
         super::print(&bytes)?;
-    } else {
+        return Ok(ExitCode::SUCCESS);
+    }
+    if !to_folder {
         std::fs::write(&args.output, &bytes)
             .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(args.output.display()).because(e))?;
-        eprintln!(
-            "{} rows of {} tracks in {} frames: {} -> {}",
-            file.table.n_rows(),
-            file.table.n_tracks(),
-            file.table.n_frames(),
-            file.format.name(),
-            args.to.name()
-        );
     }
+    eprintln!(
+        "{} rows of {} tracks in {} frames: {} -> {}",
+        file.table.n_rows(),
+        file.table.n_tracks(),
+        file.table.n_frames(),
+        file.format.name(),
+        args.to.name()
+    );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a folder of label images.
+fn to_ctc(args: &Args, file: &TrackFile) -> boresight::Result<Vec<String>> {
+    if args.output.as_os_str() == "-" || args.output.is_file() {
+        return Err(Error::new(ErrorKind::Config, "expected a folder: ctc is a table and an image for each frame")
+            .at(args.output.display()));
+    }
+    let size = args.size.map(|(w, h)| (w as usize, h as usize));
+    let dropped = ctc_write::write_folder(&file.table, None, size)?;
+    if args.lossless && !dropped.is_empty() {
+        return Ok(dropped);
+    }
+    ctc_write::write_folder(&file.table, Some(&args.output), size)
 }

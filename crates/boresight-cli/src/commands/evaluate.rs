@@ -1,17 +1,22 @@
 //! `boresight evaluate`: how good is a result against the truth, by every measure of the field.
 
+mod cells;
 mod compare;
 mod html;
+mod images;
 mod measures;
+mod plot;
 mod sequences;
+mod state;
 mod table;
+mod values;
 
 use anyhow::{Context, bail};
 use boresight::io::tracks::Format;
 use boresight::metrics::{KittiClass, MatchOptions, Rules, Similarity};
 use clap::ValueEnum;
 use measures::Judged;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Judges results against the truth.
@@ -19,7 +24,17 @@ use std::process::ExitCode;
 #[command(long_about = "Judges results against the truth.\n\n\
 TRUTH and RESULT are tables (MOTChallenge, KITTI, CSV with named columns, Cell Tracking Challenge folders), told by their \
 look. For several sequences give folders (TRUTH/SEQ/gt/gt.txt or TRUTH/SEQ/gt.txt, RESULT/SEQ.txt) or paths with {seq} \
-where the names of the sequences stand: 'data/{seq}/gt.txt' 'data/{seq}/result.txt'.")]
+where the names of the sequences stand: 'data/{seq}/gt.txt' 'data/{seq}/result.txt'. Two images, folders of images or \
+videos are compared pixel by pixel.")]
+#[command(after_help = "Examples:
+  boresight evaluate gt.txt result.txt                              every measure of one result
+  boresight evaluate 'mot17/{seq}/gt.txt' 'mine/{seq}.txt' --mot-only     CLEAR, identity and HOTA of many sequences
+  boresight evaluate gt/ mine/ --compare theirs/ --html report.html  side by side, with confidence intervals and plots
+  boresight evaluate gt.txt result.txt --require HOTA=0.4            exit code 1 if it is not met
+  boresight evaluate sim/truth.csv out/tracks.csv --detections out/detections.csv --bound 0.5,1e-5
+                                                                    state errors, NEES, NIS, ratio to the bound
+  boresight evaluate clean.png filtered.png                         MSE, RMSE, MAE, PFE, SNR, PSNR
+Each measure is explained in docs/evaluate.md.")]
 pub struct Args {
     /// The truth: a table, a folder of sequences, or a path with {seq}.
     truth: String,
@@ -55,7 +70,26 @@ pub struct Args {
     /// Order p of OSPA and GOSPA.
     #[arg(long, default_value_t = 2.0)]
     order: f64,
-    /// Window of OSPA(2), frames.
+    /// Switch cost of trajectory GOSPA, px; half the cutoff if not given.
+    #[arg(long)]
+    switch_cost: Option<f64>,
+    /// Unknowns of a window up to which trajectory GOSPA is computed; with more it takes long.
+    #[arg(long, default_value_t = 10_000)]
+    max_unknowns: usize,
+    /// Detections that the result was made from (boresight's detections.csv, {seq} allowed), for the NIS.
+    #[arg(long)]
+    detections: Option<String>,
+    /// Measurement noise that the tracker added to the detections' own (tracker.extra-noise-px), px, for the NIS.
+    #[arg(long, default_value_t = 0.0)]
+    extra_noise: f64,
+    /// Posterior Cramer-Rao bound of a constant-velocity target: variance of a measurement per axis (px²), density of its
+    /// acceleration (px²/s³), and if wanted its probability of detection: R,Q or R,Q,PD.
+    #[arg(long, value_name = "R,Q[,PD]", value_parser = bound)]
+    bound: Option<[f64; 3]>,
+    /// Largest value a pixel can have, for the PSNR of images; 255 or 65535 by their type if not given.
+    #[arg(long)]
+    peak: Option<f64>,
+    /// Window of OSPA(2) and trajectory GOSPA, frames.
     #[arg(long, default_value_t = 50)]
     window: usize,
     /// Assign OSPA by plain distances, as Stone Soup does, instead of by their p-th powers.
@@ -142,12 +176,26 @@ pub fn format(text: &str) -> Result<Format, String> {
     Format::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| format!("expected one of {}", names.join(", ")))
 }
 
-fn size(text: &str) -> Result<(f64, f64), String> {
+/// Parses WIDTHxHEIGHT.
+pub fn size(text: &str) -> Result<(f64, f64), String> {
     let (w, h) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, for instance 640x512")?;
     match (w.parse::<f64>(), h.parse::<f64>()) {
         (Ok(w), Ok(h)) if w > 0.0 && h > 0.0 && w.is_finite() && h.is_finite() => Ok((w, h)),
         _ => Err("expected WIDTHxHEIGHT, for instance 640x512".into()),
     }
+}
+
+fn bound(text: &str) -> Result<[f64; 3], String> {
+    let expected = "expected R,Q or R,Q,PD: R above 0, Q from 0 on, PD in (0, 1], for instance 0.5,1e-5";
+    let v: Vec<f64> =
+        text.split(',').map(|v| v.trim().parse()).collect::<Result<_, _>>().map_err(|_| expected.to_string())?;
+    let [r, q, p_d] = match v[..] {
+        [r, q] => [r, q, 1.0],
+        [r, q, p_d] => [r, q, p_d],
+        _ => return Err(expected.into()),
+    };
+    let good = r > 0.0 && r.is_finite() && q >= 0.0 && q.is_finite() && p_d > 0.0 && p_d <= 1.0;
+    if good { Ok([r, q, p_d]) } else { Err(expected.into()) }
 }
 
 fn demand(text: &str) -> Result<(String, f64), String> {
@@ -202,6 +250,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.distance > 0.0 && args.distance.is_finite()) {
         bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
     }
+    if images::are_frames(&args.truth) && images::are_frames(&args.result) {
+        return images::run(&args);
+    }
     let mut results = Vec::with_capacity(1 + args.compare.len());
     for result in std::iter::once(&args.result).chain(&args.compare) {
         let found = sequences::find(&args.truth, result)?;
@@ -222,31 +273,36 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     demands(&args, &results[0])
 }
 
+fn put(path: &Path, text: &str) -> boresight::Result<()> {
+    std::fs::write(path, text).map_err(|e| {
+        boresight::Error::new(boresight::ErrorKind::Output, "cannot be written").at(path.display()).because(e)
+    })
+}
+
 fn write_files(args: &Args, results: &[Judged], comparison: &[compare::Row]) -> anyhow::Result<()> {
-    let put = |path: &PathBuf, bytes: String| {
-        std::fs::write(path, bytes).map_err(|e| {
-            boresight::Error::new(boresight::ErrorKind::Output, "cannot be written").at(path.display()).because(e)
-        })
-    };
     if let Some(path) = &args.csv {
-        put(path, table::csv(results))?;
+        put(path, &table::csv(results))?;
     }
     if let Some(path) = &args.json {
         let value = serde_json::json!({
             "results": results.iter().map(Judged::to_json).collect::<Vec<_>>(),
             "comparison": comparison,
         });
-        put(path, serde_json::to_string_pretty(&value).context("scores as JSON")?)?;
+        put(path, &serde_json::to_string_pretty(&value).context("scores as JSON")?)?;
     }
     if let Some(path) = &args.html {
-        put(path, html::report(results, comparison))?;
+        put(path, &html::report(results, comparison))?;
     }
     Ok(())
 }
 
 fn demands(args: &Args, judged: &Judged) -> anyhow::Result<ExitCode> {
+    met(args, &judged.combined_values())
+}
+
+/// Whether the demands are met, as an exit code.
+fn met(args: &Args, combined: &[(&'static str, f64)]) -> anyhow::Result<ExitCode> {
     let mut met = true;
-    let combined = judged.combined_values();
     for (name, limit) in &args.require {
         let Some((key, value)) = combined.iter().find(|(k, _)| k.eq_ignore_ascii_case(name)) else {
             let known: Vec<&str> = combined.iter().map(|c| c.0).collect();
@@ -256,7 +312,7 @@ fn demands(args: &Args, judged: &Judged) -> anyhow::Result<ExitCode> {
                     .hint(format!("one of {}", known.join(", ")))
             );
         };
-        let at_most = measures::lower_is_better(key);
+        let at_most = values::lower_is_better(key);
         let ok = if at_most { *value <= *limit } else { *value >= *limit };
         if !ok {
             met = false;

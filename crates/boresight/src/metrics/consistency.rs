@@ -21,6 +21,31 @@ pub fn normalised_square<const N: usize>(error: &SVector<f64, N>, cov: &SMatrix<
     Ok(error.dot(&factor.solve(error)))
 }
 
+/// NIS of an update from what it left behind: the measurement's residual z − H x⁺ against the state after the update.
+///
+/// For a linear update with the whole gain, z − H x⁺ = R S⁻¹ ν and H P⁺ Hᵀ = R − R S⁻¹ R, so that the residual's normalised
+/// square by R − H P⁺ Hᵀ is νᵀ S⁻¹ ν: tables that keep only states and detections still tell the NIS.
+/// ```
+/// use nalgebra::{Matrix2, Vector2};
+/// // One axis of each kind: P = 3 and 1 before, R = 1, innovation (2, −1): NIS = 4/4 + 1/2.
+/// let (p, r, v) = ([3.0, 1.0], 1.0, [2.0, -1.0]);
+/// let gain = p.map(|p| p / (p + r));
+/// let residual = Vector2::new((1.0 - gain[0]) * v[0], (1.0 - gain[1]) * v[1]);
+/// let after = Matrix2::new((1.0 - gain[0]) * p[0], 0.0, 0.0, (1.0 - gain[1]) * p[1]);
+/// let nis = boresight::metrics::consistency::nis_of_residual(&residual, &(Matrix2::identity() * r), &after)?;
+/// assert!((nis - 1.5).abs() < 1e-12);
+/// # Ok::<(), boresight::Error>(())
+/// ```
+/// # Errors
+/// [`ErrorKind::Numeric`] if the state is not better known than the measurement: it was not the update of this measurement.
+pub fn nis_of_residual<const N: usize>(
+    residual: &SVector<f64, N>,
+    measurement_cov: &SMatrix<f64, N, N>,
+    posterior_cov: &SMatrix<f64, N, N>,
+) -> Result<f64> {
+    normalised_square(residual, &(measurement_cov - posterior_cov))
+}
+
 /// An average of normalised squares beside what a consistent filter would give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Consistency {

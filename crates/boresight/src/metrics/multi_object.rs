@@ -39,6 +39,8 @@ pub struct Scores {
     pub n_truth_rows: u64,
     /// Result rows.
     pub n_result_rows: u64,
+    /// Frames, those of an empty truth or result included.
+    pub n_frames: u64,
     /// Truth tracks.
     pub n_truths: u64,
     /// Result tracks.
@@ -54,6 +56,7 @@ impl Scores {
             hota: Hota::combined(all.iter().map(|s| &s.hota)),
             n_truth_rows: all.iter().map(|s| s.n_truth_rows).sum(),
             n_result_rows: all.iter().map(|s| s.n_result_rows).sum(),
+            n_frames: all.iter().map(|s| s.n_frames).sum(),
             n_truths: all.iter().map(|s| s.n_truths).sum(),
             n_results: all.iter().map(|s| s.n_results).sum(),
         }
@@ -157,6 +160,7 @@ pub fn evaluate(truth: &TrackTable, result: &TrackTable, options: &MatchOptions)
         hota,
         n_truth_rows,
         n_result_rows,
+        n_frames: n_frames as u64,
         n_truths: truth.n_tracks() as u64,
         n_results: result.n_tracks() as u64,
     })

@@ -1,8 +1,9 @@
 //! Several results side by side, with bootstrap confidence intervals.
 
 use super::Args;
-use super::measures::{Judged, mot_values};
+use super::measures::Judged;
 use super::table::aligned;
+use super::values::mot_values;
 use boresight::metrics::bootstrap::{Compared, compare as bootstrap};
 use boresight::metrics::{MatchOptions, Scores, evaluate};
 use boresight::{Result, TrackTable};

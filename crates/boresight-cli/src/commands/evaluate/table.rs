@@ -1,6 +1,8 @@
 //! The scores as tables: for the terminal and as CSV.
 
-use super::measures::{Judged, mot_values};
+use super::measures::Judged;
+use super::state;
+use super::values::mot_values;
 use std::fmt::Write;
 
 const COUNTS: [&str; 7] = ["FP", "FN", "IDSW", "Frag", "MT", "PT", "ML"];
@@ -75,19 +77,12 @@ pub fn sequences(judged: &Judged, mot_only: bool) -> String {
         }
     }
     for row in &judged.rows {
-        if let Some(n) = &row.nees {
-            let _ = writeln!(
-                out,
-                "{}: position NEES {:.3} over {} rows, expected {} within {:.3} to {:.3} (95 %): {}",
-                row.name,
-                n.average,
-                n.n,
-                n.expected,
-                n.lower,
-                n.upper,
-                n.verdict()
-            );
+        for line in row.state.iter().flat_map(state::StateScores::sentences) {
+            let _ = writeln!(out, "{}: {line}", row.name);
         }
+    }
+    if let Some(line) = state::over_runs(judged.rows.iter().filter_map(|r| r.state.as_ref())).sentence() {
+        let _ = writeln!(out, "{line}");
     }
     out
 }

@@ -89,13 +89,25 @@ impl CtcFolder {
         }
     }
 
-    /// The cells as a table: centroid boxes of each label in each frame.
+    /// The cells as a table: the box of each label in each frame; `parents` keeps the parents' labels as a column `parent`.
     /// # Errors
-    /// As [`CtcFolder::labels`].
-    pub fn table(&self, label: impl Into<String>) -> Result<TrackTable> {
+    /// As [`CtcFolder::labels`]; two images of different sizes.
+    pub fn table(&self, label: impl Into<String>, parents: bool) -> Result<TrackTable> {
         let mut b = TrackTableBuilder::new(label, PixelOrigin::Centre0);
+        let parents = parents && self.lineages.iter().any(|l| l.parent != 0);
+        if parents {
+            b.add_extra("parent");
+        }
+        let mut size = None;
         for &frame in self.images.keys() {
             let Some(image) = self.labels(frame)? else { continue };
+            let here = (image.width(), image.height());
+            let first = *size.get_or_insert(here);
+            if here != first {
+                let what = format!("is {} x {} px, those before {} x {}", here.0, here.1, first.0, first.1);
+                let place = self.images.get(&frame).map_or(String::new(), |p| p.display().to_string());
+                return Err(Error::new(ErrorKind::Damaged, what).at(place));
+            }
             let mut bounds: BTreeMap<u16, [usize; 4]> = BTreeMap::new();
             for y in 0..image.height() {
                 for (x, &v) in image.row(y).iter().enumerate().filter(|(_, v)| **v != 0) {
@@ -106,6 +118,10 @@ impl CtcFolder {
             for (v, [x0, y0, x1, y1]) in bounds {
                 let bbox = [x0 as f64 - 0.5, y0 as f64 - 0.5, (x1 - x0 + 1) as f64, (y1 - y0 + 1) as f64];
                 b.push(&TrackRow { frame, id: i64::from(v), bbox, ..TrackRow::default() })?;
+                if parents {
+                    let known = self.lineages.iter().find(|l| l.label == u32::from(v) && l.parent != 0);
+                    b.push_extra(0, &known.map_or(String::new(), |l| l.parent.to_string()));
+                }
             }
         }
         b.finish(self.n_frames() as usize)
@@ -141,20 +157,6 @@ pub fn read_lineages(path: &Path) -> Result<Vec<Lineage>> {
         return Err(Error::new(ErrorKind::Damaged, format!("label {} stands twice", w[0].label)).at(path.display()));
     }
     Ok(out)
-}
-
-/// The lineages of a table without parents, as lines of `res_track.txt`.
-pub fn lineages_of(table: &TrackTable) -> Vec<Lineage> {
-    let mut out: Vec<Option<Lineage>> = vec![None; table.n_tracks()];
-    for frame in 0..table.n_frames() {
-        for r in table.rows(frame) {
-            let t = table.tracks[r] as usize;
-            let f = frame as u32;
-            let label = t as u32 + 1;
-            out[t].get_or_insert(Lineage { label, begin: f, end: f, parent: 0 }).end = f;
-        }
-    }
-    out.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -3,10 +3,12 @@
 //! [`read`] finds the format by the look of the file; [`write()`] says what the target cannot hold.
 
 pub mod ctc;
+pub mod ctc_write;
 pub mod kitti;
 pub mod lines;
 pub mod mot;
 pub mod named;
+pub mod named_write;
 
 pub use lines::{BadRows, ReadOptions};
 pub use named::Dialect;
@@ -122,44 +124,60 @@ pub fn read(path: &Path, format: Option<Format>, options: ReadOptions, tentative
         Format::Mot | Format::MotTruth => mot::read(path, options)?,
         Format::Kitti => kitti::read(path, options)?,
         Format::Named(_) => named::read(path, options, tentative)?,
-        Format::Ctc => (ctc::CtcFolder::open(path)?.table(path.display().to_string())?, BadRows::default()),
+        Format::Ctc => {
+            (ctc::CtcFolder::open(path)?.table(path.display().to_string(), options.keep_extra)?, BadRows::default())
+        }
     };
     Ok(TrackFile { table, format, bad })
 }
 
+/// What a format is said to lose that has no regions.
+pub(crate) const REGIONS: &str = "regions that do not count";
+
+/// The columns of a table that say anything and are not among those that a format holds.
+pub(crate) fn lost(table: &TrackTable, held: &[&str]) -> Vec<String> {
+    use crate::tracks::Column::Constant;
+    let all = [
+        ("score", table.score != Constant(1.0)),
+        ("class", table.class != Constant(1)),
+        ("visibility", table.visibility != Constant(1.0)),
+        ("truncation", table.truncation != Constant(0.0)),
+        ("occlusion", table.occlusion != Constant(0)),
+        (REGIONS, !table.ignore.is_empty()),
+    ];
+    all.into_iter().filter(|(n, says)| *says && !held.contains(n)).map(|(n, _)| n.to_string()).collect()
+}
+
 /// Writes a table; the names of what the format cannot hold are returned.
 /// # Errors
-/// A format that is not written (label images cannot be made of boxes); what the writer fails with.
+/// The Cell Tracking Challenge's format, which is a folder ([`ctc_write::write_folder`]); what the writer fails with.
 pub fn write(table: &TrackTable, format: Format, out: &mut impl Write) -> Result<Vec<String>> {
     match format {
         Format::Mot | Format::MotTruth => {
-            let mut dropped: Vec<String> = table.extra.iter().map(|e| e.0.clone()).collect();
-            if format == Format::Mot && table.class != crate::tracks::Column::Constant(1) {
-                dropped.push("class".into());
+            let truth = format == Format::MotTruth;
+            let held: &[&str] = if truth { &["score", "class", "visibility"] } else { &["score"] };
+            let mut dropped = lost(table, held);
+            let names = table.extra.iter().map(|e| e.0.clone());
+            dropped.extend(names.filter(|n| truth || !mot::WORLD.contains(&n.as_str())));
+            if table.is_points {
+                dropped.push("that rows are points (they become boxes without size)".into());
             }
-            if format == Format::Mot && table.visibility != crate::tracks::Column::Constant(1.0) {
-                dropped.push("visibility".into());
-            }
-            if !table.ignore.is_empty() {
-                dropped.push("regions that do not count".into());
-            }
-            mot::write(table, format == Format::MotTruth, out)?;
+            mot::write(table, truth, out)?;
             Ok(dropped)
         }
-        Format::Kitti => kitti::write(table, out),
-        Format::Named(dialect) => {
-            let mut dropped = named::write(table, dialect, out)?;
-            if !table.ignore.is_empty() {
-                dropped.push("regions that do not count".into());
+        Format::Kitti => {
+            let mut dropped = lost(table, &["score", "class", "truncation", "occlusion", REGIONS]);
+            if table.is_points {
+                dropped.push("that rows are points (they become boxes without size)".into());
             }
+            dropped.extend(kitti::write(table, out)?);
             Ok(dropped)
         }
+        Format::Named(dialect) => named_write::write(table, dialect, out),
         Format::Ctc => {
-            let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
-            for l in ctc::lineages_of(table) {
-                writeln!(out, "{} {} {} {}", l.label, l.begin, l.end, l.parent).map_err(failed)?;
-            }
-            Ok(vec!["positions (label images are not made of boxes; only the table of lineages is written)".into()])
+            Err(Error::new(ErrorKind::Unsupported, "the Cell Tracking Challenge's format is a folder of label images")
+                .at(&table.label)
+                .hint("give a folder as the output"))
         }
     }
 }

@@ -1,14 +1,17 @@
 //! MOTChallenge tables: frame, id, left, top, width, height, confidence, class, visibility (or x, y, z), counted from 1.
 //!
 //! Source: A. Milan et al., *MOT16: a benchmark for multi-object tracking*, arXiv 1603.00831, and the files themselves.
-//! In a truth, column 7 says whether the row counts; column 8 is a class in MOT16 and later and a world coordinate
-//! (or -1) in MOT15. In a result, column 7 is the confidence and the rest is -1.
+//! In a truth, column 7 says whether the row counts; of nine columns, the last two are class and visible share (MOT16 and
+//! later); of ten, the last three are a place in the world, or -1 (MOT15, results). In a result, column 7 is the confidence.
 //! Limits: frames and pixels count from 1 in the file; [`PixelOrigin::Pixel1`] and frames from 0 in the table.
 
 use super::lines::{BadRows, Fields, ReadOptions, each_line, separator};
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
 use std::io::Write;
 use std::path::Path;
+
+/// Names of the columns that hold a place in the world.
+pub const WORLD: [&str; 3] = ["world_x_m", "world_y_m", "world_z_m"];
 
 /// Reads a table; rows may stand in any order.
 /// # Errors
@@ -21,17 +24,30 @@ pub fn read(path: &Path, options: ReadOptions) -> Result<(TrackTable, BadRows)> 
         // About 40 bytes a row; a wrong guess only costs a move.
         table.reserve((meta.len() / 48).min(1 << 24) as usize);
     }
+    if options.keep_extra {
+        WORLD.iter().for_each(|n| table.add_extra(*n));
+    }
     each_line(path, |number, line| {
         if number == 1 || comma.is_none() {
             comma = separator(line);
         }
-        let pushed = row(Fields::new(line, comma), options.frames_from_zero).and_then(|r| table.push(&r));
+        let pushed = row(Fields::new(line, comma), options.frames_from_zero).and_then(|(r, world)| {
+            table.push(&r)?;
+            if options.keep_extra {
+                world.iter().enumerate().for_each(|(k, v)| table.push_extra(k, &v.to_string()));
+            }
+            Ok(())
+        });
         pushed.or_else(|e| bad.note(options, e.at(format!("{} line {number}", path.display()))))
     })?;
-    Ok((table.finish(0)?, bad))
+    let mut table = table.finish(0)?;
+    if table.extra.iter().all(|(_, values)| values.iter().all(|v| v == "-1")) {
+        table.extra.clear();
+    }
+    Ok((table, bad))
 }
 
-fn row(mut f: Fields<'_>, from_zero: bool) -> Result<TrackRow> {
+fn row(mut f: Fields<'_>, from_zero: bool) -> Result<(TrackRow, [f64; 3])> {
     let frame = f.integer("a frame number")? + i64::from(from_zero);
     if !(1..=100_000_000).contains(&frame) {
         let e = Error::new(ErrorKind::Damaged, format!("frame {frame}: expected a number from 1 to 100 000 000"));
@@ -47,22 +63,25 @@ fn row(mut f: Fields<'_>, from_zero: bool) -> Result<TrackRow> {
         *v = f.number(what)?;
     }
     let score = f.optional("a confidence")?.unwrap_or(1.0);
-    let class = f.optional("a class")?;
-    let visibility = f.optional("a visible share")?;
-    // MOT15 holds world coordinates (or -1) here: not a class.
-    let class = class.filter(|c| (1.0..=1e6).contains(c) && c.fract() == 0.0);
-    Ok(TrackRow {
+    let eighth = f.optional("a class or a place x")?;
+    let ninth = f.optional("a visible share or a place y")?;
+    // A tenth column tells that these are places in the world, or -1, and no class.
+    let tenth = f.optional("a place z")?;
+    let world = tenth.map_or([-1.0; 3], |z| [eighth.unwrap_or(-1.0), ninth.unwrap_or(-1.0), z]);
+    let class = eighth.filter(|c| tenth.is_none() && (1.0..=1e6).contains(c) && c.fract() == 0.0);
+    let row = TrackRow {
         frame: (frame - 1) as u32,
         id,
         bbox,
         score,
         class: class.map_or(1, |c| c as i32),
-        visibility: visibility.filter(|v| (0.0..=1.0).contains(v) && class.is_some()).unwrap_or(1.0),
+        visibility: ninth.filter(|v| (0.0..=1.0).contains(v) && class.is_some()).unwrap_or(1.0),
         ..TrackRow::default()
-    })
+    };
+    Ok((row, world))
 }
 
-/// Writes a table as a truth (`truth`: class and visibility in columns 8 and 9) or as a result (-1 there).
+/// Writes a table as a truth (`truth`: class and visibility in columns 8 and 9) or as a result (places in the world, or -1).
 /// # Errors
 /// What the writer fails with.
 pub fn write(table: &TrackTable, truth: bool, out: &mut impl Write) -> Result<()> {
@@ -71,6 +90,7 @@ pub fn write(table: &TrackTable, truth: bool, out: &mut impl Write) -> Result<()
         table.to_mut().set_origin(PixelOrigin::Pixel1);
     }
     let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
+    let world = WORLD.map(|n| table.extra.iter().find(|e| e.0 == n).map(|e| &e.1));
     for frame in 0..table.n_frames() {
         for r in table.rows(frame) {
             let [l, t, w, h] = table.boxes[r];
@@ -79,7 +99,8 @@ pub fn write(table: &TrackTable, truth: bool, out: &mut impl Write) -> Result<()
             if truth {
                 writeln!(out, ",{},{}", table.class.get(r), table.visibility.get(r)).map_err(failed)?;
             } else {
-                writeln!(out, ",-1,-1,-1").map_err(failed)?;
+                let [x, y, z] = world.map(|w| w.and_then(|w| w.get(r)).filter(|v| !v.is_empty()).map_or("-1", |v| v));
+                writeln!(out, ",{x},{y},{z}").map_err(failed)?;
             }
         }
     }
@@ -129,8 +150,12 @@ mod tests {
 
     #[test]
     fn world_coordinates_of_mot15_are_no_class() {
-        let f = file("1,1,1,1,5,5,1,-3.5,14.2,0\n1,2,1,1,5,5,1,-1,-1,-1\n");
-        let (t, _) = read(f.path(), ReadOptions::default()).unwrap();
+        let text = "1,1,1,1,5,5,1,3,14.2,0\n1,2,1,1,5,5,1,-1,-1,-1\n";
+        let f = file(text);
+        let (t, _) = read(f.path(), ReadOptions { keep_extra: true, ..ReadOptions::default() }).unwrap();
+        let mut out = Vec::new();
+        write(&t, false, &mut out).unwrap();
+        assert_eq!(std::str::from_utf8(&out).unwrap(), text);
         assert_eq!((t.class.get(0), t.class.get(1), t.visibility.get(0)), (1, 1, 1.0));
     }
 }

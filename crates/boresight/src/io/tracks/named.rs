@@ -7,7 +7,6 @@
 
 use super::lines::{BadRows, Fields, ReadOptions, each_line, number, separator};
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
-use std::io::Write;
 use std::path::Path;
 
 /// What a column means.
@@ -23,12 +22,15 @@ enum Meaning {
     Height,
     Score,
     Class,
+    Visibility,
+    Truncation,
+    Occlusion,
     Status,
     Other,
 }
 
 /// The names of each meaning, best first: `ID` is a track's number in btrack but a spot's in TrackMate.
-const NAMES: [(Meaning, &[&str]); 11] = [
+const NAMES: [(Meaning, &[&str]); 14] = [
     (Meaning::Frame, &["frame", "t", "frame_index"]),
     (Meaning::Id, &["track_id", "particle", "trackid", "id", "track"]),
     (Meaning::X, &["x_px", "position_x", "x", "cx"]),
@@ -39,6 +41,9 @@ const NAMES: [(Meaning, &[&str]); 11] = [
     (Meaning::Height, &["height_px", "bb_height", "height", "h"]),
     (Meaning::Score, &["score", "confidence", "conf", "quality"]),
     (Meaning::Class, &["class", "class_id"]),
+    (Meaning::Visibility, &["visibility"]),
+    (Meaning::Truncation, &["truncation"]),
+    (Meaning::Occlusion, &["occlusion"]),
     (Meaning::Status, &["status"]),
 ];
 
@@ -179,6 +184,9 @@ fn row(
             Meaning::Height => r.bbox[3] = fields.optional("a height")?.unwrap_or(0.0),
             Meaning::Score => r.score = fields.optional("a score")?.unwrap_or(1.0),
             Meaning::Class => r.class = fields.optional("a class number")?.unwrap_or(1.0) as i32,
+            Meaning::Visibility => r.visibility = fields.optional("a visible share")?.unwrap_or(1.0),
+            Meaning::Truncation => r.truncation = fields.optional("a truncation")?.unwrap_or(0.0),
+            Meaning::Occlusion => r.occlusion = fields.optional("an occlusion")?.unwrap_or(0.0) as i32,
             Meaning::Status | Meaning::Other => {
                 let text = fields.field().unwrap_or(b"");
                 if meaning == Meaning::Status && !tentative && text == b"tentative" {
@@ -193,71 +201,6 @@ fn row(
     r.bbox[0] = left.or(x.map(|x| x - r.bbox[2] / 2.0)).unwrap_or(0.0);
     r.bbox[1] = top.or(y.map(|y| y - r.bbox[3] / 2.0)).unwrap_or(0.0);
     Ok(Some(r))
-}
-
-/// Writes a table; the names of what the dialect cannot hold are returned.
-/// # Errors
-/// What the writer fails with.
-pub fn write(table: &TrackTable, dialect: Dialect, out: &mut impl Write) -> Result<Vec<String>> {
-    let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").because(e);
-    let points_only = dialect != Dialect::Plain;
-    let mut dropped = Vec::new();
-    let scored = !matches!(table.score, crate::tracks::Column::Constant(_));
-    if points_only && !table.is_points {
-        dropped.push("width, height".to_string());
-    }
-    if scored && !matches!(dialect, Dialect::Plain | Dialect::TrackMate) {
-        dropped.push("score".to_string());
-    }
-    let extra: &[(String, Vec<String>)] = if dialect == Dialect::TrackMate {
-        dropped.extend(table.extra.iter().map(|e| e.0.clone()));
-        &[]
-    } else {
-        &table.extra
-    };
-    let mut head = match dialect {
-        Dialect::Plain if table.is_points => "frame,track_id,x_px,y_px,score,class".to_string(),
-        Dialect::Plain => "frame,track_id,x_px,y_px,width_px,height_px,score,class".to_string(),
-        Dialect::Trackpy => "frame,particle,x,y".to_string(),
-        Dialect::TrackMate => "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME".to_string(),
-        Dialect::Btrack => "ID,t,y,x".to_string(),
-        Dialect::Ultrack => "track_id,t,y,x".to_string(),
-    };
-    if !matches!(dialect, Dialect::Plain) && !matches!(table.class, crate::tracks::Column::Constant(_)) {
-        dropped.push("class".to_string());
-    }
-    for (name, _) in extra {
-        head.push(',');
-        head.push_str(name);
-    }
-    writeln!(out, "{head}").map_err(failed)?;
-    if dialect == Dialect::TrackMate {
-        writeln!(out, "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame").map_err(failed)?;
-        writeln!(out, "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame").map_err(failed)?;
-        writeln!(out, ",,,(quality),(pixel),(pixel),(pixel),(frame),").map_err(failed)?;
-    }
-    for frame in 0..table.n_frames() {
-        for r in table.rows(frame) {
-            let e = table.extent(r);
-            let (x, y) = (e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0);
-            let (id, score) = (table.ids[table.tracks[r] as usize], table.score.get(r));
-            match dialect {
-                Dialect::Plain if table.is_points => write!(out, "{frame},{id},{x},{y},{score},{}", table.class.get(r)),
-                Dialect::Plain => {
-                    write!(out, "{frame},{id},{x},{y},{},{},{score},{}", e.width_px, e.height_px, table.class.get(r))
-                }
-                Dialect::Trackpy => write!(out, "{frame},{id},{x},{y}"),
-                Dialect::TrackMate => write!(out, "ID{r},{r},{id},{score},{x},{y},0,{frame},{frame}"),
-                Dialect::Btrack | Dialect::Ultrack => write!(out, "{id},{frame},{y},{x}"),
-            }
-            .map_err(failed)?;
-            for (_, values) in extra {
-                write!(out, ",{}", values.get(r).map_or("", String::as_str)).map_err(failed)?;
-            }
-            writeln!(out).map_err(failed)?;
-        }
-    }
-    Ok(dropped)
 }
 
 #[cfg(test)]
@@ -291,26 +234,6 @@ Label,Spot ID,Track ID,Quality,X,Y,Frame\n,,,(quality),(pixel),(pixel),\nID1,1,3
         let (t, _) = read_text(text, ReadOptions { keep_extra: true, ..ReadOptions::default() }).unwrap();
         assert_eq!((t.boxes.as_slice(), t.n_frames()), ([[8.0, 17.0, 4.0, 6.0]].as_slice(), 5));
         assert_eq!(t.extra[0], ("time_s".to_string(), vec!["0.1".to_string()]));
-    }
-
-    #[test]
-    fn every_dialect_reads_back_what_it_wrote() {
-        let (t, _) = read_text(
-            "frame,track_id,x,y,width,height,score\n0,1,5,6,2,4,0.5\n1,1,6,6,2,4,0.25\n",
-            ReadOptions::default(),
-        )
-        .unwrap();
-        for d in [Dialect::Plain, Dialect::Trackpy, Dialect::TrackMate, Dialect::Btrack, Dialect::Ultrack] {
-            let mut out = Vec::new();
-            let dropped = write(&t, d, &mut out).unwrap();
-            let (u, _) = read_text(std::str::from_utf8(&out).unwrap(), ReadOptions::default()).unwrap();
-            let centre = |t: &TrackTable, r| {
-                let e = t.extent(r);
-                (e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0)
-            };
-            assert_eq!((centre(&t, 0), centre(&t, 1)), (centre(&u, 0), centre(&u, 1)), "{d:?}");
-            assert_eq!(dropped.is_empty(), d == Dialect::Plain, "{d:?} {dropped:?}");
-        }
     }
 
     #[test]

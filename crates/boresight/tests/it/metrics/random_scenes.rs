@@ -1,12 +1,14 @@
 //! A thousand small scenes (ties, empty frames, empty results, one frame, ids that swap) score as in TrackEval,
-//! py-motmetrics and Stone Soup. References: `scripts/metrics_reference.py`.
+//! py-motmetrics and Stone Soup, and trajectory GOSPA as the paper's linear programme solved by HiGHS. References:
+//! `scripts/metrics_reference.py`.
 
-use super::scenes::compare;
+use super::scenes::{compare, reference, scene};
 use boresight::TrackTable;
 use boresight::metrics::hota::mean;
 use boresight::metrics::set::{OspaAssignment, SetDistance, SetOptions};
 use boresight::metrics::siap::{nearest_associations, siap};
-use boresight::metrics::{MatchOptions, clear_classic, evaluate};
+use boresight::metrics::trajectory_gospa::{TrajectoryOptions, trajectory_gospa};
+use boresight::metrics::{MatchOptions, Similarity, clear_classic, evaluate};
 
 #[test]
 fn a_thousand_scenes_score_as_in_trackeval() {
@@ -123,4 +125,49 @@ fn a_thousand_scenes_are_as_far_apart_as_in_stone_soup() {
         ]);
         out
     });
+}
+
+#[test]
+fn a_thousand_scenes_matched_by_centres_score_as_in_trackeval() {
+    let options = MatchOptions { similarity: Similarity::Centre { zero_distance_px: 40.0 }, threshold: 0.5 };
+    compare("centre", |truth, result| {
+        let s = evaluate(truth, result, &options).unwrap();
+        vec![
+            ("CLR_TP", s.clear.tp as f64),
+            ("IDSW", s.clear.idsw as f64),
+            ("Frag", s.clear.frag as f64),
+            ("MOTA", s.clear.mota()),
+            ("MOTP", s.clear.motp()),
+            ("IDF1", s.identity.idf1()),
+            ("HOTA", mean(&s.hota.hota())),
+            ("DetA", mean(&s.hota.det_a())),
+            ("AssA", mean(&s.hota.ass_a)),
+            ("LocA", mean(&s.hota.loc_a)),
+        ]
+    });
+}
+
+/// The table with its corners as points, as the reference takes them.
+fn corner_points(t: &TrackTable) -> TrackTable {
+    let mut t = t.clone();
+    t.boxes.iter_mut().for_each(|b| (b[2], b[3]) = (0.0, 0.0));
+    t
+}
+
+#[test]
+fn a_thousand_scenes_have_the_trajectory_gospa_of_the_papers_programme() {
+    let (names, rows) = reference("trajectory");
+    assert_eq!((names.len(), rows.len()), (3, 1000));
+    for (seed, row) in rows.iter().enumerate() {
+        // Each scene with one of the three options in turn: a programme takes some milliseconds.
+        let (order, cutoff_px, switch_px) = [(1.0, 20.0, 2.0), (2.0, 30.0, 9.0), (2.0, 12.0, 40.0)][seed % 3];
+        let set = SetOptions { cutoff_px, order, ..SetOptions::default() };
+        let o = TrajectoryOptions { set, switch_px, ..TrajectoryOptions::default() };
+        let (truth, result) = scene(seed as u64);
+        let g = trajectory_gospa(&corner_points(&truth), &corner_points(&result), &o).unwrap();
+        let r = row[seed % 3];
+        assert!((g.distance - r).abs() <= 1e-9 * r.max(1.0), "scene {seed}: {g:?} instead of {r}");
+        let sum = g.localisation + g.missed + g.false_ + g.switch;
+        assert!((sum - g.distance.powf(order)).abs() <= 1e-9 * sum.max(1.0), "scene {seed}: parts of {g:?}");
+    }
 }

@@ -1,10 +1,10 @@
-//! Scores of published results on MOTChallenge sequences equal those of TrackEval, number by number.
+//! Scores of published results on MOTChallenge sequences equal those of TrackEval and py-motmetrics, number by number.
 //!
-//! The data are non-commercial and stay outside the repository; the reference files beside them were made by TrackEval.
+//! The data are non-commercial and stay outside the repository; the reference files beside them were made by these tools.
 
 use boresight::io::tracks::{ReadOptions, mot};
 use boresight::metrics::hota::{N_ALPHA, mean};
-use boresight::metrics::{MatchOptions, Rules, Scores, evaluate, preprocess};
+use boresight::metrics::{MatchOptions, Rules, Scores, clear_classic, evaluate, preprocess};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -172,4 +172,41 @@ fn the_surveillance_clip_scores_as_in_trackeval_for_both_results() {
         "pets09_vtest/expected_sort_trackeval_detailed.csv",
         Rules::Mot15,
     );
+}
+
+#[test]
+fn mot15_with_the_cem_tracker_scores_as_in_py_motmetrics() {
+    let Some(data) = data().map(|d| d.join("mot15_text")) else { return };
+    let reference = reference(&data.join("expected_cem_motmetrics.csv"));
+    for seq in MOT15 {
+        let (mut truth, _) = mot::read(&data.join(seq).join("gt.txt"), ReadOptions::default()).unwrap();
+        truth.extend_to(sequence_length(&data.join(seq)));
+        let (result, _) = mot::read(&data.join(seq).join("result_cem.txt"), ReadOptions::default()).unwrap();
+        let (truth, result) = preprocess(&truth, &result, Rules::Mot15).unwrap();
+        let c = clear_classic(&truth, &result, &MatchOptions::default()).unwrap();
+        let s = evaluate(&truth, &result, &MatchOptions::default()).unwrap();
+        let row = &reference[seq];
+        let ours = [
+            ("idf1", s.identity.idf1()),
+            ("idp", s.identity.idp()),
+            ("idr", s.identity.idr()),
+            ("num_unique_objects", s.n_truths as f64),
+            ("mostly_tracked", c.mostly_tracked as f64),
+            ("partially_tracked", c.partially_tracked as f64),
+            ("mostly_lost", c.mostly_lost as f64),
+            ("num_false_positives", c.false_positives as f64),
+            ("num_misses", c.misses as f64),
+            ("num_switches", c.switches as f64),
+            ("num_fragmentations", c.fragmentations as f64),
+            ("mota", c.mota()),
+            ("motp", c.motp()),
+            ("num_transfer", c.transfers as f64),
+            ("num_ascend", c.ascends as f64),
+            ("num_migrate", c.migrates as f64),
+        ];
+        for (name, v) in ours {
+            let theirs = row[name];
+            assert!((v - theirs).abs() <= 1e-9 * theirs.abs().max(1.0), "{seq} {name}: {v} instead of {theirs}");
+        }
+    }
 }

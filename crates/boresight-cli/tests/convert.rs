@@ -1,0 +1,117 @@
+//! `boresight convert` as a user runs it: there and back between all formats, and what is said of losses.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn boresight(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_boresight")).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Converts, then back into `home`; the text that comes back and what was said on the way there.
+fn there_and_back(dir: &Path, input: &str, to: &str, home: &str) -> (String, String) {
+    let (there, back) = (dir.join(format!("there-{to}")), dir.join("back"));
+    let go = boresight(&["convert", input, there.to_str().unwrap(), "--to", to]);
+    assert!(go.status.success(), "to {to}: {}", text(&go.stderr));
+    let come = boresight(&["convert", there.to_str().unwrap(), back.to_str().unwrap(), "--to", home]);
+    assert!(come.status.success(), "from {to}: {}", text(&come.stderr));
+    (std::fs::read_to_string(back).unwrap(), text(&go.stderr))
+}
+
+#[test]
+fn boxes_on_whole_pixels_survive_every_format_that_has_boxes() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("in.txt");
+    // MOTChallenge, counted from 1: the box of the top-left pixel is 1,1,1,1.
+    let table = "1,3,1,1,4,6,1,-1,-1,-1\n1,8,20,30,5,5,1,-1,-1,-1\n2,3,2,1,4,6,1,-1,-1,-1\n";
+    std::fs::write(&input, table).unwrap();
+    for to in ["mot", "mot-truth", "kitti", "csv", "ctc"] {
+        let (back, said) = there_and_back(dir.path(), input.to_str().unwrap(), to, "mot");
+        assert_eq!(back, table, "through {to}: {said}");
+        assert!(!said.contains("does not hold"), "{to}: {said}");
+    }
+}
+
+#[test]
+fn points_survive_every_format_that_has_points() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("in.csv");
+    std::fs::write(&input, "frame,particle,x,y\n0,3,1.5,2.25\n4,3,1.75,3\n4,5,9,9\n").unwrap();
+    for to in ["csv", "trackpy", "trackmate", "btrack", "ultrack"] {
+        let (back, said) = there_and_back(dir.path(), input.to_str().unwrap(), to, "trackpy");
+        // TrackMate's label, number, z and t of each spot are kept as columns of their own.
+        let first_four = |l: &str| l.split(',').take(4).collect::<Vec<_>>().join(",") + "\n";
+        let back: String = back.lines().map(first_four).collect();
+        assert_eq!(back, std::fs::read_to_string(&input).unwrap(), "through {to}: {said}");
+        assert!(!said.contains("does not hold"), "{to}: {said}");
+    }
+    // Label images have no places between pixels, and a pause ends a label.
+    let (back, said) = there_and_back(dir.path(), input.to_str().unwrap(), "ctc", "trackpy");
+    assert!(said.contains("positions between pixels") && said.contains("gaps (1 tracks"), "{said}");
+    assert!(back.contains(",parent\n") && back.lines().count() == 4, "{back}");
+}
+
+#[test]
+fn every_column_is_kept_or_named_as_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("0006.txt");
+    let labels = "0 -1 DontCare -1 -1 -10 5 6 15 26 -1 -1 -1 -1 -1 -1 -1\n\
+0 2 Van 1 2 0.5 10 20 30 60 1.5 1.6 3.7 1 2 3 0.1\n1 2 Van 0 0 0.5 11 20 30 60 1.5 1.6 3.7 1 2 3 0.1\n";
+    std::fs::write(&input, labels).unwrap();
+    let out = |to: &str| {
+        let o = boresight(&["convert", input.to_str().unwrap(), "-", "--to", to]);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        (text(&o.stdout), text(&o.stderr))
+    };
+    let (shown, said) = out("csv");
+    assert!(shown.contains("alpha_rad") && shown.contains("rotation_y_rad"), "{shown}");
+    assert!(shown.contains("truncation,occlusion") && said.contains("regions that do not count"), "{shown} {said}");
+    let (_, said) = out("mot");
+    for lost in ["alpha_rad", "class", "truncation", "occlusion", "regions that do not count"] {
+        assert!(said.contains(lost), "{lost}: {said}");
+    }
+    let (_, said) = out("trackmate");
+    assert!(said.contains("width, height") && said.contains("class"), "{said}");
+}
+
+#[test]
+fn a_loss_that_is_not_allowed_writes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (input, output) = (dir.path().join("in.txt"), dir.path().join("out"));
+    std::fs::write(&input, "1,3,1,1,4,6,0.5,-1,-1,-1\n").unwrap();
+    for to in ["trackpy", "ctc"] {
+        let o = boresight(&["convert", input.to_str().unwrap(), output.to_str().unwrap(), "--to", to, "--lossless"]);
+        assert_eq!(o.status.code(), Some(3));
+        assert!(text(&o.stderr).contains("does not hold") && text(&o.stderr).contains("score"), "{}", text(&o.stderr));
+        assert!(!output.exists());
+    }
+}
+
+#[test]
+fn cells_keep_their_parents_and_a_missing_input_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("cells.csv");
+    std::fs::write(&input, "frame,track_id,x,y,width,height,parent\n0,1,3,3,3,3,\n1,2,3,3,3,3,1\n1,4,9,9,3,3,1\n")
+        .unwrap();
+    let folder = dir.path().join("RES");
+    let o =
+        boresight(&["convert", input.to_str().unwrap(), folder.to_str().unwrap(), "--to", "ctc", "--size", "12x12"]);
+    assert!(o.status.success() && !text(&o.stderr).contains("does not hold"), "{}", text(&o.stderr));
+    assert_eq!(std::fs::read_to_string(folder.join("res_track.txt")).unwrap(), "1 0 0 0\n2 1 1 1\n4 1 1 1\n");
+    let same = boresight(&[
+        "evaluate",
+        folder.to_str().unwrap(),
+        folder.to_str().unwrap(),
+        "--require",
+        "TRA=1",
+        "--require",
+        "DET=1",
+    ]);
+    assert!(same.status.success(), "{}", text(&same.stderr));
+    let o = boresight(&["convert", "no-such.txt", "-", "--to", "csv"]);
+    assert_eq!(o.status.code(), Some(3));
+    assert!(text(&o.stderr).contains("no-such.txt"), "{}", text(&o.stderr));
+}
