@@ -23,7 +23,7 @@ enum Command {
     /// Detect what stands out in a video or an image sequence.
     Detect(commands::detect::Args),
     /// Score tracks, detections or centroids against a truth.
-    Evaluate(commands::evaluate::Args),
+    Evaluate(Box<commands::evaluate::Args>),
     /// Fuse the tracks of two sensors into one table.
     Fuse(commands::fuse::Args),
     /// Smooth a table of tracks: each row given all the others.
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
         Command::Detect(args) => commands::detect::run(args),
-        Command::Evaluate(args) => commands::evaluate::run(args),
+        Command::Evaluate(args) => commands::evaluate::run(*args),
         Command::Fuse(args) => commands::fuse::run(args),
         Command::Smooth(args) => commands::smooth::run(args),
         Command::Stitch(args) => commands::stitch::run(args),
