@@ -4,6 +4,7 @@ mod bench_metrics;
 mod bench_track;
 mod clutter_table;
 mod crossing_table;
+mod filter_table;
 mod ir_exam;
 mod mot_table;
 mod video_check;
@@ -30,6 +31,8 @@ enum Chore {
     ClutterTable(clutter_table::Args),
     /// Crossing targets: share tracked and identity switches of each method.
     CrossingTable(crossing_table::Args),
+    /// Every filter by name over the sample clip: held, error, NIS.
+    FilterTable(filter_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
     MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
@@ -49,6 +52,7 @@ fn main() -> anyhow::Result<()> {
         Chore::BenchTrack(args) => bench_track::run(&args),
         Chore::ClutterTable(args) => clutter_table::run(&args),
         Chore::CrossingTable(args) => crossing_table::run(&args),
+        Chore::FilterTable(args) => filter_table::table(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }

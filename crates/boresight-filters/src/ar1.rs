@@ -8,6 +8,7 @@
 //! The velocity reported is the last predicted step over its time, with variance 2 r/dt².
 //! Limits: depends on the origin of the coordinates; lags a steady motion by up to half a step for ever and a reversal
 //! for dozens of frames (SPEC I, behaviour); a step is one frame whatever its length. For comparison with the paper.
+//! Symbols: μ, z px; α, P no unit and px⁻². Cost: about 30 flops a coordinate.
 
 use crate::filter::{check_dt, check_measurement};
 use crate::mixture::check_weighted;

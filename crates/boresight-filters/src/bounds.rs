@@ -5,6 +5,7 @@
 //! for a linear Gaussian model it is the Kalman covariance; (3) no prior, no process noise: var_k = r(4k-2)/(k(k+1)).
 //! Symbols: p px, v px/step, r px², q px²/step⁴; a step is one scan.
 //! Limits: the polygon has few corners (digital lines: 4, plus those of the velocity interval); 32 are provided for.
+//! Cost: the polygon's corners a scan, the others closed forms.
 
 use crate::{FilterError, Real};
 

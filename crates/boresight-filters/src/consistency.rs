@@ -4,6 +4,8 @@
 //! Whiteness: ρ(l) = Σ ν̃_k·ν̃_{k-l} / sqrt(Σ|ν̃_k|² Σ|ν̃_{k-l}|²) with ν̃ whitened by S; 95 % within ±1.96/sqrt(K m).
 //! Chi-square quantiles: incomplete gamma by series and continued fraction (M. Abramowitz, I. Stegun, 6.5.29, 6.5.31),
 //! then Newton from Wilson-Hilferty. Limits: samples of one run are correlated in NEES: use many runs, or NIS.
+//! Symbols: ν innovation m x 1, S its covariance; e error n x 1, P its covariance; K samples. Cost: a factorisation a
+//! sample.
 
 use crate::linalg::Cholesky;
 use crate::{FilterError, Real};

@@ -6,6 +6,7 @@
 //! E[(z - x)(z - x)ᵀ] with x = (r - w)(cos(θ - ε), sin(θ - ε)).
 //! Symbols: r (px or m), θ rad, σ_r, σ_θ. Limits: σ_θ below about 0.5 rad; r well above σ_r. Without the factor λ⁻¹ the
 //! cross-range noise shortens every range by r σ_θ²/2: at 100 km and 20 mrad by 20 m.
+//! Cost: one sine and cosine, three exponentials, about 40 flops.
 
 use crate::{FilterError, Measurement, Real};
 use nalgebra::{Matrix2, Vector2};

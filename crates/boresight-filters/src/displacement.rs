@@ -6,6 +6,7 @@
 //! same straight-line extrapolation in real time; q is the variance per frame at any frame time.
 //! Symbols: `[x(t), x(t-1), y(t), y(t-1)]` (px); q px². Velocity = (d(t) - d(t-1))/dt_last.
 //! Limits: first step needs `frame_s`, the time between the two coordinates of the start.
+//! Cost: a dense step of 4 states, about 600 flops.
 
 use crate::filter::{check_belief, check_dt};
 use crate::linear::{correct_linear, predict_linear};

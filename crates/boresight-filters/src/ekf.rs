@@ -6,6 +6,7 @@
 //! nonlinear model is done by the filters themselves (Jacobian at the mean).
 //! Limits: range and azimuth with σ_θ r over σ_r above about 3, or a poor prior: take [`crate::Ukf`] or
 //! [`crate::converted`]; bearing alone needs a manoeuvring sensor or several sensors to be observable.
+//! Symbols: z, h(x) M x 1; H = dh/dx M x N; R M x M. Cost: per iteration a Jacobian and about 2 N³ flops.
 
 use crate::linear::{LinearUpdate, correct_linear};
 use crate::real::all_finite;

@@ -7,6 +7,7 @@
 //! memberships that do not sum to 1 still give an average of their rules.
 //! With ν = ν_last the default is the identity up to |ν| = 2σ and saturates there: a robust innovation.
 //! Cost: 14 memberships and 49 rules an axis, about 100 flops.
+//! Symbols: ν px; σ px; u1, u2, output no unit. Limits: seven sets an input; zero-order consequents.
 
 use crate::{FilterError, Real};
 

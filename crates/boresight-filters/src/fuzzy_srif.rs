@@ -4,6 +4,8 @@
 //! then the SRIF measurement update; the covariance is that of the plain filter.
 //! Departures: see [`crate::fuzzy`]. The published gain is small (error ratio 0.975-0.986, SPEC G.1): robustness to
 //! heavy-tailed centroids, nothing else; with light tails (mask centroid) it is 1 % worse than the plain SRIF.
+//! Symbols: ν, r_flc 2 x 1 (px); S 2 x 2 (px²). Limits: those of [`crate::srif`] and [`crate::fuzzy`]. Cost: the SRIF's
+//! and two inferences.
 
 use crate::fuzzy::Correlator;
 use crate::model::Model;

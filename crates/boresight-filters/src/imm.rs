@@ -8,6 +8,7 @@
 //! rule for given association weights.
 //! Symbols: μ_j model probabilities; c_j predicted ones; Λ_j likelihoods. All models share the state of N entries.
 //! Cost: R filters, plus R² N² for the mixing and R factorisations for square-root forms.
+//! Limits: models that differ by less than their noise cannot be told apart; all must share one state layout.
 
 use crate::filter::{check_dt, check_measurement, log_likelihood};
 use crate::mixture::check_weighted;

@@ -4,16 +4,17 @@
 //! Differs from it: H selects two states, so its products are picks; S is inverted in closed form (2 x 2).
 //! Symbols: x N x 1; P N x N; z, ν 2 x 1 (px); S, R 2 x 2 (px²); K N x 2.
 //! Limits: in f32 with P0/R of 1e12 both forms lose all digits (SPEC E-D7): take [`crate::Ud`] or [`crate::Srif`].
-//! With a nonlinear model this is the extended Kalman filter: Phi is the Jacobian at the state.
+//! Two uncorrelated axes are filtered apart, side by side in vector registers (`pack_axes`), until a full R or a PDA update
+//! couples them. With a nonlinear model this is the extended Kalman filter: Phi is the Jacobian at the state.
 //! Cost: N = 4, constant velocity: about 60 flops to predict, 130 to correct (Joseph).
 
 use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{halves_apart, invert_pair};
+use crate::linalg::{halves_apart, invert_pair, pack_axes, unpack_axes};
 use crate::mixture::{joseph, mixture_update};
 use crate::model::Model;
 use crate::real::all_finite;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start, Weighted};
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
 /// Which form of the covariance update is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +30,8 @@ pub enum CovarianceForm {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kf<M, const N: usize, T: Real = f64> {
     model: M,
-    belief: Gaussian<N, T>,
+    /// As it is, or with its axes side by side if they are apart.
+    held: Gaussian<N, T>,
     form: CovarianceForm,
     /// The axes are uncorrelated and the model keeps them so: half the work.
     apart: bool,
@@ -39,7 +41,9 @@ impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
     /// Returns the filter with another form of the covariance update.
     #[must_use]
     pub fn with_form(mut self, form: CovarianceForm) -> Self {
+        let belief = self.belief();
         self.form = form;
+        self.hold(belief);
         self
     }
 }
@@ -48,8 +52,9 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Kf<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
         crate::linalg::ud_factorize(&belief.cov)?;
-        let apart = M::AXES && halves_apart(&belief.cov);
-        Ok(Self { model, belief, form: CovarianceForm::Joseph, apart })
+        let mut filter = Self { model, held: belief, form: CovarianceForm::Joseph, apart: false };
+        filter.hold(belief);
+        Ok(filter)
     }
 
     fn model(&self) -> &M {
@@ -64,40 +69,152 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Kf<M, N, T> {
 impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> {
     type Real = T;
 
-    #[inline]
+    #[inline(always)]
     fn predict(&mut self, dt_s: T) -> Result<(), FilterError> {
         check_dt(dt_s)?;
         if dt_s == T::zero() {
             return Ok(());
         }
-        let mut next = self.belief;
-        if self.apart {
-            self.model.propagate_apart(dt_s, &mut next.mean, &mut next.cov);
-        } else {
-            self.model.propagate(dt_s, &mut next.mean, &mut next.cov);
+        if !self.apart {
+            return self.predict_coupled(dt_s);
         }
-        // The variances bound the covariances of a positive definite P, so these are enough for what can overflow here.
-        let mut fine = true;
+        let mut next = self.held;
+        self.model.propagate_axes(dt_s, &mut next.mean, &mut next.cov);
+        // What an overflow leaves of 0; the variances bound the covariances of a positive definite P.
+        let mut rest = T::zero();
         for i in 0..N {
-            fine &= (next.mean[i].abs() <= T::MAX) & (next.cov[(i, i)] <= T::MAX);
+            rest += next.mean[i] * T::zero() + next.cov[(i, i / 2)] * T::zero();
         }
-        if !fine {
+        if rest != T::zero() {
             return Err(FilterError::NotFinite("the result of the step"));
         }
-        self.belief = next;
+        self.held = next;
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        check_measurement(m)?;
+        if self.apart && m.cov[(1, 0)] == T::zero() {
+            return self.correct_apart(m);
+        }
+        self.correct_coupled(m)
+    }
+
+    fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
+    where
+        I: Iterator<Item = Weighted<T>> + Clone,
+    {
+        let next = mixture_update(&self.belief(), M::POSITION, hypotheses)?;
+        check_finite(&next)?;
+        self.hold(next);
         Ok(())
     }
 
     #[inline]
-    fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
-        check_measurement(m)?;
-        if self.apart && m.cov[(1, 0)] == T::zero() && self.form == CovarianceForm::Joseph {
-            return self.correct_apart(m);
+    fn belief(&self) -> Gaussian<N, T> {
+        if self.apart { unpack_axes(&self.held) } else { self.held }
+    }
+
+    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
+        check_belief(belief)?;
+        self.hold(*belief);
+        Ok(())
+    }
+
+    #[inline]
+    fn position_at(&self) -> [usize; 2] {
+        M::POSITION
+    }
+
+    #[inline]
+    fn kinematics(&self) -> Gaussian<4, T> {
+        self.model.kinematics(&self.belief())
+    }
+
+    #[inline]
+    fn predicted(&self) -> Gaussian<2, T> {
+        if !self.apart {
+            return position_of(&self.held, M::POSITION);
         }
+        let at = M::POSITION[0];
+        let (m, p, zero) = (&self.held.mean, &self.held.cov, T::zero());
+        Gaussian {
+            mean: Vector2::new(m[2 * at], m[2 * at + 1]),
+            cov: Matrix2::new(p[(2 * at, at)], zero, zero, p[(2 * at + 1, at)]),
+        }
+    }
+}
+
+impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
+    /// The Joseph update of two uncorrelated axes, each measured by one number: N/2 states at a time, both axes in step.
+    #[inline(always)]
+    fn correct_apart(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        let (half, at) = (N / 2, M::POSITION[0]);
+        let (x, p, r) = (&self.held.mean, &self.held.cov, [m.cov[(0, 0)], m.cov[(1, 1)]]);
+        let entry = |i: usize, j: usize, axis: usize| p[(2 * i.min(j) + axis, i.max(j))];
+        let mut next = self.held;
+        let mut k = [[T::zero(); 2]; N];
+        let mut nu = [T::zero(); 2];
+        let mut rest = [T::zero(); 2];
+        for axis in 0..2 {
+            let inv = T::one() / (entry(at, at, axis) + r[axis]);
+            nu[axis] = m.position[axis] - x[2 * at + axis];
+            for i in 0..half {
+                k[i][axis] = entry(i, at, axis) * inv;
+            }
+        }
+        for i in 0..half {
+            for axis in 0..2 {
+                let v = x[2 * i + axis] + k[i][axis] * nu[axis];
+                next.mean[2 * i + axis] = v;
+                rest[axis] += v * T::zero();
+            }
+        }
+        for j in 0..half {
+            for i in 0..=j {
+                for axis in 0..2 {
+                    // (I - K H) P (I - K H)ᵀ + K R Kᵀ, the upper half only.
+                    let (ki, kj) = (k[i][axis], k[j][axis]);
+                    let a = entry(i, j, axis) - ki * entry(at, j, axis);
+                    let b = (entry(i, at, axis) - ki * entry(at, at, axis)) - ki * r[axis];
+                    let v = a - b * kj;
+                    next.cov[(2 * i + axis, j)] = v;
+                    rest[axis] += v * T::zero();
+                }
+            }
+        }
+        // S = 0 makes a gain, an overflow a sum that is not finite: times 0 it is NaN.
+        if rest[0] + rest[1] != T::zero() {
+            return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+        }
+        self.held = next;
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn predict_coupled(&mut self, dt_s: T) -> Result<(), FilterError> {
+        let mut next = self.held;
+        self.model.propagate(dt_s, &mut next.mean, &mut next.cov);
+        let mut rest = T::zero();
+        for i in 0..N {
+            rest += next.mean[i] * T::zero() + next.cov[(i, i)] * T::zero();
+        }
+        if rest != T::zero() {
+            return Err(FilterError::NotFinite("the result of the step"));
+        }
+        self.held = next;
+        Ok(())
+    }
+
+    /// The update of a full covariance. Out of line: the apart path stays small enough to be inlined into a loop.
+    #[inline(never)]
+    fn correct_coupled(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         let at = M::POSITION;
-        let prior = position_of(&self.belief, at);
+        let belief = self.belief();
+        let prior = position_of(&belief, at);
         let s = invert_pair(&(prior.cov + m.cov), "the innovation covariance")?;
-        let p = &self.belief.cov;
+        let p = &belief.cov;
         let mut k = SMatrix::<T, N, 2>::zeros();
         for i in 0..N {
             let (p0, p1) = (p[(i, at[0])], p[(i, at[1])]);
@@ -105,7 +222,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
             k[(i, 1)] = p0 * s.inverse[(1, 0)] + p1 * s.inverse[(1, 1)];
         }
         let innovation: Vector2<T> = m.position - prior.mean;
-        let mut next = self.belief;
+        let mut next = belief;
         for i in 0..N {
             next.mean[i] += k[(i, 0)] * innovation[0] + k[(i, 1)] * innovation[1];
         }
@@ -122,95 +239,25 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Kf<M, N, T> 
                 }
             }
         }
-        self.accept(next)?;
-        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
+        check_finite(&next)?;
+        (self.held, self.apart) = (next, false);
         Ok(())
     }
 
-    fn correct_weighted<I>(&mut self, hypotheses: I) -> Result<(), FilterError>
-    where
-        I: Iterator<Item = Weighted<T>> + Clone,
-    {
-        let next = mixture_update(&self.belief, M::POSITION, hypotheses)?;
-        self.accept(next)?;
-        self.apart = M::AXES && halves_apart(&self.belief.cov);
-        Ok(())
-    }
-
-    #[inline]
-    fn belief(&self) -> Gaussian<N, T> {
-        self.belief
-    }
-
-    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
-        check_belief(belief)?;
-        self.belief = *belief;
-        self.apart = M::AXES && halves_apart(&belief.cov);
-        Ok(())
-    }
-
-    #[inline]
-    fn position_at(&self) -> [usize; 2] {
-        M::POSITION
-    }
-
-    #[inline]
-    fn kinematics(&self) -> Gaussian<4, T> {
-        self.model.kinematics(&self.belief)
-    }
-
-    #[inline]
-    fn predicted(&self) -> Gaussian<2, T> {
-        position_of(&self.belief, M::POSITION)
+    /// Takes a belief, its axes side by side if they may stay apart.
+    #[inline(always)]
+    fn hold(&mut self, belief: Gaussian<N, T>) {
+        self.apart = M::AXES && self.form == CovarianceForm::Joseph && halves_apart(&belief.cov);
+        self.held = if self.apart { pack_axes(&belief) } else { belief };
     }
 }
 
-impl<M: Model<N, T>, const N: usize, T: Real> Kf<M, N, T> {
-    /// The Joseph update of two uncorrelated axes, each measured by one number: N/2 states at a time.
-    #[inline(always)]
-    fn correct_apart(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
-        let half = N / 2;
-        let mut next = self.belief;
-        let p = &self.belief.cov;
-        let mut fine = true;
-        for axis in 0..2 {
-            let (from, to, at, r) = (axis * half, axis * half + half, M::POSITION[axis], m.cov[(axis, axis)]);
-            let s = p[(at, at)] + r;
-            let inv = T::one() / s;
-            fine &= s > T::zero() && inv <= T::MAX;
-            let nu = m.position[axis] - self.belief.mean[at];
-            let mut k = [T::zero(); N];
-            for i in from..to {
-                k[i] = p[(i, at)] * inv;
-                next.mean[i] += k[i] * nu;
-                fine &= next.mean[i].abs() <= T::MAX;
-            }
-            for j in from..to {
-                for i in from..=j {
-                    // (I - K H) P (I - K H)ᵀ + K R Kᵀ, the upper half only.
-                    let a = p[(i, j)] - k[i] * p[(at, j)];
-                    let b = (p[(i, at)] - k[i] * p[(at, at)]) - k[i] * r;
-                    let v = a - b * k[j];
-                    next.cov[(i, j)] = v;
-                    next.cov[(j, i)] = v;
-                    fine &= v.abs() <= T::MAX;
-                }
-            }
-        }
-        if !fine {
-            return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
-        }
-        self.belief = next;
+/// Refuses a belief whose sums overflowed.
+#[inline(always)]
+fn check_finite<T: Real, const N: usize>(next: &Gaussian<N, T>) -> Result<(), FilterError> {
+    if all_finite(&next.mean) & all_finite(&next.cov) {
         Ok(())
-    }
-
-    /// Takes a new belief unless a sum overflowed.
-    #[inline(always)]
-    fn accept(&mut self, next: Gaussian<N, T>) -> Result<(), FilterError> {
-        if !(all_finite(&next.mean) & all_finite(&next.cov)) {
-            return Err(FilterError::NotFinite("the result of the step"));
-        }
-        self.belief = next;
-        Ok(())
+    } else {
+        Err(FilterError::NotFinite("the result of the step"))
     }
 }

@@ -38,7 +38,9 @@ pub mod sensor;
 pub mod smooth;
 pub mod square_root;
 pub mod srif;
+mod srif_axes;
 pub mod ud;
+mod ud_axes;
 pub mod ukf;
 
 pub use adaptive::{Adaptive, AdaptiveConfig, Memory, NoiseLearner, ScaleNoise};

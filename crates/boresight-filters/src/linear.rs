@@ -2,6 +2,7 @@
 //!
 //! Source: SPEC D.1 (Joseph form, symmetrised). Symbols: x N x 1; P N x N; H M x N; R, S M x M; K N x M; ν M x 1.
 //! Cost: about 2 N³ flops for the Joseph product; trackers of positions use [`crate::Kf`], whose H only picks.
+//! Limits: S must be positive definite; no structure is used.
 
 use crate::linalg::{Cholesky, mul, mul_transposed, symmetrize};
 use crate::{FilterError, Gaussian, Real};

@@ -5,6 +5,7 @@
 //! Several weighted hypotheses are taken as one measurement: their mean by weight, with variance r/Σw + spread, which
 //! is the plain update for one sure hypothesis and a weak one for doubtful ones.
 //! Limits: a missed scan leaves the second differences with a longer step, in real time.
+//! Symbols: per axis s = (p, v, a_1 …), px, px/s, px/s². Cost: two axes of [`crate::lms`], about 24 S³ flops.
 
 use crate::filter::{check_dt, check_measurement};
 use crate::lms::{LmsAxis, LmsRule};

@@ -5,6 +5,7 @@
 //! exact moment match of the mixture Σ p_i N(x_i, P_i); with one covariance for all it is SPEC E's update. The spread
 //! is summed about its own mean, so it cannot lose positive definiteness to cancellation.
 //! Symbols: p_i weights; p0 = 1 - Σ p_i; K_i N x 2; S_i 2 x 2 (px²). Cost: about 2 m N² + N² flops for m hypotheses.
+//! Limits: the mixture's shape is lost: two far hypotheses of equal weight give a wide Gaussian between them.
 
 use crate::filter::{check_measurement, position_of};
 use crate::linalg::{invert_pair, symmetrize};

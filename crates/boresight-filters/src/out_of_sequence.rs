@@ -9,6 +9,7 @@
 //! Exact for one lag; for more it is the published approximation. Replay keeps the measurements and runs them again:
 //! exact for every lag inside the ring. Limits: K updates are remembered; a model whose noise does not compose over
 //! time (discrete white acceleration) is exact in neither. Cost: retrodiction about 10 N³, replay a step per update.
+//! Symbols: τ, now s; x, b N x 1; P, Q, B N x N.
 
 use crate::filter::{check_dt, check_measurement};
 use crate::linalg::{Cholesky, invert_pair, mul, mul_transposed, symmetrize};

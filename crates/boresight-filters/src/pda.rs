@@ -6,6 +6,8 @@
 //! 2π λ (1 - P_D P_G)/P_D, which is the same for equal covariances. The exponents are shifted by the smallest d², so
 //! far measurements do not underflow to 0/0.
 //! Symbols: λ clutter density (false measurements per px²); P_D, P_G probabilities of detection and of the gate.
+//! Limits: one target; the sum runs over gated measurements only. Cost: about 30 flops and one exponential a
+//! measurement.
 
 use crate::linalg::invert_pair;
 use crate::{FilterError, Gaussian, Measurement, Real};

@@ -2,6 +2,7 @@
 //!
 //! Source: Bar-Shalom, Li, Kirubarajan 2001, 10.3, 10.4. Azimuth is atan2(y, x) seen from the sensor: 0 along +x, growing
 //! towards +y. Symbols: h(x) M x 1; H = dh/dx M x N; residuals of angles are wrapped to (-π, π].
+//! Limits: a target on the sensor has no angle: the Jacobian is refused there. Cost: a root, an arc tangent.
 
 use crate::{FilterError, Real};
 use nalgebra::{SMatrix, SVector, Vector2};

@@ -5,14 +5,14 @@
 //! Symbols: r N x N upper triangular, diagonal >= 0 (1/px); y N x 1; R_m = L Lᵀ measurement covariance (px²).
 //! Limits: the measurement covariance must be positive definite (a perfect measurement has infinite information), Phi
 //! must have an inverse, and a nonlinear model must not be strongly curved over one step.
+//! Two uncorrelated axes are filtered apart, side by side (`srif_axes`), until a full R_m or a PDA update couples them.
 //! Cost: about 2 N²(N + W) flops per predict, 4 N² per correct, N³/3 to read the belief.
 
 use crate::filter::{check_belief, check_dt, check_measurement};
-use crate::linalg::{
-    Cholesky, eliminate, eliminate_in, fold_rows, fold_rows_in, halves_apart, mul, triangularize, triangularize_in,
-};
+use crate::linalg::{Cholesky, eliminate, fold_rows, halves_apart, mul, triangularize};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;
+use crate::srif_axes::{measure, move_back, pack, spread, unpack};
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
@@ -137,33 +137,16 @@ impl<const N: usize, T: Real> InformationPair<N, T> {
     #[inline]
     pub fn propagate<const W: usize>(&mut self, phi_inverse: &SMatrix<T, N, N>, noise_root: &SMatrix<T, N, W>) {
         self.r = mul(&self.r, phi_inverse);
-        self.spread(noise_root, false);
+        self.spread(noise_root);
     }
 
-    /// The second half of [`InformationPair::propagate`]: R is R Phi⁻¹ already; `apart` works on each axis alone.
+    /// The second half of [`InformationPair::propagate`]: R is R Phi⁻¹ already.
     #[inline(always)]
-    fn spread<const W: usize>(&mut self, noise_root: &SMatrix<T, N, W>, apart: bool) {
+    fn spread<const W: usize>(&mut self, noise_root: &SMatrix<T, N, W>) {
         let Self { r, y } = self;
-        if apart {
-            let mut a = SMatrix::<T, N, W>::zeros();
-            for axis in 0..2 {
-                let (n, w) = (N / 2, W / 2);
-                let (block, noise) = ((axis * n, axis * n + n), (axis * w, axis * w + w));
-                for c in noise.0..noise.1 {
-                    for i in block.0..block.1 {
-                        for k in i..block.1 {
-                            a[(i, c)] -= r[(i, k)] * noise_root[(k, c)];
-                        }
-                    }
-                }
-                eliminate_in(block, noise, &mut a, r, y);
-                triangularize_in(block.0, block.1, r, y);
-            }
-        } else {
-            let mut a = mul(r, noise_root) * -T::one();
-            eliminate(&mut a, r, y);
-            triangularize(r, y);
-        }
+        let mut a = mul(r, noise_root) * -T::one();
+        eliminate(&mut a, r, y);
+        triangularize(r, y);
     }
 }
 
@@ -171,15 +154,17 @@ impl<const N: usize, T: Real> InformationPair<N, T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Srif<M, const N: usize, T: Real = f64> {
     model: M,
-    pair: InformationPair<N, T>,
+    /// As it is, or with its axes side by side (`srif_axes`) if they are apart.
+    held: InformationPair<N, T>,
     /// The axes are uncorrelated and the model keeps them so: half the work.
     apart: bool,
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
     /// Returns the information pair.
-    pub fn pair(&self) -> &InformationPair<N, T> {
-        &self.pair
+    #[inline(always)]
+    pub fn pair(&self) -> InformationPair<N, T> {
+        if self.apart { unpack(&self.held) } else { self.held }
     }
 
     /// Corrects by two sensors at once (SPEC G eq 10): the same as one after the other, with one triangularisation.
@@ -198,10 +183,11 @@ impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
                 h[(k + 2, c)] = h2[(k, c)];
             }
         }
-        let mut pair = self.pair;
+        let mut pair = self.pair();
         pair.measure(&h, &z);
-        self.accept(pair)?;
-        self.apart = self.apart && first.cov[(1, 0)] == T::zero() && second.cov[(1, 0)] == T::zero();
+        check_regular(&pair)?;
+        let apart = self.apart && first.cov[(1, 0)] == T::zero() && second.cov[(1, 0)] == T::zero();
+        self.hold(pair, apart);
         Ok(())
     }
 
@@ -209,33 +195,76 @@ impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
     #[inline(always)]
     fn correct_apart(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         check_measurement(m)?;
-        let mut pair = self.pair;
-        for axis in 0..2 {
-            let half = N / 2;
-            let white = T::one() / m.cov[(axis, axis)].sqrt();
-            if !(white > T::zero() && white <= T::MAX) {
-                return Err(FilterError::NotPositiveDefinite("the measurement covariance"));
-            }
-            let mut h = SMatrix::<T, 1, N>::zeros();
-            h[M::POSITION[axis]] = white;
-            let mut e = SVector::<T, 1>::new(m.position[axis] * white);
-            fold_rows_in(axis * half, axis * half + half, &mut pair.r, &mut pair.y, &mut h, &mut e);
-        }
-        self.accept(pair)
-    }
-
-    #[inline(always)]
-    fn accept(&mut self, pair: InformationPair<N, T>) -> Result<(), FilterError> {
-        let mut regular = all_finite(&pair.r) & all_finite(&pair.y);
-        for i in 0..N {
-            regular &= pair.r[(i, i)] > T::zero();
-        }
-        if !regular {
-            return Err(FilterError::NotFinite("the result of the step"));
-        }
-        self.pair = pair;
+        let variance = [m.cov[(0, 0)], m.cov[(1, 1)]];
+        let mut next = self.held;
+        measure(&mut next, M::POSITION[0], &m.position, variance);
+        // A variance of 0 gives an infinite row, which no rotation leaves finite.
+        check_regular_axes(&next)?;
+        self.held = next;
         Ok(())
     }
+
+    /// The measurement update of a full R. Out of line: the apart path stays small.
+    #[inline(never)]
+    fn correct_coupled(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        let (h, z) = whitened::<N, T>(m, M::POSITION)?;
+        let mut pair = self.pair();
+        pair.measure(&h, &z);
+        check_regular(&pair)?;
+        self.hold(pair, false);
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn predict_coupled(&mut self, dt_s: T) -> Result<(), FilterError> {
+        let mean = if M::LINEAR { self.held.y } else { self.held.mean() };
+        let r = self.model.times_inverse_transition(dt_s, &mean, &self.held.r)?;
+        let moved = InformationPair { r, y: self.held.y };
+        let mut next = self.model.with_noise_factor(dt_s, TimeUpdate { pair: moved, apart: false })?;
+        if !M::LINEAR {
+            // The pair moved by the Jacobian; the mean moves by the function itself.
+            next.y = mul(&next.r, &self.model.moved(dt_s, &mean));
+        }
+        for i in 0..N {
+            // A step cannot create exact ignorance; only underflow can, and the check refuses it.
+            next.r[(i, i)] = next.r[(i, i)].abs();
+        }
+        check_regular(&next)?;
+        self.held = next;
+        Ok(())
+    }
+
+    /// Takes a pair; `apart` puts its axes side by side.
+    #[inline(always)]
+    fn hold(&mut self, pair: InformationPair<N, T>, apart: bool) {
+        self.apart = apart;
+        self.held = if apart { pack(&pair) } else { pair };
+    }
+}
+
+/// Refuses a pair that is not finite or has lost a direction.
+#[inline(always)]
+fn check_regular<T: Real, const N: usize>(pair: &InformationPair<N, T>) -> Result<(), FilterError> {
+    let mut regular = all_finite(&pair.r) & all_finite(&pair.y);
+    for i in 0..N {
+        regular &= pair.r[(i, i)] > T::zero();
+    }
+    if regular { Ok(()) } else { Err(FilterError::NotFinite("the result of the step")) }
+}
+
+/// [`check_regular`] of axes side by side.
+#[inline(always)]
+fn check_regular_axes<T: Real, const N: usize>(pair: &InformationPair<N, T>) -> Result<(), FilterError> {
+    let mut rest = T::zero();
+    let mut regular = true;
+    for i in 0..N {
+        rest += pair.y[i] * T::zero();
+        for j in i / 2..N / 2 {
+            rest += pair.r[(i, j)] * T::zero();
+        }
+        regular &= pair.r[(i, i / 2)] > T::zero();
+    }
+    if regular & (rest == T::zero()) { Ok(()) } else { Err(FilterError::NotFinite("the result of the step")) }
 }
 
 /// Returns L⁻¹ H and L⁻¹ z for a position measurement, R_m = L Lᵀ.
@@ -258,8 +287,10 @@ fn whitened<const N: usize, T: Real>(
 impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Srif<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
-        let apart = M::AXES && halves_apart(&belief.cov);
-        Ok(Self { model, pair: InformationPair::from_belief(&belief)?, apart })
+        let pair = InformationPair::from_belief(&belief)?;
+        let mut filter = Self { model, held: pair, apart: false };
+        filter.hold(pair, M::AXES && halves_apart(&belief.cov));
+        Ok(filter)
     }
     fn model(&self) -> &M {
         &self.model
@@ -269,7 +300,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Srif<M, N, T> {
     }
 }
 
-/// Holds the pair with R Phi⁻¹ in place of R.
+/// Holds the pair with R Phi⁻¹ in place of R; `apart`: its axes side by side.
 struct TimeUpdate<const N: usize, T> {
     pair: InformationPair<N, T>,
     apart: bool,
@@ -286,7 +317,11 @@ impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<N, T> {
                 root[(i, c)] *= s;
             }
         }
-        self.pair.spread(&root, self.apart);
+        if self.apart {
+            spread(&mut self.pair, &root, W / 2);
+        } else {
+            self.pair.spread(&root);
+        }
         self.pair
     }
 }
@@ -300,42 +335,30 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Srif<M, N, T
         if dt_s == T::zero() {
             return Ok(());
         }
-        let mean = if M::LINEAR { self.pair.y } else { self.pair.mean() };
-        let r = self.model.times_inverse_transition(dt_s, &mean, &self.pair.r)?;
-        let moved = InformationPair { r, y: self.pair.y };
-        let mut next = self.model.with_noise_factor(dt_s, TimeUpdate { pair: moved, apart: self.apart })?;
-        if !M::LINEAR {
-            // The pair moved by the Jacobian; the mean moves by the function itself.
-            next.y = mul(&next.r, &self.model.moved(dt_s, &mean));
+        if !self.apart {
+            return self.predict_coupled(dt_s);
         }
-        for i in 0..N {
-            // A step cannot create exact ignorance; only underflow can, and accept() refuses it.
-            next.r[(i, i)] = next.r[(i, i)].abs();
-        }
-        self.accept(next)
+        let back = self.model.inverse_transition(dt_s, &self.held.y)?;
+        let mut moved = self.held;
+        move_back(&mut moved.r, &back);
+        let next = self.model.with_noise_factor(dt_s, TimeUpdate { pair: moved, apart: true })?;
+        check_regular_axes(&next)?;
+        self.held = next;
+        Ok(())
     }
 
     #[inline]
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
-        if self.apart && m.cov[(1, 0)] == T::zero() {
-            return self.correct_apart(m);
-        }
-        let (h, z) = whitened::<N, T>(m, M::POSITION)?;
-        let mut pair = self.pair;
-        pair.measure(&h, &z);
-        self.accept(pair)?;
-        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
-        Ok(())
+        if self.apart && m.cov[(1, 0)] == T::zero() { self.correct_apart(m) } else { self.correct_coupled(m) }
     }
 
     fn belief(&self) -> Gaussian<N, T> {
-        self.pair.belief()
+        self.pair().belief()
     }
 
     fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
         check_belief(belief)?;
-        self.pair = InformationPair::from_belief(belief)?;
-        self.apart = M::AXES && halves_apart(&belief.cov);
+        self.hold(InformationPair::from_belief(belief)?, M::AXES && halves_apart(&belief.cov));
         Ok(())
     }
 
@@ -351,16 +374,17 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Srif<M, N, T
     fn predicted(&self) -> Gaussian<2, T> {
         // Only the two position rows of R⁻¹ are needed: a R = e_i by forward substitution.
         let at = M::POSITION;
-        let x = self.pair.mean();
+        let pair = self.pair();
+        let x = pair.mean();
         let mut rows = [[T::zero(); N]; 2];
         for (row, i) in rows.iter_mut().zip(at) {
-            row[i] = T::one() / self.pair.r[(i, i)];
+            row[i] = T::one() / pair.r[(i, i)];
             for c in i + 1..N {
                 let mut v = T::zero();
                 for k in i..c {
-                    v -= row[k] * self.pair.r[(k, c)];
+                    v -= row[k] * pair.r[(k, c)];
                 }
-                row[c] = v / self.pair.r[(c, c)];
+                row[c] = v / pair.r[(c, c)];
             }
         }
         let dot = |a: &[T; N], b: &[T; N]| a.iter().zip(b).fold(T::zero(), |s, (u, v)| s + *u * *v);

@@ -5,12 +5,14 @@
 //! Differs from it: a measurement with a full covariance is whitened first (R = L Lᵀ); the PDA update is made in factors
 //! too: P^ = Σ of weighted factors, joined by Gram-Schmidt, so it cannot lose definiteness.
 //! Symbols: x N x 1; u N x N unit upper; d N (variances); a N x 1 row of H; r measurement variance; α innovation variance.
+//! Two uncorrelated axes are filtered apart, side by side (`ud_axes`), until a full R or a PDA update couples them.
 //! Limits: none of rank: a zero variance is allowed. Cost: about N²(N + W) + 3 N² flops per predict + update.
 
 use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{UdFactors, halves_apart, mwgs, mwgs_in, ud_factorize};
+use crate::linalg::{UdFactors, halves_apart, mwgs, ud_factorize};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;
+use crate::ud_axes;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start};
 use nalgebra::{SMatrix, SVector};
 
@@ -67,24 +69,12 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
     a: &SVector<T, N>,
     r: T,
 ) -> ScalarUpdate<N, T> {
-    factor_update_in((0, N), factors, a, r)
-}
-
-/// [`factor_update`] where a, U and D matter only in one diagonal block.
-#[inline(always)]
-fn factor_update_in<const N: usize, T: Real>(
-    block: (usize, usize),
-    factors: &mut UdFactors<N, T>,
-    a: &SVector<T, N>,
-    r: T,
-) -> ScalarUpdate<N, T> {
     let UdFactors { u, d } = factors;
-    let (from, to) = block;
     let mut f = [T::zero(); N];
     let mut g = [T::zero(); N];
-    for j in from..to {
+    for j in 0..N {
         let mut sum = a[j];
-        for i in from..j {
+        for i in 0..j {
             sum += u[(i, j)] * a[i];
         }
         f[j] = sum;
@@ -92,7 +82,7 @@ fn factor_update_in<const N: usize, T: Real>(
     }
     let mut gain = SVector::<T, N>::zeros();
     let mut alpha = r;
-    for j in from..to {
+    for j in 0..N {
         let before = alpha;
         alpha += g[j] * f[j];
         // Both are 0 only for r = 0 and directions already known exactly.
@@ -100,7 +90,7 @@ fn factor_update_in<const N: usize, T: Real>(
         if alpha > T::zero() {
             d[j] *= before / alpha;
         }
-        for i in from..j {
+        for i in 0..j {
             let t = u[(i, j)];
             u[(i, j)] = t + lambda * gain[i];
             gain[i] += g[j] * t;
@@ -109,7 +99,7 @@ fn factor_update_in<const N: usize, T: Real>(
     }
     if alpha > T::zero() {
         let inv = T::one() / alpha;
-        for i in from..to {
+        for i in 0..N {
             gain[i] *= inv;
         }
     }
@@ -120,34 +110,79 @@ fn factor_update_in<const N: usize, T: Real>(
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ud<M, const N: usize, T: Real = f64> {
     model: M,
+    /// Mean and factors as they are, or with their axes side by side (`ud_axes`) if they are apart.
     mean: SVector<T, N>,
-    factors: UdFactors<N, T>,
+    held: UdFactors<N, T>,
     /// The axes are uncorrelated and the model keeps them so: half the work.
     apart: bool,
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Ud<M, N, T> {
     /// Returns the factors of the covariance.
-    pub fn factors(&self) -> &UdFactors<N, T> {
-        &self.factors
+    #[inline(always)]
+    pub fn factors(&self) -> UdFactors<N, T> {
+        if self.apart { ud_axes::unpack(&self.held) } else { self.held }
     }
 
     #[inline(always)]
+    fn whole_mean(&self) -> SVector<T, N> {
+        if self.apart { ud_axes::unpack_mean(&self.mean) } else { self.mean }
+    }
+
+    #[inline(always)]
+    fn hold(&mut self, mean: SVector<T, N>, factors: UdFactors<N, T>, apart: bool) {
+        self.apart = apart;
+        (self.mean, self.held) =
+            if apart { (ud_axes::pack_mean(&mean), ud_axes::pack(&factors)) } else { (mean, factors) };
+    }
+
+    /// Takes mean and factors in the layout that is held.
+    #[inline(always)]
     fn accept(&mut self, mean: SVector<T, N>, factors: UdFactors<N, T>) -> Result<(), FilterError> {
-        if !(all_finite(&mean) & all_finite(&factors.u) & all_finite(&factors.d)) {
-            return Err(FilterError::NotFinite("the result of the step"));
-        }
-        self.mean = mean;
-        self.factors = factors;
+        check_finite(&mean, &factors)?;
+        (self.mean, self.held) = (mean, factors);
         Ok(())
+    }
+
+    /// The time update of full factors. Out of line: the apart path stays small.
+    #[inline(never)]
+    fn predict_coupled(&mut self, dt_s: T) -> Result<(), FilterError> {
+        let phi_u = self.model.transition_times(dt_s, &self.mean, &self.held.u);
+        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi: phi_u, held: &self.held, apart: false })?;
+        self.accept(self.model.moved(dt_s, &self.mean), next)
+    }
+
+    #[inline(never)]
+    fn correct_coupled(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
+        let (mut mean, mut factors) = (self.whole_mean(), self.factors());
+        for (a, z, r) in whitened_rows::<N, T>(m, M::POSITION)? {
+            let done = ud_scalar_update(&mut mean, &mut factors, &a, z, r);
+            if !(done.alpha > T::zero()) {
+                return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+            }
+        }
+        check_finite(&mean, &factors)?;
+        self.hold(mean, factors, false);
+        Ok(())
+    }
+}
+
+#[inline(always)]
+fn check_finite<T: Real, const N: usize>(mean: &SVector<T, N>, f: &UdFactors<N, T>) -> Result<(), FilterError> {
+    if all_finite(mean) & all_finite(&f.u) & all_finite(&f.d) {
+        Ok(())
+    } else {
+        Err(FilterError::NotFinite("the result of the step"))
     }
 }
 
 impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
     fn start(model: M, belief: Gaussian<N, T>) -> Result<Self, FilterError> {
         check_belief(&belief)?;
-        let apart = M::AXES && halves_apart(&belief.cov);
-        Ok(Self { model, mean: belief.mean, factors: ud_factorize(&belief.cov)?, apart })
+        let factors = ud_factorize(&belief.cov)?;
+        let mut filter = Self { model, mean: belief.mean, held: factors, apart: false };
+        filter.hold(belief.mean, factors, M::AXES && halves_apart(&belief.cov));
+        Ok(filter)
     }
 
     fn model(&self) -> &M {
@@ -159,10 +194,10 @@ impl<M: Model<N, T>, const N: usize, T: Real> Start<M, N> for Ud<M, N, T> {
     }
 }
 
-/// Thornton's time update with the model's noise factor.
+/// Thornton's time update with the model's noise factor; `phi` is Phi if the axes are apart, else Phi U.
 struct TimeUpdate<'a, const N: usize, T> {
-    phi_u: SMatrix<T, N, N>,
-    d: &'a SVector<T, N>,
+    phi: SMatrix<T, N, N>,
+    held: &'a UdFactors<N, T>,
     apart: bool,
 }
 
@@ -170,14 +205,7 @@ impl<const N: usize, T: Real> NoiseVisitor<N, T> for TimeUpdate<'_, N, T> {
     type Out = UdFactors<N, T>;
     #[inline]
     fn visit<const W: usize>(self, g: &SMatrix<T, N, W>, q: &SVector<T, W>) -> Self::Out {
-        if !self.apart {
-            return mwgs(&self.phi_u, self.d, g, q);
-        }
-        let mut f = UdFactors { u: SMatrix::identity(), d: SVector::zeros() };
-        let (n, w) = (N / 2, W / 2);
-        mwgs_in((0, n), (0, w), &mut f, &self.phi_u, self.d, g, q);
-        mwgs_in((n, N), (w, W), &mut f, &self.phi_u, self.d, g, q);
-        f
+        if self.apart { ud_axes::propagate(self.held, &self.phi, g, q) } else { mwgs(&self.phi, &self.held.d, g, q) }
     }
 }
 
@@ -190,55 +218,47 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ud<M, N, T> 
         if dt_s == T::zero() {
             return Ok(());
         }
-        let phi_u = self.model.transition_times(dt_s, &self.mean, &self.factors.u);
-        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi_u, d: &self.factors.d, apart: self.apart })?;
-        self.accept(self.model.moved(dt_s, &self.mean), next)
+        if !self.apart {
+            return self.predict_coupled(dt_s);
+        }
+        let phi = self.model.transition(dt_s, &self.mean);
+        let mut mean = SVector::<T, N>::zeros();
+        for i in 0..N / 2 {
+            for k in i..N / 2 {
+                for axis in 0..2 {
+                    mean[2 * i + axis] += phi[(i, k)] * self.mean[2 * k + axis];
+                }
+            }
+        }
+        let next = self.model.with_noise_factor(dt_s, TimeUpdate { phi, held: &self.held, apart: true })?;
+        self.accept(mean, next)
     }
 
     #[inline]
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         check_measurement(m)?;
-        let (mut mean, mut factors) = (self.mean, self.factors);
-        if self.apart && m.cov[(1, 0)] == T::zero() {
-            let mut regular = true;
+        if !(self.apart && m.cov[(1, 0)] == T::zero()) {
+            return self.correct_coupled(m);
+        }
+        let (mut mean, mut factors, at) = (self.mean, self.held, M::POSITION[0]);
+        let Some(gain) = ud_axes::correct(&mut factors, at, [m.cov[(0, 0)], m.cov[(1, 1)]]) else {
+            return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+        };
+        for i in 0..N / 2 {
             for axis in 0..2 {
-                let half = N / 2;
-                let block = (axis * half, axis * half + half);
-                let at = M::POSITION[axis];
-                let mut a = SVector::<T, N>::zeros();
-                a[at] = T::one();
-                let done = factor_update_in(block, &mut factors, &a, m.cov[(axis, axis)]);
-                regular &= done.alpha > T::zero();
-                let innovation = m.position[axis] - self.mean[at];
-                for i in block.0..block.1 {
-                    mean[i] += done.gain[i] * innovation;
-                }
-            }
-            if !regular {
-                return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
-            }
-            return self.accept(mean, factors);
-        }
-        for (a, z, r) in whitened_rows::<N, T>(m, M::POSITION)? {
-            let done = ud_scalar_update(&mut mean, &mut factors, &a, z, r);
-            if !(done.alpha > T::zero()) {
-                return Err(FilterError::NotPositiveDefinite("the innovation covariance"));
+                mean[2 * i + axis] += gain[i][axis] * (m.position[axis] - self.mean[2 * at + axis]);
             }
         }
-        self.accept(mean, factors)?;
-        self.apart = self.apart && m.cov[(1, 0)] == T::zero();
-        Ok(())
+        self.accept(mean, factors)
     }
 
     fn belief(&self) -> Gaussian<N, T> {
-        Gaussian { mean: self.mean, cov: self.factors.product() }
+        Gaussian { mean: self.whole_mean(), cov: self.factors().product() }
     }
 
     fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
         check_belief(belief)?;
-        self.factors = ud_factorize(&belief.cov)?;
-        self.mean = belief.mean;
-        self.apart = M::AXES && halves_apart(&belief.cov);
+        self.hold(belief.mean, ud_factorize(&belief.cov)?, M::AXES && halves_apart(&belief.cov));
         Ok(())
     }
 

@@ -5,6 +5,7 @@
 //! Symbols: χ_i = x ± column i of sqrt((N + κ) P), L Lᵀ = P by Cholesky; w_0 = κ/(N + κ), w_i = 1/(2(N + κ)).
 //! Differs from it: κ is kept at 0 or above, so no weight is negative and covariances stay positive semi-definite.
 //! Linear models and position measurements give the Kalman answer. Cost: 2N + 1 motions, N³ for each root and product.
+//! Limits: a posterior bent within one standard deviation (range known far better than azimuth) is still no Gaussian.
 
 use crate::filter::{check_belief, check_dt, check_measurement};
 use crate::linalg::{Cholesky, symmetrize};

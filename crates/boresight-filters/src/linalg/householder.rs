@@ -39,24 +39,11 @@ pub fn fold_rows<T: Real, const N: usize, const M: usize>(
     b: &mut SMatrix<T, M, N>,
     e: &mut SVector<T, M>,
 ) {
-    fold_rows_in(0, N, r, y, b, e);
-}
-
-/// [`fold_rows`] of one diagonal block `from..to`, the rest being zero in these rows.
-#[inline(always)]
-pub(crate) fn fold_rows_in<T: Real, const N: usize, const M: usize>(
-    from: usize,
-    to: usize,
-    r: &mut SMatrix<T, N, N>,
-    y: &mut SVector<T, N>,
-    b: &mut SMatrix<T, M, N>,
-    e: &mut SVector<T, M>,
-) {
-    for j in from..to {
+    for j in 0..N {
         let tail = b.data.0[j];
         if let Some((s, u0, beta)) = reflector(r[(j, j)], &tail) {
             r[(j, j)] = s;
-            for c in j + 1..to {
+            for c in j + 1..N {
                 let mut dot = u0 * r[(j, c)];
                 for k in 0..M {
                     dot += tail[k] * b[(k, c)];
@@ -78,7 +65,7 @@ pub(crate) fn fold_rows_in<T: Real, const N: usize, const M: usize>(
             }
         }
         if r[(j, j)] < T::zero() {
-            for c in j..to {
+            for c in j..N {
                 r[(j, c)] = -r[(j, c)];
             }
             y[j] = -y[j];
@@ -94,53 +81,40 @@ pub fn eliminate<T: Real, const N: usize, const W: usize>(
     r: &mut SMatrix<T, N, N>,
     y: &mut SVector<T, N>,
 ) {
-    eliminate_in((0, N), (0, W), a, r, y);
-}
-
-/// [`eliminate`] of the unknowns `noise` that reach only the diagonal block `block`.
-#[inline(always)]
-pub(crate) fn eliminate_in<T: Real, const N: usize, const W: usize>(
-    block: (usize, usize),
-    noise: (usize, usize),
-    a: &mut SMatrix<T, N, W>,
-    r: &mut SMatrix<T, N, N>,
-    y: &mut SVector<T, N>,
-) {
-    let (from, to) = block;
-    for j in noise.0..noise.1 {
+    for j in 0..W {
         let mut tail = [T::zero(); N];
-        for k in from..to {
+        for k in 0..N {
             tail[k] = a[(k, j)];
         }
         // The head is 1: the unit block stays a unit block to the right of its diagonal, and row j of it is zero in
         // every later column, so the dot products are over the tail alone.
         let Some((_, _, beta)) = reflector(T::one(), &tail) else { continue };
-        for c in j + 1..noise.1 {
+        for c in j + 1..W {
             let mut dot = T::zero();
-            for k in from..to {
+            for k in 0..N {
                 dot += tail[k] * a[(k, c)];
             }
             let f = beta * dot;
-            for k in from..to {
+            for k in 0..N {
                 a[(k, c)] += f * tail[k];
             }
         }
-        for c in from..to {
+        for c in 0..N {
             let mut dot = T::zero();
-            for k in from..to {
+            for k in 0..N {
                 dot += tail[k] * r[(k, c)];
             }
             let f = beta * dot;
-            for k in from..to {
+            for k in 0..N {
                 r[(k, c)] += f * tail[k];
             }
         }
         let mut dot = T::zero();
-        for k in from..to {
+        for k in 0..N {
             dot += tail[k] * y[k];
         }
         let f = beta * dot;
-        for k in from..to {
+        for k in 0..N {
             y[k] += f * tail[k];
         }
     }
@@ -149,52 +123,41 @@ pub(crate) fn eliminate_in<T: Real, const N: usize, const W: usize>(
 /// Triangularises a full `[R | y]` to upper triangular with a diagonal of at least 0.
 #[inline]
 pub fn triangularize<T: Real, const N: usize>(r: &mut SMatrix<T, N, N>, y: &mut SVector<T, N>) {
-    triangularize_in(0, N, r, y);
-}
-
-/// [`triangularize`] of one diagonal block `from..to`.
-#[inline(always)]
-pub(crate) fn triangularize_in<T: Real, const N: usize>(
-    from: usize,
-    to: usize,
-    r: &mut SMatrix<T, N, N>,
-    y: &mut SVector<T, N>,
-) {
-    for j in from..to {
+    for j in 0..N {
         let mut tail = [T::zero(); N];
-        for k in j + 1..to {
+        for k in j + 1..N {
             tail[k] = r[(k, j)];
         }
         if let Some((s, u0, beta)) = reflector(r[(j, j)], &tail) {
             r[(j, j)] = s;
-            for c in j + 1..to {
+            for c in j + 1..N {
                 let mut dot = u0 * r[(j, c)];
-                for k in j + 1..to {
+                for k in j + 1..N {
                     dot += tail[k] * r[(k, c)];
                 }
                 let f = beta * dot;
                 r[(j, c)] += f * u0;
-                for k in j + 1..to {
+                for k in j + 1..N {
                     r[(k, c)] += f * tail[k];
                 }
             }
             let mut dot = u0 * y[j];
-            for k in j + 1..to {
+            for k in j + 1..N {
                 dot += tail[k] * y[k];
             }
             let f = beta * dot;
             y[j] += f * u0;
-            for k in j + 1..to {
+            for k in j + 1..N {
                 y[k] += f * tail[k];
             }
         }
         if r[(j, j)] < T::zero() {
-            for c in j..to {
+            for c in j..N {
                 r[(j, c)] = -r[(j, c)];
             }
             y[j] = -y[j];
         }
-        for k in j + 1..to {
+        for k in j + 1..N {
             r[(k, j)] = T::zero();
         }
     }

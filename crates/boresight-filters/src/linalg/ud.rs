@@ -78,34 +78,18 @@ pub fn mwgs<T: Real, const N: usize, const W: usize>(
     db: &SVector<T, W>,
 ) -> UdFactors<N, T> {
     let mut f = UdFactors { u: SMatrix::identity(), d: SVector::zeros() };
-    mwgs_in((0, N), (0, W), &mut f, a, da, b, db);
-    f
-}
-
-/// [`mwgs`] of one diagonal block of A with the columns `noise` of B that reach it.
-#[inline(always)]
-pub(crate) fn mwgs_in<T: Real, const N: usize, const W: usize>(
-    block: (usize, usize),
-    noise: (usize, usize),
-    f: &mut UdFactors<N, T>,
-    a: &SMatrix<T, N, N>,
-    da: &SVector<T, N>,
-    b: &SMatrix<T, N, W>,
-    db: &SVector<T, W>,
-) {
-    let (from, to) = block;
     // Rows of [A | B] as columns, so that each vector lies in one piece.
     let mut wa = a.transpose();
     let mut wb = b.transpose();
-    for j in (from..to).rev() {
+    for j in (0..N).rev() {
         let mut va = [T::zero(); N];
         let mut vb = [T::zero(); W];
         let mut dj = T::zero();
-        for l in from..to {
+        for l in 0..N {
             va[l] = da[l] * wa[(l, j)];
             dj += va[l] * wa[(l, j)];
         }
-        for l in noise.0..noise.1 {
+        for l in 0..W {
             vb[l] = db[l] * wb[(l, j)];
             dj += vb[l] * wb[(l, j)];
         }
@@ -114,26 +98,27 @@ pub(crate) fn mwgs_in<T: Real, const N: usize, const W: usize>(
             continue;
         }
         let inv = T::one() / dj;
-        for k in from..j {
+        for k in 0..j {
             let mut dot = T::zero();
-            for l in from..to {
+            for l in 0..N {
                 dot += va[l] * wa[(l, k)];
             }
-            for l in noise.0..noise.1 {
+            for l in 0..W {
                 dot += vb[l] * wb[(l, k)];
             }
             let ukj = dot * inv;
             f.u[(k, j)] = ukj;
-            for l in from..to {
+            for l in 0..N {
                 let less = ukj * wa[(l, j)];
                 wa[(l, k)] -= less;
             }
-            for l in noise.0..noise.1 {
+            for l in 0..W {
                 let less = ukj * wb[(l, j)];
                 wb[(l, k)] -= less;
             }
         }
     }
+    f
 }
 
 #[cfg(test)]

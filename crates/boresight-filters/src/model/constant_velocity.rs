@@ -149,10 +149,26 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
     }
 
     #[inline(always)]
-    fn propagate_apart(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
+    fn propagate_axes(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
+        let (q00, q01, q11) = self.axis_noise(dt);
+        for axis in 0..2 {
+            let moved = x[axis] + dt * x[2 + axis];
+            x[axis] = moved;
+        }
+        // Each 2 x 2 block B of P becomes F B Fᵀ with F = [[1, dt], [0, 1]].
+        for axis in 0..2 {
+            let (b, c) = (p[(axis, 1)], p[(2 + axis, 1)]);
+            let v = b + dt * c;
+            p[(axis, 0)] += dt * (b + v) + q00;
+            p[(axis, 1)] = v + q01;
+            p[(2 + axis, 1)] = c + q11;
+        }
+    }
+
+    #[inline]
+    fn propagate(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
         *x = self.moved(dt, x);
         let (q00, q01, q11) = self.axis_noise(dt);
-        // Each 2 x 2 block B of P becomes F B Fᵀ with F = [[1, dt], [0, 1]].
         for i in [0, 2] {
             let v = p[(i, i + 1)] + dt * p[(i + 1, i + 1)];
             let more = dt * (p[(i, i + 1)] + v) + q00;
@@ -161,11 +177,6 @@ impl<T: Real> Model<4, T> for ConstantVelocity<T> {
             p[(i + 1, i)] = v + q01;
             p[(i + 1, i + 1)] += q11;
         }
-    }
-
-    #[inline]
-    fn propagate(&self, dt: T, x: &mut SVector<T, 4>, p: &mut SMatrix<T, 4, 4>) {
-        self.propagate_apart(dt, x, p);
         let cross = Matrix2::new(p[(0, 2)], p[(0, 3)], p[(1, 2)], p[(1, 3)]);
         let top = [cross[(0, 0)] + dt * cross[(1, 0)], cross[(0, 1)] + dt * cross[(1, 1)]];
         let block = [top[0] + dt * top[1], top[1], cross[(1, 0)] + dt * cross[(1, 1)], cross[(1, 1)]];

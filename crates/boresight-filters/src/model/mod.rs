@@ -37,7 +37,8 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
     /// Whether Phi is the same at every state.
     const LINEAR: bool = true;
     /// Whether the state is two independent axes, x in the first half and y, alike, in the second, and the noise factor
-    /// has the columns of x first and as many of y after them: filters then skip the zeros between uncorrelated axes.
+    /// has the columns of x first and as many of y after them; Phi of an axis is upper triangular. Filters then skip the
+    /// zeros between uncorrelated axes.
     const AXES: bool = false;
 
     /// Returns Phi for a step of `dt_s` seconds; a nonlinear model linearises at the state `at`.
@@ -88,10 +89,36 @@ pub trait Model<const N: usize, T: Real = f64>: Clone {
         Ok(mul(a, &self.inverse_transition(dt_s, at)?))
     }
 
-    /// [`Model::propagate`] for a P whose axes are uncorrelated; only called where [`Model::AXES`] holds.
+    /// [`Model::propagate`] of two uncorrelated axes side by side: state i of axis a at 2 i + a of x, entry (i, j), i <= j,
+    /// of its block at row 2 i + a of column j of P. Only called where [`Model::AXES`] holds.
     #[inline]
-    fn propagate_apart(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
-        self.propagate(dt_s, x, p);
+    fn propagate_axes(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        let half = N / 2;
+        let (phi, q, before) = (self.transition(dt_s, x), self.process_noise(dt_s), *x);
+        // F P of both axes, all entries.
+        let mut fp = SMatrix::<T, N, N>::zeros();
+        *x = SVector::zeros();
+        for i in 0..half {
+            for k in 0..half {
+                for axis in 0..2 {
+                    x[2 * i + axis] += phi[(i, k)] * before[2 * k + axis];
+                    for j in 0..half {
+                        fp[(2 * i + axis, j)] += phi[(i, k)] * p[(2 * k.min(j) + axis, k.max(j))];
+                    }
+                }
+            }
+        }
+        for j in 0..half {
+            for i in 0..=j {
+                for axis in 0..2 {
+                    let mut v = q[(i, j)];
+                    for k in 0..half {
+                        v += fp[(2 * i + axis, k)] * phi[(j, k)];
+                    }
+                    p[(2 * i + axis, j)] = v;
+                }
+            }
+        }
     }
 
     /// Hands the factored process noise Q = G diag(q) Gᵀ to the visitor; the default factors Q with W = N.

@@ -5,6 +5,7 @@
 //! Symbols: state `[x, vx, y, vy]`; β = 1/τ (1/s); σ_v stationary velocity standard deviation (px/s); noise density
 //! 2 β σ_v² (px²/s³). Over long gaps the velocity variance stays at σ_v², so a coasting track does not explode:
 //! the model for cells, particles, pedestrians. Limits: a target on a long straight course is pulled towards rest.
+//! Cost: an exponential, and five quadrature points where the closed form would cancel.
 
 use super::axes::{both_axes, decay1, noise_integral};
 use super::{Model, check_strength};

@@ -4,6 +4,7 @@
 //! variance q dt per axis (px²/s; a particle of diffusion coefficient D has q = 2 D).
 //! Kinematics: the velocity is reported as 0 with the variance of the displacement of one second, q per axis (px²/s²),
 //! so that nothing downstream takes it for a known standstill.
+//! Limits: nothing is predicted but the growth of the uncertainty. Cost: two additions.
 
 use super::{Model, check_strength};
 use crate::{FilterError, Gaussian, Real};

@@ -1,4 +1,7 @@
 //! A model whose process noise is multiplied by a factor that can change from step to step (for adaptive noise).
+//!
+//! Symbols: Q process covariance of the model inside; s factor, no unit: s Q. Limits: at s other than 1 the model's own
+//! shortcuts are not taken. Cost: that of the model.
 
 use super::{Dense, Model, NoiseVisitor, check_strength};
 use crate::{FilterError, Gaussian, Real};
@@ -66,8 +69,12 @@ impl<const N: usize, T: Real, M: Model<N, T>> Model<N, T> for Scaled<M, T> {
             Dense(self.clone()).propagate(dt_s, x, p)
         }
     }
-    fn propagate_apart(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
-        if self.scale == T::one() { self.model.propagate_apart(dt_s, x, p) } else { self.propagate(dt_s, x, p) }
+    fn propagate_axes(&self, dt_s: T, x: &mut SVector<T, N>, p: &mut SMatrix<T, N, N>) {
+        if self.scale == T::one() {
+            self.model.propagate_axes(dt_s, x, p);
+        } else {
+            Dense(self.clone()).propagate_axes(dt_s, x, p);
+        }
     }
     fn transition_times(&self, dt_s: T, at: &SVector<T, N>, a: &SMatrix<T, N, N>) -> SMatrix<T, N, N> {
         self.model.transition_times(dt_s, at, a)

@@ -6,6 +6,7 @@
 //! Symbols: state `[x, vx, ax, y, vy, ay]`; α = 1/τ (1/s); σ_m acceleration standard deviation (px/s²).
 //! Limits: the mean acceleration is 0: a long turn is followed with a lag. τ → ∞ is constant acceleration, τ → 0
 //! constant velocity with white acceleration of density 2 σ_m² τ.
+//! Cost: an exponential, and five quadrature points where the closed form would cancel.
 
 use super::axes::{both_axes, decay1, decay2, noise_integral};
 use super::constant_acceleration::lift_to_acceleration;

@@ -6,6 +6,7 @@
 //! Differs from it: the noise is that of [`ConstantVelocity`] in each axis (continuous): the exact covariance of a turn
 //! differs by terms of (ω dt)², which the tuning of q swallows.
 //! Limits: [`NearlyConstantTurn`] is linearised (or taken by sigma points, [`crate::Ukf`]): ω dt below about 1 rad.
+//! Cost: one sine and cosine a step; dense 4 x 4 or 5 x 5 products.
 
 use super::{ConstantVelocity, Model, NoiseVisitor, check_strength};
 use crate::{FilterError, Gaussian, Real};

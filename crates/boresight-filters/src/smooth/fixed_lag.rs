@@ -2,6 +2,7 @@
 //!
 //! Source: J. B. Moore, Automatica 9(2), 1973, by L steps of [`super::rts_step`] over a ring of beliefs: the same answer
 //! as a full smoother that stops at the newest scan. Cost: L N³ a scan. Limits: memory for L beliefs in the value itself.
+//! Symbols: L beliefs of N states; dt_s between them, s.
 
 use super::{Filtered, rts_step};
 use crate::model::Model;

@@ -4,6 +4,7 @@
 //! (I - C Phi) S, C G L and C S_s⁺ side by side, made triangular by Householder: P_s = their products summed. The gain
 //! C = P Phiᵀ P~⁻¹ is solved in roots as well: S~ = root of [Phi S | G L], C = (S (Phi S)ᵀ S~⁻ᵀ) S~⁻¹.
 //! Cost: about 12 N³ flops a scan. Limits: P~ must be positive definite in the precision of its root (half the digits).
+//! Symbols: x, P, S filtered; ~ predicted; ⁺ next scan; G, L process-noise root.
 
 use super::Filtered;
 use crate::linalg::{Cholesky, lower_factor, mul, mul_transposed};
