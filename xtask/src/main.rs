@@ -4,6 +4,7 @@ mod bench_metrics;
 mod bench_track;
 mod clutter_table;
 mod crossing_table;
+mod docs;
 mod filter_table;
 mod ir_exam;
 mod mot_table;
@@ -23,6 +24,8 @@ struct Cli {
 enum Chore {
     /// Measure the speed of the evaluation from files, beside other tools.
     BenchMetrics(bench_metrics::Args),
+    /// Write the parameter reference and the JSON schema to docs/.
+    Docs(docs::Args),
     /// Track the public infrared clips with no options and score the tracks.
     IrExam(ir_exam::Args),
     /// Scale: scans per second from 10 to 100 000 targets, with GOSPA.
@@ -48,6 +51,7 @@ fn test_data() -> PathBuf {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
         Chore::BenchMetrics(args) => bench_metrics::run(&args),
+        Chore::Docs(args) => docs::run(&args),
         Chore::IrExam(args) => ir_exam::exam(&args),
         Chore::BenchTrack(args) => bench_track::run(&args),
         Chore::ClutterTable(args) => clutter_table::run(&args),

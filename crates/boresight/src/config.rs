@@ -3,6 +3,13 @@
 //! Enums are externally tagged (`[tracker.associator.global-nearest]`), unknown keys are refused with their line. Errors name
 //! the key, its value, what was expected and a mend.
 
+mod explain;
+mod reference;
+mod typo;
+
+pub use explain::{Explanation, explain, schema};
+pub use reference::reference;
+
 use crate::io::{Colour, OpenOptions, RawFormat, RawType};
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
@@ -147,11 +154,7 @@ impl Config {
     /// # Errors
     /// A key that is unknown, of the wrong type or out of its range, with its line.
     pub fn from_toml(text: &str, name: &str) -> Result<Self> {
-        let config: Self = toml::from_str(text).map_err(|e| {
-            Error::new(ErrorKind::Config, e.to_string().trim_end().to_string()).at(name).hint(
-                "`boresight config` prints every key with its default, `boresight config --explain KEY` what it means",
-            )
-        })?;
+        let config: Self = toml::from_str(text).map_err(|e| typo::explain(&e, true).at(name))?;
         config.validate().map_err(|e| e.at(name))?;
         Ok(config)
     }
@@ -161,7 +164,7 @@ impl Config {
     /// A file that cannot be read, and what [`Config::from_toml`] refuses.
     pub fn from_file(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::new(ErrorKind::NotFound, "the configuration cannot be read").at(path.display()).because(e)
+            Error::new(ErrorKind::NotFound, "the configuration cannot be read").at(path.display()).because(e).hint("`boresight config > my.toml` writes one with every key's default; each run leaves its own as config.toml")
         })?;
         Self::from_toml(&text, &path.display().to_string())
     }
@@ -200,7 +203,11 @@ impl Config {
         let mut tree = toml::Value::try_from(self).map_err(|e| bad(&e.to_string()))?;
         set(&mut tree, key.trim(), value).ok_or_else(|| bad("no such table"))?;
         let text = toml::to_string(&tree).map_err(|e| bad(&e.to_string()))?;
-        Self::from_toml(&text, &format!("--set {assignment}"))
+        let name = format!("--set {assignment}");
+        // The text is ours: its lines would say nothing to a user.
+        let config: Self = toml::from_str(&text).map_err(|e| typo::explain(&e, false).at(&name))?;
+        config.validate().map_err(|e| e.at(name))?;
+        Ok(config)
     }
 }
 
@@ -230,99 +237,6 @@ fn set(tree: &mut toml::Value, key: &str, value: toml::Value) -> Option<()> {
     }
     at.as_table_mut()?.insert((*last).to_string(), value);
     Some(())
-}
-
-/// The JSON schema of the configuration, with every key's meaning.
-pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(Config).to_value()
-}
-
-/// What a key or a table means.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Explanation {
-    /// Meaning, unit, range, effect.
-    pub meaning: String,
-    /// Default, if it has one.
-    pub default: Option<String>,
-    /// The keys of a table or the choices of an enum, with their meanings.
-    pub entries: Vec<(String, String)>,
-}
-
-/// Explains a key such as `tracker.gate-probability`, or a table or choice such as `tracker.filter`.
-/// # Errors
-/// A key that does not exist; the error lists what there is at that place.
-pub fn explain(key: &str) -> Result<Explanation> {
-    let schema = schema();
-    let mut at = schema.clone();
-    let mut meaning = "The whole configuration.".to_string();
-    for (i, part) in key.split('.').enumerate() {
-        let children = children(&schema, &at);
-        let Some((_, child)) = children.iter().find(|(name, _)| name == part) else {
-            let known: Vec<_> = children.iter().map(|(name, _)| name.as_str()).collect();
-            return Err(Error::new(ErrorKind::Config, "there is no such key").at(key).hint(format!(
-                "{} holds: {}",
-                if i == 0 { "the configuration" } else { "this table" },
-                known.join(", ")
-            )));
-        };
-        meaning = describe(&schema, child);
-        at = child.clone();
-    }
-    let default = at.get("default").filter(|d| !d.is_object()).map(ToString::to_string);
-    let entries = children(&schema, &at).iter().map(|(name, child)| (name.clone(), describe(&schema, child))).collect();
-    Ok(Explanation { meaning, default, entries })
-}
-
-/// Follows a reference to its definition.
-fn resolve<'a>(root: &'a serde_json::Value, at: &'a serde_json::Value) -> &'a serde_json::Value {
-    let mut at = at;
-    for _ in 0..8 {
-        let link = at.get("$ref").and_then(serde_json::Value::as_str);
-        let any = at.get("anyOf").and_then(|a| a.as_array()).and_then(|a| a.iter().find(|v| v.get("$ref").is_some()));
-        match (link.and_then(|l| root.pointer(l.trim_start_matches('#'))), any) {
-            (Some(next), _) | (None, Some(next)) => at = next,
-            (None, None) => break,
-        }
-    }
-    at
-}
-
-fn describe(root: &serde_json::Value, at: &serde_json::Value) -> String {
-    let own = at.get("description").or_else(|| resolve(root, at).get("description"));
-    own.and_then(serde_json::Value::as_str).unwrap_or("").replace('\n', " ")
-}
-
-/// The named parts of a table, or the variants of an enum.
-fn children(root: &serde_json::Value, at: &serde_json::Value) -> Vec<(String, serde_json::Value)> {
-    let mut at = resolve(root, at);
-    // A variant of an enum is a table with the variant's name as its only key; what it holds is one level down.
-    let mut out = Vec::new();
-    if let Some(variants) = at.get("oneOf").and_then(|v| v.as_array()) {
-        for variant in variants {
-            if let Some(name) = variant.get("const").and_then(|c| c.as_str()) {
-                out.push((name.to_string(), variant.clone()));
-            }
-            for name in variant.get("enum").and_then(|e| e.as_array()).into_iter().flatten().filter_map(|n| n.as_str())
-            {
-                out.push((name.to_string(), variant.clone()));
-            }
-            for (name, inner) in variant.get("properties").and_then(|p| p.as_object()).into_iter().flatten() {
-                let mut inner = inner.clone();
-                if let (Some(object), Some(text)) = (inner.as_object_mut(), variant.get("description")) {
-                    object.insert("description".to_string(), text.clone());
-                }
-                out.push((name.clone(), inner));
-            }
-        }
-        return out;
-    }
-    if let Some(items) = at.get("items") {
-        at = resolve(root, items);
-    }
-    for (name, child) in at.get("properties").and_then(|p| p.as_object()).into_iter().flatten() {
-        out.push((name.clone(), child.clone()));
-    }
-    out
 }
 
 #[cfg(test)]
@@ -358,26 +272,5 @@ mod tests {
         assert!(config.with("tracker.gate-probability=2").is_err());
         assert!(config.with("tracker.nonsense=2").is_err());
         assert!(config.with("nonsense").is_err());
-    }
-
-    #[test]
-    fn every_key_has_a_meaning() {
-        fn walk(path: &str, depth: usize, bare: &mut Vec<String>) {
-            for (name, meaning) in explain(path).unwrap().entries {
-                let key = format!("{path}.{name}");
-                if meaning.is_empty() {
-                    bare.push(key.clone());
-                }
-                if depth < 4 {
-                    walk(&key, depth + 1, bare);
-                }
-            }
-        }
-        let mut bare = Vec::new();
-        ["input", "detector", "tracker"].iter().for_each(|table| walk(table, 0, &mut bare));
-        assert!(bare.is_empty(), "keys without a meaning: {bare:?}");
-        assert!(explain("tracker.gate-probability").unwrap().meaning.contains("χ²"));
-        assert!(explain("tracker.filter").unwrap().entries.iter().any(|(name, _)| name == "kf"));
-        assert!(explain("tracker.nonsense").unwrap_err().to_string().contains("coast-s"));
     }
 }

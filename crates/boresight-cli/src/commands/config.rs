@@ -48,24 +48,25 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// What `--list` knows, and the key that holds it.
+const LISTS: [(&str, &str); 8] = [
+    ("filters", "tracker.filter"),
+    ("associators", "tracker.associator"),
+    ("lives", "tracker.life"),
+    ("births", "tracker.birth"),
+    ("clutter", "tracker.clutter"),
+    ("thresholds", "detector.threshold"),
+    ("spatial-filters", "detector.filter"),
+    ("centroids", "detector.centroid.method"),
+];
+
 fn list(what: &str) -> anyhow::Result<String> {
-    let key = match what {
-        "filters" => "tracker.filter",
-        "models" => "tracker.filter.kf.model",
-        "innovations" => "tracker.filter.kf.innovation",
-        "thresholds" => "detector.threshold",
-        "associators" => "tracker.associator",
-        "lives" => "tracker.life",
-        "births" => "tracker.birth",
-        _ => {
-            return Err(Error::new(
-                ErrorKind::Config,
-                "expected filters, models, innovations, thresholds, associators, lives or births",
-            )
+    let names = LISTS.map(|(name, _)| name).join(", ");
+    let (_, key) = LISTS.iter().find(|(name, _)| *name == what).ok_or_else(|| {
+        Error::new(ErrorKind::Config, "there is no such list")
             .at(format!("--list {what}"))
-            .into());
-        }
-    };
+            .hint(format!("lists: {names}"))
+    })?;
     explain(key)
 }
 

@@ -94,7 +94,8 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
 /// The configuration with what the command line changes.
 fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     if let Some(filter) = &args.filter {
-        config = config.with(&format!("tracker.filter.{filter}={{}}"))?;
+        config =
+            config.with(&format!("tracker.filter.{filter}={{}}")).map_err(|e| e.at(format!("--filter {filter}")))?;
     }
     for set in &args.sets {
         config = config.with(set)?;
@@ -143,7 +144,10 @@ pub fn default_folder(input: &str, ending: &str) -> PathBuf {
 /// Makes the results' folder.
 pub fn make_folder(dir: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| {
-        Error::new(ErrorKind::Output, "the folder for the results cannot be made").at(dir.display()).because(e)
+        Error::new(ErrorKind::Output, "the folder for the results cannot be made")
+            .at(dir.display())
+            .because(e)
+            .hint("choose another with --output DIR")
     })?;
     Ok(())
 }

@@ -24,7 +24,18 @@ impl AtomicFile {
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be created or another run is writing it.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
-        let path = path.into();
+        let mut path = path.into();
+        // A link keeps pointing where it points: its target is replaced, not the link.
+        if path.is_symlink()
+            && let Ok(target) = path.canonicalize()
+        {
+            path = target;
+        }
+        if is_special(&path) {
+            return Err(Error::new(ErrorKind::Output, "is a device or a pipe, which a file must not replace")
+                .at(path.display())
+                .hint("give the name of a file; tables also go to `-`, standard output"));
+        }
         if path.is_dir() {
             return Err(Error::new(ErrorKind::Output, "a folder of this name is in the way").at(path.display()));
         }
@@ -107,6 +118,11 @@ impl Drop for AtomicFile {
     }
 }
 
+/// Whether something stands under this name that is neither file nor folder: renaming onto it would destroy it.
+fn is_special(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
+}
+
 /// Where a text writer's lines go.
 pub enum Output {
     /// A file that appears whole.
@@ -116,10 +132,17 @@ pub enum Output {
 }
 
 impl Output {
-    /// A file that appears whole; unfinished, its lines stay readable under `path.part`.
+    /// A file that appears whole; unfinished, its lines stay readable under `path.part`. A device or a pipe gets the lines
+    /// as they come.
     /// # Errors
     /// As [`AtomicFile::create`].
     pub fn file(path: impl Into<PathBuf>) -> Result<Self> {
+        let path = path.into();
+        if is_special(&path) {
+            let device = OpenOptions::new().write(true).open(&path);
+            let failed = |e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e);
+            return Ok(Self::Stream(Box::new(device.map_err(failed)?)));
+        }
         Ok(Self::File(AtomicFile::create(path)?.keep_part()))
     }
 
@@ -137,7 +160,7 @@ impl Output {
             Self::Stream(stream) => stream
                 .write_all(lines)
                 .and_then(|()| stream.flush())
-                .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at("standard output").because(e)),
+                .map_err(|e| Error::new(ErrorKind::Output, "the output's stream cannot be written").because(e)),
         }
     }
 
@@ -187,5 +210,35 @@ mod tests {
         first.write_all(b"new").unwrap();
         first.finish().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_written_to_and_never_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let is_device = || std::fs::metadata("/dev/null").unwrap().file_type().is_char_device();
+        assert!(is_device());
+        assert!(AtomicFile::create("/dev/null").unwrap_err().to_string().contains("must not replace"));
+        let mut lines = Output::file("/dev/null").unwrap();
+        lines.put(b"a\n").unwrap();
+        lines.finish().unwrap();
+        assert!(is_device());
+        if is_special(Path::new("/dev/full")) {
+            assert_eq!(Output::file("/dev/full").unwrap().put(b"a\n").unwrap_err().kind(), ErrorKind::Output);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_its_target_is_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let (target, link) = (dir.path().join("t.csv"), dir.path().join("l.csv"));
+        std::fs::write(&target, b"old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        let mut file = AtomicFile::create(&link).unwrap();
+        file.write_all(b"new").unwrap();
+        file.finish().unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read(&target).unwrap(), b"new");
     }
 }

@@ -1,0 +1,33 @@
+//! Every subcommand has a help text with examples; completions and the manual page know them all.
+
+use super::{run_ok, stdout};
+
+fn subcommands() -> Vec<String> {
+    let text = stdout(&run_ok(["--help"]));
+    let list = text.split("Commands:").nth(1).and_then(|t| t.split("Options:").next()).expect("a list of commands");
+    list.lines().filter_map(|l| l.split_whitespace().next()).filter(|n| *n != "help").map(str::to_string).collect()
+}
+
+#[test]
+fn every_help_text_has_a_sentence_usage_and_examples() {
+    let names = subcommands();
+    assert!(names.len() >= 9, "{names:?}");
+    for name in names {
+        let text = stdout(&run_ok([name.as_str(), "--help"]));
+        let first = text.lines().next().unwrap_or("");
+        assert!(first.len() > 15 && first.starts_with(char::is_uppercase), "{name}: {first}");
+        assert!(text.contains("Usage: boresight"), "{name}");
+        assert!(text.contains("Example"), "{name} shows no example:\n{text}");
+        assert!(text.contains(&format!("  boresight {name}")), "{name}: an example that runs it");
+    }
+}
+
+#[test]
+fn completions_name_every_subcommand() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh", "man"] {
+        let text = stdout(&run_ok(["completions", shell]));
+        for name in subcommands() {
+            assert!(text.contains(&name), "{shell} lacks {name}");
+        }
+    }
+}
