@@ -17,6 +17,7 @@ pub mod noise_level;
 pub mod pixel;
 pub mod probability;
 pub mod region;
+mod runs;
 pub mod spatial;
 mod stage;
 pub mod tbd;

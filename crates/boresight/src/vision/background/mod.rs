@@ -18,19 +18,21 @@ pub mod difference;
 mod light;
 pub mod model;
 pub mod morphology;
+mod rows;
 pub mod shadow;
 
 pub use config::BackgroundConfig;
 pub use difference::{DifferenceConfig, FrameDifference};
 pub use model::BackgroundPixel;
 pub use morphology::{BitImage, CleanUp};
+pub(crate) use rows::pack;
 pub use shadow::ShadowConfig;
 
 use crate::{Error, ErrorKind, Image, Result};
-use fearless_simd::{Level, Simd, SimdBase, SimdMask, dispatch};
+use fearless_simd::{Level, dispatch};
 use light::{Grid, Light};
 use model::{Coefficients, GHOST, MOVING, Rates, STILL};
-use multiversion::multiversion;
+use rows::{adapt, judge};
 
 /// Fewest of the row's updates a time constant: a rate below 1/32 would drown in the rounding of the fixed-point model.
 const SLOWEST_RATE: f64 = 1.0 / 32.0;
@@ -367,51 +369,4 @@ fn size_changed(w: usize, h: usize, found_w: usize, found_h: usize) -> Error {
     Error::new(ErrorKind::Damaged, format!("expected a frame of {w} x {h} px, as before"))
         .at(format!("{found_w} x {found_h} px"))
         .hint("frames of one sequence must have one size")
-}
-
-/// Writes 1 for each pixel that moves and 0 for the rest, also past the width.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn judge<T: BackgroundPixel>(
-    row: &[T],
-    mean: &[T::Level],
-    deviation: &[T::Level],
-    terms: &T::Terms,
-    states: &mut [u8],
-) {
-    let n = row.len();
-    let (mean, deviation) = (&mean[..n], &deviation[..n]);
-    let (inside, outside) = states.split_at_mut(n);
-    for x in 0..n {
-        inside[x] = u8::from(row[x].moves(mean[x], deviation[x], terms));
-    }
-    outside.fill(0);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn adapt<T: BackgroundPixel>(
-    row: &[T],
-    states: &[u8],
-    terms: &T::Terms,
-    steps: &T::Steps,
-    mean: &mut [T::Level],
-    deviation: &mut [T::Level],
-) {
-    let n = row.len();
-    let (states, mean, deviation) = (&states[..n], &mut mean[..n], &mut deviation[..n]);
-    for x in 0..n {
-        (mean[x], deviation[x]) = row[x].adapt(mean[x], deviation[x], states[x], terms, steps);
-    }
-}
-
-/// Packs bytes 0 and 1 into bits; `states` has 64 bytes for every word.
-#[inline(always)]
-pub(crate) fn pack<S: Simd>(simd: S, states: &[u8], bits: &mut [u64]) {
-    let lanes = S::u8s::LEN;
-    for (bytes, word) in states.chunks_exact(64).zip(bits) {
-        let mut w = 0;
-        for (i, part) in bytes.chunks_exact(lanes).enumerate() {
-            w |= S::u8s::from_slice(simd, part).simd_gt(0).to_bitmask() << (i * lanes);
-        }
-        *word = w;
-    }
 }

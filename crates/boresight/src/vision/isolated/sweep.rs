@@ -3,8 +3,8 @@
 //! The full moments of a cluster are taken later and only for the few that count.
 
 use crate::Image;
-use crate::vision::cluster::runs;
 use crate::vision::pixel::Pixel;
+use crate::vision::runs::runs;
 use crate::vision::threshold::Side;
 
 /// A cluster at one level.

@@ -1,6 +1,7 @@
 //! Thresholds: which pixels belong to targets. Each turns one row of native pixels into one row of bits.
 
 pub mod band;
+mod box_mean;
 pub mod grid;
 pub mod local;
 pub mod otsu;
