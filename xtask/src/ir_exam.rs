@@ -5,7 +5,7 @@
 //! Truth boxes count pixels and frames from 1 (the data's SOURCE.md); single-target clips are those with one box in every frame.
 
 use anyhow::{Context, Result};
-use boresight::auto::{self, Replay};
+use boresight::auto;
 use boresight::pipeline::{Input, run};
 use boresight::{Config, FrameSource, Sink, TrackStatus, View};
 use std::collections::{BTreeMap, HashMap};
@@ -81,11 +81,10 @@ struct Score {
 
 fn clip(input: &str, truth: &HashMap<u64, Vec<Box4>>, sets: &[String]) -> Result<Score> {
     let base = Config::default().with("input.rate-hz=30")?;
-    let source = boresight::io::open(input, &base.input.open_options())?;
     let started = std::time::Instant::now();
-    let mut replay = Replay::new(source, 48);
+    let (replay, choice) = auto::open_and_choose(input, &base)?;
     let info = replay.info().clone();
-    let mut config = auto::choose(replay.ahead(), &info, &base)?.config;
+    let mut config = choice.config;
     for set in sets {
         config = config.with(set)?;
     }

@@ -2,6 +2,7 @@
 
 mod bench_metrics;
 mod bench_track;
+mod choices;
 mod clutter_table;
 mod crossing_table;
 mod docs;
@@ -9,6 +10,7 @@ mod filter_table;
 mod ir_exam;
 mod mot_table;
 mod video_check;
+mod vision_exam;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -30,6 +32,8 @@ enum Chore {
     IrExam(ir_exam::Args),
     /// Scale: scans per second from 10 to 100 000 targets, with GOSPA.
     BenchTrack(bench_track::Args),
+    /// What the automatic choice says of every public clip.
+    Choices(choices::Args),
     /// One target in clutter: share lost by each method, beside SPEC E.
     ClutterTable(clutter_table::Args),
     /// Crossing targets: share tracked and identity switches of each method.
@@ -40,6 +44,8 @@ enum Chore {
     MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
     VideoCheck(video_check::Args),
+    /// Track the public clips that are not infrared with no options and score the tracks.
+    VisionExam(vision_exam::Args),
 }
 
 /// The folder of the real data: `BORESIGHT_TEST_DATA`, by default `../shared/data` beside the repository.
@@ -54,10 +60,12 @@ fn main() -> anyhow::Result<()> {
         Chore::Docs(args) => docs::run(&args),
         Chore::IrExam(args) => ir_exam::exam(&args),
         Chore::BenchTrack(args) => bench_track::run(&args),
+        Chore::Choices(args) => choices::run(&args),
         Chore::ClutterTable(args) => clutter_table::run(&args),
         Chore::CrossingTable(args) => crossing_table::run(&args),
         Chore::FilterTable(args) => filter_table::table(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
+        Chore::VisionExam(args) => vision_exam::run(&args),
     }
 }

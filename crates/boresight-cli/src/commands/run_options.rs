@@ -1,7 +1,7 @@
 //! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
 
 use anyhow::Context;
-use boresight::auto::{self, PROBE_FRAMES, Replay};
+use boresight::auto;
 use boresight::pipeline::{Input, Summary};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
@@ -74,18 +74,17 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
     if boresight::io::is_table(&args.input) {
         return plan_table(args, given, base);
     }
-    let source = boresight::io::open(&args.input, &base.input.open_options())?;
-    let info = source.info().clone();
-    let mut source: Box<dyn boresight::FrameSource> = source;
-    let (mut config, reasons) = match &given {
-        Some(_) => (base, vec!["Configuration as given.".to_string()]),
+    let (source, mut config, reasons): (Box<dyn boresight::FrameSource>, _, _) = match given {
+        Some(_) => {
+            let source = boresight::io::open(&args.input, &base.input.open_options())?;
+            (source, base, vec!["Configuration as given.".to_string()])
+        }
         None => {
-            let mut replay = Replay::new(source, PROBE_FRAMES);
-            let choice = auto::choose(replay.ahead(), &info, &base)?;
-            source = Box::new(replay);
-            (choice.config, choice.reasons)
+            let (replay, choice) = auto::open_and_choose(&args.input, &base)?;
+            (Box::new(replay), choice.config, choice.reasons)
         }
     };
+    let info = source.info().clone();
     config = changed(config, args)?;
     let detector = vision::build(&config.detector, &info)?;
     Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })

@@ -3,16 +3,24 @@
 //! Source: our own. It only reads frames and proposes a [`Config`]; the run itself uses that configuration and nothing else, so
 //! the same configuration given back gives the identical result.
 
+mod colour;
 mod detections;
+mod further;
+mod moving;
 mod open;
+mod particles;
 mod replay;
+mod scene;
 mod spots;
 
 pub use detections::for_detections;
+pub use further::{FURTHER_FRAMES, open_and_choose};
 pub use open::{Opened, PROBE_FRAMES, open};
 pub use replay::Replay;
 
+use crate::config::ColourConfig;
 use crate::{Config, Frame, Result, SourceInfo};
+use scene::Camera;
 
 /// A proposed configuration and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,24 +31,50 @@ pub struct Choice {
     pub reasons: Vec<String>,
 }
 
-/// Proposes a configuration from the first frames of a sequence.
+/// Proposes a configuration from the first frames of a sequence; [`open_and_choose`] also looks further on and in colour.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
+    choose_with(frames, info, base, &mut Vec::new)
+}
+
+/// As [`choose`]; `further` gives frames from further on, in colour if there is any, or none.
+fn choose_with(
+    frames: &[Frame],
+    info: &SourceInfo,
+    base: &Config,
+    further: &mut dyn FnMut() -> Vec<Frame>,
+) -> Result<Choice> {
     let mut reasons = Vec::new();
     let mut config = base.clone();
     let interval_s = interval_s(frames, info);
+    let mut scene = scene::look(frames, info)?;
+    let more = if scene.camera == Camera::Fixed { further() } else { Vec::new() };
+    let n_looked = frames.len().max(more.len());
+    let over_s = more.last().or(frames.last()).map_or(0.0, |f| f.time.as_secs_f64());
     reasons.push(format!(
-        "{} x {} {:?}, {:.4} frames/s ({}), from {} first frames.",
+        "{} x {} {:?}, {:.4} frames/s ({}), from {n_looked} frames of the first {over_s:.1} s.",
         info.width,
         info.height,
         info.kind,
         1.0 / interval_s,
         if info.true_times { "the file's times" } else { "no times in the input: the given rate" },
-        frames.len()
     ));
-    let evidence = spots::look(frames, info)?;
-    spots::configure(&evidence, info, interval_s, &mut config, &mut reasons);
+    if !more.is_empty() {
+        scene = scene::look(&more, &SourceInfo { kind: more[0].pixels.kind(), ..info.clone() })?;
+    }
+    // Who asks for grey gets grey.
+    let coloured = base.input.colour != ColourConfig::Gray;
+    if let Some(reference) = coloured.then(|| colour::look(&more, &scene)).flatten() {
+        colour::configure(&reference, &scene, info, interval_s, &mut config, &mut reasons);
+    } else if moving::fits(&scene, info) {
+        moving::configure(&scene, info, interval_s, &mut config, &mut reasons);
+    } else if let Some(seen) = particles::look(frames, &scene, info)? {
+        particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+    } else {
+        let evidence = spots::look(frames, info)?;
+        spots::configure(&evidence, info, interval_s, &mut config, &mut reasons);
+    }
     Ok(Choice { config, reasons })
 }
 

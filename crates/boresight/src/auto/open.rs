@@ -1,6 +1,6 @@
 //! Opens an input and settles everything in one call: what the command `boresight track INPUT` does, for programs.
 
-use super::{Replay, choose};
+use super::open_and_choose;
 use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Config, FrameSource, Result};
@@ -22,7 +22,7 @@ pub struct Opened {
     pub reasons: Vec<String>,
 }
 
-/// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them.
+/// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also further on.
 ///
 /// `base` says how the input is read; its other parts are where the choice starts from.
 /// ```
@@ -44,11 +44,10 @@ pub struct Opened {
 /// # Errors
 /// An input that cannot be read; a parameter out of its range.
 pub fn open(input: &str, base: &Config) -> Result<Opened> {
-    let mut replay = Replay::new(crate::io::open(input, &base.input.open_options())?, PROBE_FRAMES);
-    let info = replay.info().clone();
-    let choice = choose(replay.ahead(), &info, base)?;
+    let (frames, choice) = open_and_choose(input, base)?;
+    let info = frames.info().clone();
     Ok(Opened {
-        frames: Box::new(replay),
+        frames: Box::new(frames),
         detector: crate::vision::build(&choice.config.detector, &info)?,
         tracker: crate::track::build(&choice.config.tracker)?,
         config: choice.config,

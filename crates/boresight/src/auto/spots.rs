@@ -64,7 +64,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
 }
 
 /// The longest side looked for: two fifths of the frame's shorter side.
-fn max_side(info: &SourceInfo) -> u32 {
+pub(super) fn max_side(info: &SourceInfo) -> u32 {
     (info.width.min(info.height) * 2 / 5).clamp(8, 4096) as u32
 }
 

@@ -1,15 +1,18 @@
 //! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
 
+use super::background::BitImage;
 use super::camera::CameraMotion;
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
+use super::colour::{ColourMask, grey_image};
 use super::config::{CameraConfig, CentroidMethod, DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
-use super::stage::{Motion, Stage};
-use super::threshold::band::{band_bits, words};
+use super::stage::Stage;
+use super::threshold::band::words;
 use super::threshold::grid::BackgroundGrid;
+use super::threshold::level::{band_edge, one_band, one_side};
 use super::threshold::local::LocalThreshold;
 use super::threshold::otsu::otsu_level;
 use super::threshold::spot::SpotDetector;
@@ -28,6 +31,11 @@ const DEFAULT_CELL_PX: u32 = 32;
 /// A parameter out of its range.
 pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Detector>> {
     config.validate("detector")?;
+    if matches!(config.threshold, ThresholdConfig::Colour(_)) && source.kind != PixelKind::Rgb8 {
+        return Err(Error::new(ErrorKind::Config, format!("expected colour frames, found {:?}", source.kind))
+            .at("detector.threshold.colour")
+            .hint("--set input.colour=rgb reads a video in colour; grey pictures have none"));
+    }
     let detector = Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)?);
     Ok(match config.camera {
         CameraConfig::Fixed => detector,
@@ -64,6 +72,7 @@ struct ThresholdDetector {
     samples: Vec<f32>,
     isolated: IsolatedDetector,
     spots: Option<SpotDetector>,
+    colour: Option<ColourMask>,
     /// One per pixel type, so that a frame keeps its type.
     stage8: Stage<u8>,
     stage16: Stage<u16>,
@@ -83,6 +92,10 @@ impl ThresholdDetector {
             _ => None,
         };
         Ok(Self {
+            colour: match &config.threshold {
+                ThresholdConfig::Colour(c) => Some(ColourMask::new(*c)?),
+                _ => None,
+            },
             size,
             kind,
             spots,
@@ -114,7 +127,7 @@ impl ThresholdDetector {
                 ThresholdConfig::Otsu(c) => c.side == Side::Dark,
                 ThresholdConfig::Local(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Isolated(_) => true,
                 // Their pixels may be brighter or darker than the ground, so they count alike, see `method`.
-                ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) => false,
+                ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => false,
             },
         }
     }
@@ -130,9 +143,12 @@ impl ThresholdDetector {
 
     /// The centroid's method: where a pixel's value does not say how surely it is target, all pixels count alike.
     fn method(&self) -> CentroidMethod {
-        let by_change = matches!(self.config.threshold, ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_));
+        let alike = matches!(
+            self.config.threshold,
+            ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_)
+        );
         match self.config.centroid.method {
-            CentroidMethod::Mask if by_change && self.config.centroid.weight == Weight::Auto => CentroidMethod::Binary,
+            CentroidMethod::Mask if alike && self.config.centroid.weight == Weight::Auto => CentroidMethod::Binary,
             method => method,
         }
     }
@@ -153,7 +169,10 @@ impl ThresholdDetector {
             motion.update(image, scan.time, self.last)?;
         }
         self.last = Some(scan.time);
-        self.run(image, noise, stage.motion.as_ref(), scan);
+        let colour = self.colour.take();
+        let mask = stage.motion.as_ref().map(|m| m.bits()).or(colour.as_ref().map(ColourMask::bits));
+        self.run(image, noise, mask, scan);
+        self.colour = colour;
         Ok(())
     }
 
@@ -161,7 +180,7 @@ impl ThresholdDetector {
         &mut self,
         image: &Image<T>,
         (variance, gain): (f64, f64),
-        motion: Option<&Motion<T>>,
+        mask: Option<&BitImage>,
         scan: &mut Scan,
     ) {
         if let ThresholdConfig::Isolated(c) = &self.config.threshold {
@@ -200,9 +219,9 @@ impl ThresholdDetector {
                     level = one_side(image, &c, &mut self.bits, &mut self.bright, &mut self.dark);
                 }
             }
-            ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) => {
-                for (y, motion) in motion.iter().flat_map(|m| (0..image.height()).map(move |y| (y, m))) {
-                    self.bright.row(y, motion.row(y), image.row(y));
+            ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
+                for (y, mask) in mask.iter().flat_map(|m| (0..image.height()).map(move |y| (y, m))) {
+                    self.bright.row(y, mask.row(y), image.row(y));
                 }
             }
             // Ran above: they have no rows of bits of their own.
@@ -230,9 +249,9 @@ impl ThresholdDetector {
                     self.grid.at(region.x / n, region.y / n)
                 });
                 let ground = local.map(|(median, _)| median);
-                // Moving pixels are not told apart by their sign: the region's mean tells.
+                // Moving and coloured pixels are not told apart by their sign: the region's mean tells.
                 let below = ground.is_some_and(|g| region.sum < g * f64::from(region.area));
-                let dark = if motion.is_some() { below } else { dark };
+                let dark = if mask.is_some() { below } else { dark };
                 let sign = if dark { -1.0 } else { 1.0 };
                 let level = match (&self.config.threshold, local) {
                     (ThresholdConfig::Local(c), Some((median, deviation))) => {
@@ -253,48 +272,6 @@ impl ThresholdDetector {
         }
         keep_strongest(&mut scan.detections, self.config.max_detections);
     }
-}
-
-/// The edge of a band towards the background: the lower one, or the upper one if the band has no lower end. Whole-number
-/// pixels join half a count before it.
-fn band_edge<T: Pixel>(low: T, high: T) -> f64 {
-    let half = 0.5 * f64::from(T::STEP);
-    if T::band(f64::NEG_INFINITY, f64::INFINITY).is_some_and(|(least, _)| low <= least) {
-        high.value() + half
-    } else {
-        low.value() - half
-    }
-}
-
-fn one_band<T: Pixel>(image: &Image<T>, band: Option<(T, T)>, bits: &mut [u64], clusters: &mut Clusterer) {
-    let Some((low, high)) = band else { return };
-    for y in 0..image.height() {
-        let row = image.row(y);
-        band_bits(row, low, high, bits);
-        clusters.row(y, bits, row);
-    }
-}
-
-/// A level is a band with one open end; returns the edge.
-fn one_side<T: Pixel>(
-    image: &Image<T>,
-    c: &LevelConfig,
-    bits: &mut [u64],
-    bright: &mut Clusterer,
-    dark: &mut Clusterer,
-) -> Option<f64> {
-    let (band, clusters) = match c.side {
-        Side::Bright => {
-            let low = if c.exclusive { c.level.next_up() } else { c.level };
-            (T::band(low, f64::INFINITY), bright)
-        }
-        Side::Dark => {
-            let high = if c.exclusive { c.level.next_down() } else { c.level };
-            (T::band(f64::NEG_INFINITY, high), dark)
-        }
-    };
-    one_band(image, band, bits, clusters);
-    band.map(|(low, high)| band_edge(low, high))
 }
 
 fn detection<T: Pixel>(
@@ -379,12 +356,9 @@ impl Detector for ThresholdDetector {
             }
             Pixels::Rgb8(image) => {
                 let mut grey = std::mem::take(&mut self.grey);
-                if (grey.width(), grey.height()) != (width, height) {
-                    grey.reset(width, height, 0);
-                }
-                for (g, &[r, green, b]) in grey.as_mut_slice().iter_mut().zip(image.as_slice()) {
-                    // SPEC I.1.
-                    *g = ((9798 * u32::from(r) + 19235 * u32::from(green) + 3735 * u32::from(b) + 16384) >> 15) as u8;
+                grey_image(image, &mut grey);
+                if let Some(colour) = &mut self.colour {
+                    colour.update(image);
                 }
                 let done = self.run8(&grey, scan);
                 self.grey = grey;

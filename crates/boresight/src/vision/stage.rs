@@ -1,6 +1,6 @@
 //! What a detector keeps for the one pixel type of its frames: the smoothed frame and the memory of moving pixels.
 
-use super::background::{Background, FrameDifference};
+use super::background::{Background, BitImage, FrameDifference};
 use super::pixel::Pixel;
 use super::spatial::{SpatialConfig, SpatialFilter};
 use super::threshold::ThresholdConfig;
@@ -34,11 +34,11 @@ impl<T: Pixel> Motion<T> {
         }
     }
 
-    /// The moving pixels of row `y`.
-    pub(super) fn row(&self, y: usize) -> &[u64] {
+    /// The moving pixels.
+    pub(super) fn bits(&self) -> &BitImage {
         match self {
-            Self::Background(b) => b.row(y),
-            Self::Difference(d) => d.row(y),
+            Self::Background(b) => b.moving(),
+            Self::Difference(d) => d.moving(),
         }
     }
 }

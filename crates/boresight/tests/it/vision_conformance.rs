@@ -1,6 +1,7 @@
 //! Every detector, whatever its threshold: odd sizes, empty and full frames, NaN, the whole range of u16; finite positions
 //! inside the frame, covariances that can be inverted, the same answer twice.
 
+use boresight::vision::colour::ColourMatchConfig;
 use boresight::vision::config::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
 use boresight::vision::spatial::{SpatialConfig, WindowConfig};
 use boresight::vision::threshold::{
@@ -28,6 +29,7 @@ fn thresholds() -> Vec<ThresholdConfig> {
         ThresholdConfig::Isolated(Default::default()),
         ThresholdConfig::Moving(Default::default()),
         ThresholdConfig::Difference(Default::default()),
+        ThresholdConfig::Colour(ColourMatchConfig { reference: [200, 100, 55], ..Default::default() }),
     ];
     for t in &all {
         match t {
@@ -38,7 +40,8 @@ fn thresholds() -> Vec<ThresholdConfig> {
             | ThresholdConfig::Spot(_)
             | ThresholdConfig::Isolated(_)
             | ThresholdConfig::Moving(_)
-            | ThresholdConfig::Difference(_) => {}
+            | ThresholdConfig::Difference(_)
+            | ThresholdConfig::Colour(_) => {}
         }
     }
     all
@@ -114,7 +117,14 @@ const KINDS: [PixelKind; 4] = [PixelKind::Gray8, PixelKind::Gray16, PixelKind::G
 
 fn check(config: &DetectorConfig, what: &str) -> usize {
     let mut n = 0;
+    // Colour is looked for in colour frames; a source without it is refused when the detector is built.
+    let colour = matches!(config.threshold, ThresholdConfig::Colour(_));
     for kind in KINDS {
+        if colour && kind != PixelKind::Rgb8 {
+            let e = build(config, &source(9, 9, kind)).err().unwrap().to_string();
+            assert!(e.contains("colour frames") && e.contains("input.colour=rgb"), "{e}");
+            continue;
+        }
         for (width, height) in [(0, 0), (1, 1), (1, 9), (9, 1), (63, 5), (64, 12), (65, 12), (130, 20)] {
             let what = format!("{what}, {kind:?} {width} x {height}");
             let build = || build(config, &source(width, height, kind)).unwrap();

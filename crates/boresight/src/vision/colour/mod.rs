@@ -5,12 +5,14 @@
 //! precision, and the few pixels that lie too near a limit to be sure are computed in full.
 
 mod hsi;
+mod mask;
 mod reference;
 
 pub use hsi::{Hsi, distance, grey, grey_image, hsi};
+pub(super) use mask::ColourMask;
 pub use reference::{Reference, choose_reference};
 
-use crate::vision::background::pack;
+use crate::vision::background::{CleanUp, pack};
 use crate::{Error, ErrorKind, Result};
 use fearless_simd::{Level, dispatch};
 use multiversion::multiversion;
@@ -27,11 +29,13 @@ pub struct ColourMatchConfig {
     pub max_distance: f64,
     /// Smallest saturation, 0 to 1: greys have no hue worth comparing.
     pub min_saturation: f64,
+    /// How the matching pixels are cleaned before they are joined.
+    pub clean_up: CleanUp,
 }
 
 impl Default for ColourMatchConfig {
     fn default() -> Self {
-        Self { reference: [0, 255, 0], max_distance: 0.15, min_saturation: 0.1 }
+        Self { reference: [0, 255, 0], max_distance: 0.15, min_saturation: 0.1, clean_up: CleanUp::Majority }
     }
 }
 
@@ -202,7 +206,7 @@ mod tests {
         fn the_fast_comparison_is_the_definition_bit_for_bit(
             reference: [u8; 3], max_distance in 0.01f64..0.5, min_saturation in 0.0f64..0.6, seed: u32, near: bool, w in 1usize..200,
         ) {
-            let config = ColourMatchConfig { reference, max_distance, min_saturation };
+            let config = ColourMatchConfig { reference, max_distance, min_saturation, ..Default::default() };
             let mut fast = ColourMatch::new(config).unwrap();
             let mut s = u64::from(seed);
             for _ in 0..10 {

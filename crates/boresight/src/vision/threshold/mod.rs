@@ -3,11 +3,13 @@
 pub mod band;
 mod box_mean;
 pub mod grid;
+pub(crate) mod level;
 pub mod local;
 pub mod otsu;
 pub mod spot;
 
 use super::background::{BackgroundConfig, DifferenceConfig};
+use super::colour::ColourMatchConfig;
 use super::config::wrong;
 use super::isolated::IsolatedConfig;
 use crate::Result;
@@ -30,6 +32,8 @@ pub enum ThresholdConfig {
     Moving(BackgroundConfig),
     /// Pixels that differ from the frames just before.
     Difference(DifferenceConfig),
+    /// Pixels of one colour; needs colour frames (`input.colour = "rgb"` for video).
+    Colour(ColourMatchConfig),
     /// Closed blobs of any size that stand clear of the ring around them.
     Isolated(IsolatedConfig),
     /// Small targets by their contrast to what surrounds them: one detection for each peak, no clusters.
@@ -210,6 +214,7 @@ impl ThresholdConfig {
             Self::Otsu(_) => {}
             Self::Moving(c) => c.validate(&format!("{at}.moving"))?,
             Self::Difference(c) => c.validate(&format!("{at}.difference"))?,
+            Self::Colour(c) => c.validate(&format!("{at}.colour"))?,
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
             Self::Local(c) => {

@@ -1,0 +1,64 @@
+//! A single target told by its colour: a ball, a marker; the colour is chosen from the frames looked at.
+
+use super::scene::{Camera, Scene};
+use crate::config::ColourConfig;
+use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
+use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::threshold::ThresholdConfig;
+use crate::{Config, Frame, Pixels, SourceInfo};
+
+/// More regions than this that move at a time are not a single target and a hand.
+const MOST_REGIONS: f64 = 4.0;
+/// Share of the frames with motion in which the colour must be seen in one piece.
+const SEEN: f64 = 0.4;
+/// Least saturation of a colour that tells a target from its surroundings.
+const LEAST_SATURATION: f64 = 0.1;
+
+/// The colour of a single moving target, if there is one.
+pub fn look(frames: &[Frame], scene: &Scene) -> Option<Reference> {
+    let images: Vec<_> = frames
+        .iter()
+        .filter_map(|f| match &f.pixels {
+            Pixels::Rgb8(image) => Some(image),
+            _ => None,
+        })
+        .collect();
+    if images.is_empty() || scene.camera != Camera::Fixed || scene.regions > MOST_REGIONS {
+        return None;
+    }
+    let seen = |r: &Reference| r.n_frames as f64 >= SEEN * scene.n_moving as f64;
+    choose_reference(&images).filter(|r| seen(r) && r.hsi.saturation >= LEAST_SATURATION)
+}
+
+/// Writes detector and tracker.
+pub fn configure(
+    reference: &Reference,
+    scene: &Scene,
+    info: &SourceInfo,
+    interval_s: f64,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
+    let [r, g, b] = reference.rgb;
+    let side = reference.area_px.sqrt();
+    reasons.push(format!(
+        "Fixed camera, and one moving piece of a colour of its own: red {r}, green {g}, blue {b} (hue {:.0} degrees), about {side:.0} px across, in {} \
+         of {} frames with motion. So pixels of this colour are detected (input.colour = rgb).",
+        reference.hsi.hue_deg, reference.n_frames, scene.n_moving
+    ));
+    config.input.colour = ColourConfig::Rgb;
+    let colour = ColourMatchConfig { reference: reference.rgb, ..ColourMatchConfig::default() };
+    config.detector = DetectorConfig {
+        threshold: ThresholdConfig::Colour(colour),
+        max_detections: Some(100),
+        ..DetectorConfig::default()
+    };
+    config.detector.cluster.min_area_px = Some(super::round((0.15 * reference.area_px).max(6.0)) as u32);
+    config.detector.cluster.distance_px = super::round((0.15 * side).clamp(2.0, 12.0));
+    config.detector.camera = CameraConfig::Fixed;
+    super::moving::tracker(side, info, interval_s, &mut config.tracker);
+    let tracker = &mut config.tracker;
+    // A thrown thing: 1 g seen as some ten of its own sides a second squared.
+    tracker.acceleration_std_px_per_s2 = super::round((20.0 * side).max(0.2 / (interval_s * interval_s)));
+    tracker.max_speed_px_per_s = super::round(2.0 * info.width.max(info.height) as f64);
+}

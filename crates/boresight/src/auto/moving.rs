@@ -1,0 +1,85 @@
+//! Things that move before a fixed camera: people, cars, animals; detector and tracker from the size of what moves.
+
+use super::scene::{Camera, Scene};
+use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, TrackerConfig};
+use crate::vision::background::{BackgroundConfig, ShadowConfig};
+use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::threshold::ThresholdConfig;
+use crate::{Config, SourceInfo};
+
+/// Share of the frames in which something must move.
+const SHARE_OF_FRAMES: f64 = 0.2;
+/// Least longer side of what moves, as a share of the frame's: smaller things are the small targets' matter.
+const LEAST_SIDE: f64 = 0.02;
+/// Least area of what moves, as a share of the frame's.
+const LEAST_AREA: f64 = 0.0004;
+/// Least share of fresh ground, see [`Scene`]: less is leaves, water, flicker.
+const LEAST_FRESH: f64 = 0.12;
+/// More regions than this are noise, water, leaves or particles.
+const MOST_REGIONS: f64 = 40.0;
+/// Isolated blobs that explain this share of what moves are found better as such.
+const MOST_EXPLAINED: f64 = 0.2;
+/// Fewer frames than this show no background.
+const LEAST_FRAMES: usize = 12;
+
+/// Whether what moves before a fixed camera is what should be tracked.
+pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
+    let side = scene.size_px[0].max(scene.size_px[1]);
+    scene.camera == Camera::Fixed
+        && scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
+        && side >= LEAST_SIDE * info.width.max(info.height) as f64
+        && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64
+        && scene.fresh >= LEAST_FRESH
+        && scene.regions <= MOST_REGIONS
+        && scene.share <= 0.35
+        && scene.n_frames >= LEAST_FRAMES
+        && scene.explained <= MOST_EXPLAINED
+}
+
+/// Writes detector and tracker.
+pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
+    let [w, h] = scene.size_px;
+    reasons.push(format!(
+        "Fixed camera; in {} of {} frames looked at something moves: {:.1} regions a frame, median {w:.0} x {h:.0} px, of which {:.0} % are isolated \
+         blobs. So moving pixels are detected, against a background learned as it goes.",
+        scene.n_moving,
+        scene.n_frames,
+        scene.regions,
+        100.0 * scene.explained
+    ));
+    let least = super::round((0.35 * scene.area_px).max(9.0)) as u32;
+    // Measured on vtest.avi: dark clothes are darker than 0.6 of the ground, shadows are not.
+    let background = BackgroundConfig {
+        threshold_sd: 6.0,
+        shadow: Some(ShadowConfig { darkest: 0.6, spread: 0.15, ..ShadowConfig::default() }),
+        ..BackgroundConfig::default()
+    };
+    config.detector = DetectorConfig {
+        threshold: ThresholdConfig::Moving(background),
+        max_detections: Some(1000),
+        ..DetectorConfig::default()
+    };
+    config.detector.cluster.min_area_px = Some(least);
+    // Parts of one thing lie nearer than a fifth of its shorter side.
+    config.detector.cluster.distance_px = super::round((0.2 * w.min(h)).clamp(2.0, 12.0));
+    config.detector.camera = CameraConfig::Fixed;
+    tracker(w.max(h), info, interval_s, &mut config.tracker);
+    reasons.push(format!(
+        "Regions of {least} px or more count, parts nearer than {} px are one. What stands for a minute becomes background \
+         (detector.threshold.moving.standing-time-s).",
+        config.detector.cluster.distance_px
+    ));
+}
+
+/// The tracker for things whose outline changes: the noise grows with their size.
+pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker: &mut TrackerConfig) {
+    *tracker = TrackerConfig::default();
+    tracker.acceleration_std_px_per_s2 = super::round((1.0 * side_px).max(0.02 / (interval_s * interval_s)));
+    tracker.extra_noise_px = super::round((0.05 * side_px).max(0.5));
+    tracker.extra_noise_of_size = 0.03;
+    tracker.max_speed_px_per_s = super::round(0.5 * info.width.max(info.height) as f64);
+    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: super::round(2.0 * side_px) });
+    tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });
+    tracker.coast_s = 1.0;
+    tracker.field_px = Some([info.width as f64, info.height as f64]);
+}

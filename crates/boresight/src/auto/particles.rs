@@ -1,0 +1,126 @@
+//! Many small things alike all over the frame: particles under a microscope, seeds, stars; the spot detector at their size.
+//!
+//! Source: our own. Particles that move each their own way leave nothing that moves as one, so the camera's motion is not known; a
+//! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.2 times as wide.
+
+use super::scene::{Camera, Scene};
+use crate::track::TrackerConfig;
+use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::isolated::IsolatedConfig;
+use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
+
+/// Least blobs a frame.
+const LEAST: f64 = 60.0;
+/// Frames looked at.
+const LOOKS: usize = 4;
+/// Largest ratio of the upper to the lower quartile of their widths.
+const MOST_SPREAD: f64 = 1.6;
+/// Least ratio of their number to that of blobs of the other sign.
+const MOST_SIDED: f64 = 4.0;
+/// Score of a blob that counts here: dim ones give the size as well.
+const SCORE: f64 = 3.0;
+/// Widest blob taken for a particle, px.
+const WIDEST_PX: u32 = 40;
+/// A soft-edged spot's diameter in units of its width at half height: 2.2 holds 97 % of a Gaussian's light.
+const DIAMETER_PER_WIDTH: f64 = 2.2;
+
+/// What was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Particles {
+    /// Brighter or darker than their surroundings.
+    pub polarity: Polarity,
+    /// Blobs a frame.
+    pub per_frame: f64,
+    /// Median width at half height, px.
+    pub width_px: f64,
+}
+
+/// Particles, if the frames are full of them.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option<Particles>> {
+    // What stands before a fixed camera is scenery.
+    if scene.camera == Camera::Fixed && scene.regions < LEAST {
+        return Ok(None);
+    }
+    let (mut best, mut counts): (Option<Particles>, [f64; 2]) = (None, [0.0; 2]);
+    for (polarity, count) in [Polarity::Bright, Polarity::Dark].into_iter().zip(&mut counts) {
+        let isolated =
+            IsolatedConfig { polarity, min_score: SCORE, max_side_px: WIDEST_PX, ..IsolatedConfig::default() };
+        let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..DetectorConfig::default() };
+        config.cluster.min_area_px = Some(3);
+        let mut detector = crate::vision::build(&config, info)?;
+        let mut scan = Scan::default();
+        let (mut n, mut looks, mut widths, mut quarters) = (0usize, 0usize, Vec::new(), [0usize; 4]);
+        for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+            detector.detect(frame, &mut scan)?;
+            looks += 1;
+            n += scan.detections.len();
+            for d in &scan.detections {
+                widths.push((d.extent.width_px * d.extent.height_px).sqrt());
+                let right = 2.0 * d.position.x > info.width as f64;
+                let low = 2.0 * d.position.y > info.height as f64;
+                quarters[usize::from(right) + 2 * usize::from(low)] += 1;
+            }
+        }
+        widths.sort_by(f64::total_cmp);
+        let per_frame = n as f64 / looks.max(1) as f64;
+        let everywhere = quarters.iter().all(|q| 10 * q >= n);
+        *count = per_frame;
+        let at = |share: f64| widths.get((share * widths.len() as f64) as usize).copied().unwrap_or(0.0);
+        let width_px = at(0.5);
+        let alike = at(0.75) <= MOST_SPREAD * at(0.25);
+        if everywhere && alike && per_frame >= LEAST && best.is_none_or(|b| per_frame > b.per_frame) {
+            best = Some(Particles { polarity, per_frame, width_px });
+        }
+    }
+    // Texture is as often dark as bright.
+    let other = counts[0].min(counts[1]);
+    Ok(best.filter(|b| b.per_frame >= MOST_SIDED * other))
+}
+
+/// Writes detector and tracker.
+pub fn configure(
+    particles: &Particles,
+    info: &SourceInfo,
+    interval_s: f64,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
+    let size_px = super::round((DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0));
+    let dark = particles.polarity == Polarity::Dark;
+    reasons.push(format!(
+        "Some {:.0} {} blobs a frame all over it, {:.1} px wide at half their height, nothing that moves as one: particles. So spots of {size_px} px are \
+         detected, one for each peak.",
+        particles.per_frame,
+        if dark { "dark" } else { "bright" },
+        particles.width_px
+    ));
+    let spot = SpotConfig {
+        size_px,
+        k: 4.5,
+        polarity: particles.polarity,
+        min_contrast: 1.0,
+        surround: 1.0,
+        smooth_px: Some(super::round((0.27 * size_px).max(1.0))),
+    };
+    config.detector = DetectorConfig {
+        threshold: ThresholdConfig::Spot(spot),
+        max_detections: Some(20_000),
+        ..DetectorConfig::default()
+    };
+    config.detector.camera = CameraConfig::Fixed;
+    let tracker = &mut config.tracker;
+    *tracker = TrackerConfig::default();
+    let step_px = 0.1 * size_px;
+    tracker.acceleration_std_px_per_s2 = super::round(step_px / (interval_s * interval_s));
+    tracker.max_speed_px_per_s = super::round(0.5 * size_px / interval_s);
+    tracker.coast_s = super::round(3.0 * interval_s);
+    tracker.coast_scans = 3;
+    tracker.field_px = Some([info.width as f64, info.height as f64]);
+    reasons.push(format!(
+        "Every particle is tracked from its third sighting in five; none goes farther than half its size ({:.1} px) from frame to frame.",
+        0.5 * size_px
+    ));
+}

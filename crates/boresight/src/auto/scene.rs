@@ -1,0 +1,242 @@
+//! What the first frames show as a whole: whether the camera stands still, what moves before it, and whether isolated blobs explain it.
+//!
+//! Source: our own. How:
+//! 1. the camera: the background's shift from frame to frame ([`CameraMotion`]); where too little texture says nothing, the edges of
+//!    the median frame must stay where they are;
+//! 2. what moves: the median of all frames is the background ([`Background::prime`], on a grid of at most 400 px), and what differs from it
+//!    in a frame, without shadows and changes of light, is joined to regions;
+//! 3. which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
+//!
+//! Limits: a target that stands in the same place in half of the frames is background.
+
+use crate::vision::background::{Background, BackgroundConfig, BitImage};
+use crate::vision::camera::CameraMotion;
+use crate::vision::cluster::Clusterer;
+use crate::vision::colour::grey;
+use crate::vision::config::{ClusterConfig, DetectorConfig};
+use crate::vision::isolated::IsolatedConfig;
+use crate::vision::pixel::Pixel;
+use crate::vision::threshold::{Polarity, ThresholdConfig};
+use crate::{Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo};
+use nalgebra::Vector2;
+
+/// Width of the grid, px.
+const GRID_PX: usize = 400;
+/// Smallest region that counts, px of the grid.
+const MIN_AREA: u32 = 6;
+/// Frames in which isolated blobs are looked for.
+const LOOKS: usize = 12;
+/// Score from which an isolated blob explains what moves there: that from which it would start a track.
+const BLOB_SCORE: f64 = 6.0;
+/// A camera that came no farther than this share of the frame's width stands still.
+const STILL_SHARE: f64 = 0.004;
+/// Least difference from the background that counts as moving in 8-bit frames, counts: above what codecs leave.
+const MIN_COUNTS: f32 = 12.0;
+
+/// Whether the camera stands still.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Camera {
+    /// It does.
+    Fixed,
+    /// It does not.
+    Moving,
+    /// Too little is seen to say so.
+    #[default]
+    Unknown,
+}
+
+/// What was seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scene {
+    /// Whether the camera stands still.
+    pub camera: Camera,
+    /// Frames looked at, and those in which something moves.
+    pub n_frames: usize,
+    /// Frames in which something moves.
+    pub n_moving: usize,
+    /// Mean number of moving regions in those.
+    pub regions: f64,
+    /// Median width and height of the regions, px of the frame.
+    pub size_px: [f64; 2],
+    /// Median area of the regions, px of the frame.
+    pub area_px: f64,
+    /// Share of the frame that moves, mean of the moving frames.
+    pub share: f64,
+    /// Ground that moves in any frame, as a share of what moves in all frames together: 1 for things that go on, little for leaves
+    /// and water, which stay in their places.
+    pub fresh: f64,
+    /// Share of the regions that an isolated blob explains.
+    pub explained: f64,
+}
+
+/// A moving region, px of the frame.
+#[derive(Clone, Copy, Debug)]
+struct Moved {
+    left: f64,
+    top: f64,
+    right: f64,
+    bottom: f64,
+    area: f64,
+}
+
+/// Looks at frames of one size in the order of time.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
+    let mut scene = Scene { n_frames: frames.len(), ..Scene::default() };
+    let step = info.width.div_ceil(GRID_PX).max(1);
+    let grids: Vec<Image<f32>> = frames.iter().map(|f| grid(&f.pixels, step)).collect();
+    let same = |g: &Image<f32>| grids.first().is_some_and(|f| (f.width(), f.height()) == (g.width(), g.height()));
+    if grids.len() < 4 || !grids.iter().all(same) || grids.iter().any(|g| g.as_slice().is_empty()) {
+        return Ok(scene);
+    }
+    let bytes = matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8);
+    let config =
+        BackgroundConfig { start_s: 0.0, min_difference: bytes.then_some(MIN_COUNTS), ..BackgroundConfig::default() };
+    let mut background = Background::<f32>::new(config)?;
+    background.prime(&grids.iter().collect::<Vec<_>>())?;
+    let edges = edges(&background, grids[0].width(), grids[0].height(), bytes);
+    let (mut moved, mut edges_moved) = (Vec::with_capacity(grids.len()), 0);
+    let (mut ever, mut all) = (BitImage::new(grids[0].width(), grids[0].height()), 0);
+    // Parts of one thing lie near each other.
+    let join = ClusterConfig { distance_px: 4.0, min_area_px: Some(MIN_AREA), ..ClusterConfig::default() };
+    let mut clusters = Clusterer::new(&join);
+    for g in &grids {
+        // No time passes: the background stays what it is.
+        background.update(g, 0.0)?;
+        edges_moved += edges.iter().filter(|&&(x, y)| background.moving().get(x, y)).count();
+        clusters.begin(g.width());
+        all += background.moving().count();
+        for y in 0..g.height() {
+            ever.row_mut(y).iter_mut().zip(background.row(y)).for_each(|(e, b)| *e |= b);
+            clusters.row(y, background.row(y), g.row(y));
+        }
+        let scale = step as f64;
+        let found = clusters.regions().filter(|r| r.area >= MIN_AREA).map(|r| Moved {
+            left: f64::from(r.left) * scale,
+            top: f64::from(r.top) * scale,
+            right: f64::from(r.right + 1) * scale,
+            bottom: f64::from(r.bottom + 1) * scale,
+            area: f64::from(r.area) * scale * scale,
+        });
+        moved.push(found.collect::<Vec<_>>());
+    }
+    let stay = edges_moved as f64 / (edges.len() * grids.len()).max(1) as f64;
+    let enough_edges = edges.len() * 1000 > grids[0].as_slice().len();
+    scene.camera = camera(frames, enough_edges.then_some(stay));
+    scene.fresh = ever.count() as f64 / all.max(1) as f64;
+    measure(&mut scene, &moved, info);
+    if scene.camera == Camera::Fixed {
+        scene.explained = explained(frames, &moved, info)?;
+    }
+    Ok(scene)
+}
+
+/// Every `step`-th pixel both ways, as grey.
+fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
+    fn take<P: Copy>(image: &Image<P>, step: usize, value: impl Fn(P) -> f32) -> Image<f32> {
+        let (w, h) = (image.width().div_ceil(step), image.height().div_ceil(step));
+        let mut out = Image::filled(w, h, 0.0f32);
+        for y in 0..h {
+            for (o, &p) in out.row_mut(y).iter_mut().zip(image.row(y * step).iter().step_by(step)) {
+                *o = value(p);
+            }
+        }
+        out
+    }
+    match pixels {
+        Pixels::Gray8(i) => take(i, step, |p| p.value_f32()),
+        Pixels::Gray16(i) => take(i, step, |p| p.value_f32()),
+        Pixels::GrayF32(i) => take(i, step, |p| p.value_f32()),
+        Pixels::Rgb8(i) => take(i, step, |p| f32::from(grey(p))),
+    }
+}
+
+/// The pixels of the background whose neighbour to the right or below differs so far that a shift of one pixel shows.
+fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(usize, usize)> {
+    let at = |x: usize, y: usize| background.mean(x, y).unwrap_or(0.0);
+    let mut noise: Vec<f32> = (0..w * h).step_by(7).filter_map(|i| background.deviation(i % w, i / w)).collect();
+    let middle = noise.len() / 2;
+    let typical = if noise.is_empty() { 1.0 } else { *noise.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    let least = (16.0 * typical).max(if bytes { 2.0 * MIN_COUNTS } else { f32::MIN_POSITIVE });
+    let inside = (0..h.saturating_sub(1)).flat_map(|y| (0..w.saturating_sub(1)).map(move |x| (x, y)));
+    inside
+        .filter(|&(x, y)| (at(x + 1, y) - at(x, y)).abs() > least || (at(x, y + 1) - at(x, y)).abs() > least)
+        .collect()
+}
+
+/// Whether the camera stands still; `edges_moved` is the share of edge pixels that move, if there are edges.
+fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
+    let mut motion = CameraMotion::default();
+    let (mut said, mut still) = (0u32, 0u32);
+    let mut moved = Vector2::<f64>::zeros();
+    let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
+    for frame in frames {
+        if let Some(shift) = motion.step(&frame.pixels) {
+            said += 1;
+            moved += shift;
+            still += u32::from(moved.norm() <= STILL_SHARE * frame.pixels.width() as f64);
+        }
+    }
+    // Strong edges would show the smallest shift.
+    let edges_stand = edges_moved.is_some_and(|share| share <= 0.03);
+    if edges_stand || (2 * said >= n_steps && still == said) {
+        return Camera::Fixed;
+    }
+    if 2 * said >= n_steps {
+        return Camera::Moving;
+    }
+    // Too little texture to follow: that targets cross the edges is no motion of the camera.
+    if edges_moved.is_some_and(|share| share < 0.2) { Camera::Fixed } else { Camera::Unknown }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
+    let all = || moved.iter().flatten();
+    scene.n_moving = moved.iter().filter(|m| !m.is_empty()).count();
+    let n = scene.n_moving.max(1) as f64;
+    scene.regions = all().count() as f64 / n;
+    scene.size_px = [
+        median(&mut all().map(|m| m.right - m.left).collect::<Vec<_>>()),
+        median(&mut all().map(|m| m.bottom - m.top).collect::<Vec<_>>()),
+    ];
+    scene.area_px = median(&mut all().map(|m| m.area).collect::<Vec<_>>());
+    scene.share = all().map(|m| m.area).sum::<f64>() / (n * (info.width * info.height).max(1) as f64);
+}
+
+/// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle.
+fn explained(frames: &[Frame], moved: &[Vec<Moved>], info: &SourceInfo) -> Result<f64> {
+    let moving: Vec<usize> = (0..moved.len()).filter(|&i| !moved[i].is_empty()).collect();
+    let isolated = IsolatedConfig {
+        polarity: Polarity::Both,
+        min_score: BLOB_SCORE,
+        max_side_px: super::spots::max_side(info),
+        ..IsolatedConfig::default()
+    };
+    let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..DetectorConfig::default() };
+    config.cluster.min_area_px = Some(3);
+    let Some(first) = frames.first() else { return Ok(0.0) };
+    // A second look may have another kind of pixels than the source announced.
+    let seen = SourceInfo { kind: first.pixels.kind(), ..info.clone() };
+    let mut detector = crate::vision::build(&config, &seen)?;
+    let mut scan = Scan::default();
+    let (mut n, mut hits) = (0usize, 0usize);
+    for &i in moving.iter().step_by(moving.len().div_ceil(LOOKS).max(1)) {
+        detector.detect(&frames[i], &mut scan)?;
+        for m in &moved[i] {
+            let area = (m.right - m.left) * (m.bottom - m.top);
+            let hit = scan.detections.iter().any(|d| {
+                let (x, y) = (d.position.x, d.position.y);
+                let within = x >= m.left - 2.0 && x <= m.right + 1.0 && y >= m.top - 2.0 && y <= m.bottom + 1.0;
+                within && 4.0 * d.extent.width_px * d.extent.height_px >= area
+            });
+            n += 1;
+            hits += usize::from(hit);
+        }
+    }
+    Ok(hits as f64 / n.max(1) as f64)
+}
