@@ -3,6 +3,7 @@
 //! Source: our own. It only reads frames and proposes a [`Config`]; the run itself uses that configuration and nothing else, so
 //! the same configuration given back gives the identical result.
 
+mod cells;
 mod colour;
 mod detections;
 mod further;
@@ -71,6 +72,8 @@ fn choose_with(
         moving::configure(&scene, info, interval_s, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, &scene, info)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+    } else if let Some(seen) = cells::look(frames, info)? {
+        cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
         let evidence = spots::look(frames, info)?;
         spots::configure(&evidence, info, interval_s, &mut config, &mut reasons);

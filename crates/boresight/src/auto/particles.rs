@@ -1,7 +1,7 @@
 //! Many small things alike all over the frame: particles under a microscope, seeds, stars; the spot detector at their size.
 //!
 //! Source: our own. Particles that move each their own way leave nothing that moves as one, so the camera's motion is not known; a
-//! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.2 times as wide.
+//! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.45 times as wide.
 
 use super::scene::{Camera, Scene};
 use crate::track::TrackerConfig;
@@ -22,8 +22,8 @@ const MOST_SIDED: f64 = 4.0;
 const SCORE: f64 = 3.0;
 /// Widest blob taken for a particle, px.
 const WIDEST_PX: u32 = 40;
-/// A soft-edged spot's diameter in units of its width at half height: 2.2 holds 97 % of a Gaussian's light.
-const DIAMETER_PER_WIDTH: f64 = 2.2;
+/// A soft-edged spot's diameter in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
+const DIAMETER_PER_WIDTH: f64 = 2.45;
 
 /// What was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
