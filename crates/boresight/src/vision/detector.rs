@@ -134,6 +134,10 @@ impl ThresholdDetector {
 
     /// Variance of one pixel at intensity 0, counts², and its growth with intensity.
     fn pixel_noise<T: Pixel>(&mut self, image: &Image<T>) -> (f64, f64) {
+        if matches!(self.config.threshold, ThresholdConfig::Isolated(_)) {
+            // It measures the noise of the pixels that it sees, itself.
+            return (0.0, 0.0);
+        }
         match &self.config.noise {
             // The rounding to whole counts is noise as well.
             NoiseConfig::Given(g) => (g.read_counts * g.read_counts + f64::from(T::STEP) / 12.0, g.gain),

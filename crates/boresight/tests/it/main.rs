@@ -1,5 +1,6 @@
 //! Integration tests: one binary, a module per matter.
 
+mod auto_real;
 mod background;
 mod colour_real;
 mod fuse;

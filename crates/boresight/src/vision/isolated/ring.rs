@@ -114,12 +114,19 @@ fn inside<T: Pixel>(image: &Image<T>, side: Side, level: f64, blob: &Blob) -> Op
 
 /// Least-squares plane v = p0 + p1 x + p2 y.
 fn fit(samples: &[(f64, f64, f64)]) -> Option<Vector3<f64>> {
-    let mut a = Matrix3::zeros();
-    let mut b = Vector3::zeros();
+    // The sums of the normal equations one by one: the products with 1 cost nothing, and each pair is summed once.
+    let [mut sx, mut sy, mut sxx, mut sxy, mut syy, mut sv, mut sxv, mut syv] = [0.0f64; 8];
     for &(x, y, v) in samples {
-        let row = Vector3::new(1.0, x, y);
-        a += row * row.transpose();
-        b += row * v;
+        sx += x;
+        sy += y;
+        sxx += x * x;
+        sxy += x * y;
+        syy += y * y;
+        sv += v;
+        sxv += x * v;
+        syv += y * v;
     }
+    let a = Matrix3::new(samples.len() as f64, sx, sy, sx, sxx, sxy, sy, sxy, syy);
+    let b = Vector3::new(sv, sxv, syv);
     a.cholesky().map(|c| c.solve(&b))
 }

@@ -1,0 +1,67 @@
+//! The automatic choice on real clips: each kind of input gets its detector, and says why; infrared keeps what it had.
+
+use boresight::vision::threshold::{Polarity, ThresholdConfig};
+use boresight::{Config, auto};
+use std::path::PathBuf;
+
+/// The detector chosen and all reasons as one text; `None` (said so) where the data are missing.
+fn chosen(name: &str) -> Option<(ThresholdConfig, String)> {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    let path = folder.join(name);
+    if !path.exists() {
+        println!("skipped: {} is not here (set BORESIGHT_TEST_DATA)", path.display());
+        return None;
+    }
+    match auto::open_and_choose(&path.display().to_string(), &Config::default()) {
+        Ok((_, choice)) => Some((choice.config.detector.threshold, choice.reasons.join(" "))),
+        Err(e) => {
+            // AVI and 4:2:2 need ffmpeg.
+            println!("skipped: {e}");
+            None
+        }
+    }
+}
+
+#[test]
+fn a_street_seen_by_a_fixed_camera_is_searched_for_what_moves() {
+    for name in ["traffic_bgslibrary/video02.avi", "traffic_bgslibrary/demo.avi"] {
+        let Some((threshold, why)) = chosen(name) else { continue };
+        assert!(matches!(threshold, ThresholdConfig::Moving(_)), "{name}: {threshold:?}");
+        assert!(why.contains("Fixed camera") && why.contains("moving pixels"), "{why}");
+    }
+}
+
+#[test]
+fn a_green_ball_is_told_by_its_colour() {
+    let Some((threshold, why)) = chosen("ball_green_trflorian/ball.mp4") else { return };
+    let ThresholdConfig::Colour(c) = threshold else { panic!("{threshold:?}") };
+    let [r, g, b] = c.reference;
+    assert!(g > r && g > b, "{:?}", c.reference);
+    assert!(why.contains("one moving piece of a colour of its own"), "{why}");
+}
+
+#[test]
+fn particles_are_spots_and_nuclei_are_compact_pieces() {
+    if let Some((threshold, why)) = chosen("trackpy_bulk_water/frames") {
+        let ThresholdConfig::Spot(c) = threshold else { panic!("{threshold:?}") };
+        // trackpy's walkthrough uses a diameter of 11 px for these frames.
+        assert!(c.polarity == Polarity::Dark && (9.0..13.0).contains(&c.size_px), "{c:?}");
+        assert!(why.contains("particles"), "{why}");
+    }
+    for name in ["cells_ctc_gowt1/01/frames", "cells_hela_16bit/frames"] {
+        let Some((threshold, why)) = chosen(name) else { continue };
+        assert!(matches!(threshold, ThresholdConfig::Local(_)), "{name}: {threshold:?}");
+        assert!(why.contains("cells"), "{why}");
+    }
+}
+
+#[test]
+fn infrared_clips_of_still_and_moving_cameras_keep_isolated_bright_targets() {
+    // The hard ones of the 31: birds before trees, a shaking camera, a slow pan.
+    for name in ["IR_BIRD_027", "IR_BIRD_038", "IR_HELICOPTER_042", "IR_DRONE_046"] {
+        let Some((threshold, _)) = chosen(&format!("ir_drone_svanstrom/{name}.mp4")) else { continue };
+        let ThresholdConfig::Isolated(c) = threshold else { panic!("{name}: {threshold:?}") };
+        assert_eq!(c.polarity, Polarity::Bright, "{name}");
+    }
+}
