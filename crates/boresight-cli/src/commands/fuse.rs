@@ -1,9 +1,14 @@
-//! `boresight fuse`: two sensors' tracks become one table.
+//! `boresight fuse`: two sensors' tracks or detections become one table of tracks.
 
-use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables, timelines};
-use boresight::io::tables::{TableOptions, TracksCsv, read_tracks};
-use boresight::{FrameIndex, Scan, Sink, Timestamp, View};
-use std::path::PathBuf;
+mod input;
+
+use boresight::fuse::{
+    FuseConfig, PlaneMap, Registration, RegistrationConfig, Rule, SensorScans, Timeline, fuse_tables, merge_scans,
+};
+use boresight::io::tables::TracksCsv;
+use boresight::{Config, FrameIndex, Scan, Sink, Timestamp, TrackState, View};
+use input::{MapSpec, Sensor};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// How two beliefs become one.
@@ -28,25 +33,58 @@ enum Estimate {
     Time,
 }
 
-/// Fuse two tables of tracks (tracks.csv, MOTChallenge): register, pair, fuse, say where the sensors disagree.
+/// Where fusion happens.
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
+enum Level {
+    /// Each sensor's own tracks are fused.
+    Tracks,
+    /// One tracker takes both sensors' detections.
+    Measurements,
+}
+
+/// Fuse two tables of tracks or detections: bring them into one frame, register, pair, fuse, say where the sensors disagree.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   boresight fuse imaging/tracks.csv radar/tracks.csv -o fused.csv
-  boresight fuse a.csv b.csv --register offset,rotation,time --rule independent")]
+  boresight fuse a.csv b.csv --register offset,rotation,time --rule independent
+  boresight fuse ais.csv radar.csv --register rotation --pivot 0,0          a radar at the origin with a biased azimuth
+  boresight fuse imaging/detections.csv radar.csv --config track.toml      two tables of detections: one tracker takes both
+  boresight fuse tracks.csv radar.csv --map-b 0.5,0,100,0,0.5,40            the radar's metres into the imager's pixels
+  boresight fuse tracks.csv map.csv --map-b homography:points.csv           from points known in both frames (x,y,X,Y)
+  boresight fuse a.csv b.csv --map-b affine --common 1=4,2=7                from tracks known to be common")]
 pub struct Args {
-    /// Tracks of the first sensor: its frame of reference and clock are kept.
+    /// Tracks or detections of the first sensor: its frame of reference and clock are kept.
     a: PathBuf,
-    /// Tracks of the second sensor.
+    /// Tracks or detections of the second sensor.
     b: PathBuf,
     /// The fused table.
     #[arg(short, long, default_value = "fused.csv")]
     output: PathBuf,
-    /// Rule of fusion.
+    /// Rule of fusion of tracks.
     #[arg(long, value_enum, default_value = "ci")]
     rule: RuleName,
+    /// Level of fusion; measurements if both tables hold detections, else tracks.
+    #[arg(long, value_enum)]
+    level: Option<Level>,
     /// Estimate these from common targets before fusing.
     #[arg(long, value_enum, value_delimiter = ',')]
     register: Vec<Estimate>,
+    /// Point of the second sensor's frame that --register rotation turns about: where a radar with a biased azimuth stands.
+    #[arg(long, value_name = "X,Y", num_args = 1, value_delimiter = ',', allow_negative_numbers = true)]
+    pivot: Option<Vec<f64>>,
+    /// Map of the first sensor's frame into the common one: 6 numbers (affine), 9 (homography), a file of them, or
+    /// `affine:POINTS`, `homography:POINTS` with a table x,y,X,Y.
+    #[arg(long, value_name = "MAP")]
+    map_a: Option<String>,
+    /// Map of the second sensor's frame, likewise; also `affine` or `homography` alone, with --common.
+    #[arg(long, value_name = "MAP")]
+    map_b: Option<String>,
+    /// Tracks known to be common, for --map-b: numbers of the first and the second sensor.
+    #[arg(long, value_name = "A=B,...")]
+    common: Option<String>,
+    /// Configuration whose tracker makes tracks of detections; chosen from the table without it.
+    #[arg(short, long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// Largest mean squared distance of a pair of tracks (no unit).
     #[arg(long, default_value_t = 9.21)]
     gate: f64,
@@ -66,24 +104,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             return Err(e.at(format!("{key} {value}")).into());
         }
     }
-    let read = |path: &PathBuf| -> anyhow::Result<Vec<Timeline>> {
-        let table = read_tracks(path, &TableOptions::default())?;
-        table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", path.display()));
-        Ok(timelines(table.frames.iter().map(|f| (f.time.as_secs_f64(), f.tracks.as_slice()))))
-    };
-    let (a, b) = (read(&args.a)?, read(&args.b)?);
+    if args.pivot.as_ref().is_some_and(|p| p.len() != 2 || p.iter().any(|v| !v.is_finite())) {
+        let e = boresight::Error::new(boresight::ErrorKind::Config, "expected two numbers").at("--pivot");
+        return Err(e.hint("--pivot 0,0 turns about the origin").into());
+    }
+    let config = args.config.as_deref().map(Config::from_file).transpose()?;
+    let (a, b) = sensors(&args, config.as_ref())?;
     let wanted = |e| args.register.contains(&e);
     let registration = (!args.register.is_empty()).then(|| RegistrationConfig {
         offset: wanted(Estimate::Offset),
         rotation: wanted(Estimate::Rotation),
         time: wanted(Estimate::Time),
+        pivot_px: args.pivot.as_deref().and_then(|p| p.first_chunk().copied()),
     });
     let rule = match args.rule {
         RuleName::Independent => Rule::Independent,
         RuleName::Ci => Rule::CovarianceIntersection,
         RuleName::Ici => Rule::InverseCovarianceIntersection,
     };
-    let config = FuseConfig {
+    let fuse_config = FuseConfig {
         rule,
         gate: args.gate,
         density: args.density,
@@ -91,40 +130,100 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         registration,
         ..FuseConfig::default()
     };
-    let fused = fuse_tables(&a, &b, &config)?;
-    let mut out = TracksCsv::create(&args.output)?;
-    for (k, (time_s, tracks)) in fused.frames.iter().enumerate() {
-        let scan = Scan { index: FrameIndex(k as u64), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
-        out.put(&View { frame: None, scan: &scan, tracks })?;
-    }
-    Box::new(out).finish()?;
-    fused.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    let fused = fuse_tables(&a.tracks, &b.tracks, &fuse_config)?;
     if registration.is_some() {
-        let r = &fused.registration;
-        eprintln!(
-            "registration from {} common points: offset ({:.3} ± {:.3}, {:.3} ± {:.3}) px, rotation {:.5} ± {:.5} rad about ({:.1}, {:.1}), second clock ahead by {:.4} ± {:.4} s; mean d² {:.2} -> {:.2}",
-            r.n_points,
-            r.offset_px[0],
-            r.std[0],
-            r.offset_px[1],
-            r.std[1],
-            r.rotation_rad,
-            r.std[2],
-            r.centre_px[0],
-            r.centre_px[1],
-            r.time_s,
-            r.std[3],
-            r.mean_d2[0],
-            r.mean_d2[1]
-        );
+        say_registration(&fused.registration);
     }
+    let level = args.level.unwrap_or(match (&a.scans, &b.scans) {
+        (Some(_), Some(_)) => Level::Measurements,
+        _ => Level::Tracks,
+    });
+    fused.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    let frames = match (level, &a.scans, &b.scans) {
+        (Level::Tracks, ..) => fused.frames,
+        (Level::Measurements, Some(x), Some(y)) => together(&a, x, y, &fused.registration, config.as_ref())?,
+        (Level::Measurements, ..) => {
+            let e = boresight::Error::new(boresight::ErrorKind::Config, "both tables must hold detections");
+            return Err(e.at("--level measurements").hint("tracks are fused with --level tracks").into());
+        }
+    };
+    write(&args.output, &frames)?;
     eprintln!(
-        "{} + {} tracks, {} paired, {} times: {}",
-        a.len(),
-        b.len(),
+        "{} + {} tracks, {} paired; {} at {} times: {}",
+        a.tracks.len(),
+        b.tracks.len(),
         fused.pairs.len(),
-        fused.frames.len(),
+        if level == Level::Tracks { "tracks fused" } else { "measurements fused" },
+        frames.len(),
         args.output.display()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Reads both sensors into the common frame.
+fn sensors(args: &Args, config: Option<&Config>) -> anyhow::Result<(Sensor, Sensor)> {
+    let spec = |text: &Option<String>| text.as_deref().map(MapSpec::read).transpose();
+    let known = match spec(&args.map_a)? {
+        None => PlaneMap::IDENTITY,
+        Some(MapSpec::Known(map)) => map,
+        Some(MapSpec::FromTracks(_)) => {
+            let e = boresight::Error::new(boresight::ErrorKind::Config, "only the second sensor's map is estimated");
+            return Err(e.at("--map-a").hint("swap the tables, or give --map-b").into());
+        }
+    };
+    let a = input::read(&args.a, config, &known)?;
+    let b = match spec(&args.map_b)? {
+        None => input::read(&args.b, config, &PlaneMap::IDENTITY)?,
+        Some(MapSpec::Known(map)) => input::read(&args.b, config, &map)?,
+        Some(MapSpec::FromTracks(kind)) => {
+            let raw: Vec<Timeline> = input::read(&args.b, config, &PlaneMap::IDENTITY)?.tracks;
+            let pairs = args.common.as_deref().map_or(Ok(Vec::new()), input::common_tracks)?;
+            let map = input::map_from_tracks(kind, &a.tracks, &raw, &pairs, args.max_gap)?;
+            input::read(&args.b, config, &map)?
+        }
+    };
+    Ok((a, b))
+}
+
+/// One tracker takes both sensors' detections.
+fn together(
+    a: &Sensor,
+    x: &[Scan],
+    y: &[Scan],
+    registration: &Registration,
+    config: Option<&Config>,
+) -> boresight::Result<Vec<(f64, Vec<TrackState>)>> {
+    // The maps are in the detections already.
+    let plain = |scans, registration| SensorScans { scans, map: PlaneMap::IDENTITY, registration };
+    let (scans, _) = merge_scans(&[plain(x, Registration::IDENTITY), plain(y, *registration)]);
+    let config = input::tracker_of(&scans, a.rate_hz, config);
+    input::run_tracker(&config, &scans)
+}
+
+fn write(path: &Path, frames: &[(f64, Vec<TrackState>)]) -> boresight::Result<()> {
+    let mut out = TracksCsv::create(path)?;
+    for (k, (time_s, tracks)) in frames.iter().enumerate() {
+        let scan = Scan { index: FrameIndex(k as u64), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
+        out.put(&View { frame: None, scan: &scan, tracks })?;
+    }
+    Box::new(out).finish()
+}
+
+fn say_registration(r: &Registration) {
+    eprintln!(
+        "registration from {} common points: offset ({:.3} ± {:.3}, {:.3} ± {:.3}) px, rotation {:.5} ± {:.5} rad about ({:.1}, {:.1}), second clock ahead by {:.4} ± {:.4} s; mean d² {:.2} -> {:.2}",
+        r.n_points,
+        r.offset_px[0],
+        r.std[0],
+        r.offset_px[1],
+        r.std[1],
+        r.rotation_rad,
+        r.std[2],
+        r.centre_px[0],
+        r.centre_px[1],
+        r.time_s,
+        r.std[3],
+        r.mean_d2[0],
+        r.mean_d2[1]
+    );
 }

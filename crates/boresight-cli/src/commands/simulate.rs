@@ -1,8 +1,11 @@
-//! `boresight simulate`: frames and truth of a simulated scene to disk.
+//! `boresight simulate`: frames, radar plots and truth of a simulated scene to disk; or radars on any table of tracks.
+
+mod config;
+mod plots;
 
 use crate::frame_writer::{FrameFormat, FrameWriter};
 use crate::progress;
-use boresight::io::tables::{Output, TracksCsv, mot_box_of_extent};
+use boresight::io::tables::{Output, TableOptions, TracksCsv, mot_box_of_extent, read_tracks};
 use boresight::sim::{SceneConfig, SceneSource, Seed, named, scene::Background};
 use boresight::{Error, ErrorKind, FrameSource, Scan, Sink, View};
 use std::fmt::Write as _;
@@ -13,11 +16,14 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   boresight simulate ds2 --seed 1 -o sim           data set II of the thesis: sim/frames/*.png, sim/truth.csv, sim/gt.txt
+  boresight track sim/frames --config sim/track.toml -o out && boresight evaluate sim/truth.csv out/tracks.csv
   boresight simulate scene.toml -o sim             a scene of your own (`--print` shows one to start from)
-  boresight simulate ds2 -o - | boresight track -  straight into the tracker (YUV4MPEG2 on standard output)
-Scenes by name: ds1, ds2, ds3, d3-s1, d3-s2, lms-sines, lms-singer, montecarlo.")]
+  boresight simulate d1-fusion -o sim              an imager and a radar: sim/frames, sim/radar.csv
+  boresight simulate tracks.csv --radars radars.toml -o sim   radars that look at trajectories of your own
+  boresight simulate ds2 -o - | boresight track - --config sim/track.toml -o out   straight into the tracker
+Scenes by name: ds1, ds2, ds3, d3-s1, d3-s2, d1-fusion, d1-fusion-loss, lms-sines, lms-singer, montecarlo.")]
 pub struct Args {
-    /// Name of a scene, or a TOML file.
+    /// Name of a scene, a TOML file, or (with --radars) a table of tracks that radars look at.
     scene: String,
     /// Seed: the same seed gives the same bits.
     #[arg(long, default_value_t = 1)]
@@ -34,6 +40,9 @@ pub struct Args {
     /// How frames are written.
     #[arg(long, value_enum, default_value = "png")]
     format: FrameFormat,
+    /// Radars instead of the scene's own: a TOML file with `[[radars]]`, keys as in a scene.
+    #[arg(long, value_name = "FILE")]
+    radars: Option<PathBuf>,
     /// Print the scene as TOML and stop.
     #[arg(long)]
     print: bool,
@@ -42,7 +51,14 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let seed = Seed::new(args.seed).of_run(args.run);
+    if boresight::io::is_table(&args.scene) && !args.scene.ends_with(".toml") {
+        return on_tracks(&args, seed);
+    }
     let mut scene = read_scene(&args.scene, seed)?;
+    if let Some(file) = &args.radars {
+        scene.radars = plots::read_radars(file)?;
+        scene.validate("scene")?;
+    }
     if let Some(n) = args.frames {
         scene.n_frames = n;
     }
@@ -70,6 +86,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let mut frames = FrameWriter::create(dir, args.format, source.info())?;
     let mut truth = TracksCsv::to(Output::file(dir.join("truth.csv"))?)?;
+    let mut radars = plots::Radars::create(dir, &scene.radars, seed)?;
     let (mut gt, mut times) = (String::new(), String::from("frame,time_s\n"));
     let bar = progress::bar(Some(scene.n_frames), "frames");
     let (mut n_frames, mut n_boxes) = (0u64, 0usize);
@@ -82,6 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             writeln!(gt, "{},{},{l},{top},{w},{h},1,1,{}", frame.index.0 + 1, t.id.0, t.score)?;
         }
         writeln!(times, "{},{}", frame.index.0, frame.time.as_secs_f64())?;
+        radars.see(frame.time.as_secs_f64(), source.truth())?;
         n_frames += 1;
         n_boxes += source.truth().len();
         source.recycle(frame);
@@ -90,6 +108,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     frames.finish()?;
     Box::new(truth).finish()?;
+    let mut written = vec!["frames".to_string(), "truth.csv".into(), "gt.txt".into(), "frames.csv".into()];
+    written.extend(radars.finish()?);
+    if let Some(config) = config::for_scene(&args.scene, &scene) {
+        write("track.toml", &config.to_toml()?)?;
+        written.push("track.toml".into());
+    }
+    written.push("scene.toml".into());
     write("gt.txt", &gt)?;
     write("frames.csv", &times)?;
     write("scene.toml", &toml::to_string(&scene)?)?;
@@ -101,10 +126,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         scene.rate_hz,
         args.seed,
         args.run,
-        ["frames", "truth.csv", "gt.txt", "frames.csv", "scene.toml"]
-            .map(|f| dir.join(f).display().to_string())
-            .join("\n  ")
+        written.iter().map(|f| dir.join(f).display().to_string()).collect::<Vec<_>>().join("\n  ")
     );
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Radars that look at a table of tracks.
+fn on_tracks(args: &Args, seed: Seed) -> anyhow::Result<ExitCode> {
+    let Some(file) = &args.radars else {
+        let e = Error::new(ErrorKind::Config, "a table of tracks needs radars that look at it").at(&args.scene);
+        return Err(e.hint("give --radars FILE with [[radars]]; docs/simulate.md shows one").into());
+    };
+    let table = read_tracks(&args.scene, &TableOptions::default())?;
+    table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", args.scene));
+    std::fs::create_dir_all(&args.output)
+        .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(args.output.display()).because(e))?;
+    let mut radars = plots::Radars::create(&args.output, &plots::read_radars(file)?, seed)?;
+    for frame in &table.frames {
+        radars.see(frame.time.as_secs_f64(), &frame.tracks)?;
+    }
+    for name in radars.finish()? {
+        eprintln!("{}", args.output.join(name).display());
+    }
     Ok(ExitCode::SUCCESS)
 }
 

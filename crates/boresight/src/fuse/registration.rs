@@ -1,6 +1,6 @@
 //! Registration of two sensors from common targets: constant offset, rotation and time offset, with their uncertainty.
 //!
-//! Model: p_a(t) = Rot(φ) (p_b(t + τ) − c) + c + d, c the mean of b's positions, φ positive from +x towards +y, τ > 0: b's clock is
+//! Model: p_a(t) = Rot(φ) (p_b(t + τ) − c) + c + d, c the mean of b's positions or a given pivot, φ positive from +x towards +y, τ > 0: b's clock is
 //! ahead. Weighted least squares by Gauss-Newton (Levenberg damping), weights (P_a + Rot P_b Rotᵀ)⁻¹.
 //! Symbols: d px, φ rad, τ s; residual px. Limits: errors of filtered tracks are correlated in time, so the stated standard
 //! deviations are too small by about the root of the correlation length in scans; one straight target cannot tell a time offset
@@ -11,7 +11,7 @@ use crate::{Error, ErrorKind, Result};
 use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2, Vector4};
 
 /// What is to be estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegistrationConfig {
     /// Constant offset.
     pub offset: bool,
@@ -19,6 +19,9 @@ pub struct RegistrationConfig {
     pub rotation: bool,
     /// Time offset.
     pub time: bool,
+    /// Point (x, y) of the second sensor's frame that is rotated about, px: where a radar stands whose azimuth is biased. None:
+    /// the mean of its positions, which keeps rotation and offset apart. Matters when the offset is not estimated.
+    pub pivot_px: Option<[f64; 2]>,
 }
 
 /// A registration: how the second sensor's positions become the first one's.
@@ -117,7 +120,7 @@ pub fn register(pairs: &[(&Timeline, &Timeline)], config: RegistrationConfig, ma
     let n_all = pairs.iter().map(|(_, b)| b.points.len()).sum::<usize>();
     let sum: Vector2<f64> =
         pairs.iter().flat_map(|(_, b)| &b.points).map(|(_, g)| Vector2::new(g.mean[0], g.mean[2])).sum();
-    let c = sum / n_all.max(1) as f64;
+    let c = config.pivot_px.map_or(sum / n_all.max(1) as f64, Vector2::from);
     let free = [config.offset, config.offset, config.rotation, config.time];
     let refuse = |what: &str| {
         Error::new(ErrorKind::Numeric, what.to_string())

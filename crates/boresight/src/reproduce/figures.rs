@@ -7,7 +7,6 @@
 use super::follow::{StartAt, Tuning, nearest_gated};
 use super::item::{Figure, Line, Output};
 use super::scene_study::{READING_A, READING_B, READING_C, SceneRun, run_scene};
-use super::sensor_fusion::{F1, F2};
 use super::study::{FilterKind, Job, Options, estimates};
 use crate::sim::Seed;
 use crate::sim::named::{PAPER_START, paper_scene};
@@ -115,11 +114,27 @@ fn pair(d: &Detail, first: usize, numbers: &str, what: &str, unit: &str) -> Vec<
         .collect()
 }
 
+fn states(d: &Detail, i: usize, number: &str, what: &str, unit: &str) -> Figure {
+    let of = |name: &str, s: &[Vector4<f64>], i: usize| line(name, s.iter().map(|v| v[i]));
+    let lines = vec![
+        of("true x = y", &d.run.truth, i),
+        of("estimated x", &d.estimates, i),
+        of("estimated y", &d.estimates, i + 2),
+    ];
+    over_scans(
+        format!("D1 Figure {number}: true and estimated {what}, data set II"),
+        unit,
+        lines,
+        "The start is known.",
+    )
+}
+
 /// Makes all figures.
 pub fn figures(options: &Options<'_>) -> Result<Output> {
     let seed = Seed::new(options.seed);
     let (one, two) = (detail(0.0, 0.0, seed)?, detail(10.0, 50.0, seed)?);
     let mut figures = vec![
+        super::figures_fusion::gate(seed)?,
         picture("4.5", "data set I", 0.0, 0.0, seed)?,
         trajectory(
             "D1 Figure 4.6: trajectory, data set I".into(),
@@ -144,8 +159,10 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
             "The target is held in every scan.",
         ),
     ];
+    figures.push(states(&two, 0, "4.10", "positions", "px"));
     figures.extend(pair(&two, 0, "4.10, 4.13", "position", "px"));
-    figures.extend(pair(&two, 1, "4.11", "velocity", "px/scan"));
+    figures.push(states(&two, 1, "4.11", "velocities", "px/scan"));
+    figures.extend(pair(&two, 1, "4.11, 4.13", "velocity", "px/scan"));
     let root =
         |i: usize| two.run.truth.iter().zip(&two.estimates).map(move |(t, e)| (t[i] - e[i]).hypot(t[i + 2] - e[i + 2]));
     figures.push(over_scans(
@@ -167,7 +184,7 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
         ));
     }
     figures.extend(tracking_of_d0(seed)?);
-    figures.extend(fusion_of_d1(seed)?);
+    figures.extend(super::figures_fusion::fusion_of_d1(seed)?);
     figures.push(fusion_of_d3(seed)?);
     Ok(Output { figures, ..Output::default() })
 }
@@ -194,29 +211,6 @@ fn tracking_of_d0(seed: Seed) -> Result<Vec<Figure>> {
             "The velocity settles after the two-point start.",
         ),
     ])
-}
-
-fn fusion_of_d1(seed: Seed) -> Result<Vec<Figure>> {
-    let truth = super::sensor_fusion::truth();
-    let mut out = Vec::new();
-    for (name, sensors) in [("F1, unbiased", F1), ("F2, opposite biases", F2)] {
-        for loss in [false, true] {
-            let all = super::sensor_fusion::run(&sensors, loss, seed, &truth)?;
-            let root = |s: &[Vector4<f64>]| -> Vec<f64> {
-                truth.iter().zip(s).map(|(t, e)| (t[0] - e[0]).hypot(t[2] - e[2])).collect()
-            };
-            let lines =
-                ["imaging", "radar", "fused"].iter().zip(&all).map(|(n, s)| line(n, root(s).into_iter())).collect();
-            let table = if loss { "4.4, with loss" } else { "4.3" };
-            out.push(over_scans(
-                format!("Position errors behind D1 Table {table}, reading {name}"),
-                "px",
-                lines,
-                "One run.",
-            ));
-        }
-    }
-    Ok(out)
 }
 
 fn fusion_of_d3(seed: Seed) -> Result<Figure> {

@@ -73,9 +73,13 @@ fn row(h: &mut String, r: &Row) {
 
 /// Draws a figure as SVG, 500 x 320.
 pub fn svg(f: &Figure) -> String {
-    let (w, h, left, bottom, top) = (500.0, 320.0, 52.0, 40.0, 12.0);
+    let (w, h, left, bottom) = (500.0, 320.0, 52.0, 40.0);
+    // Lines start below the legend.
+    let top = if f.lines.len() > 4 { 40.0 } else { 26.0 };
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" font-family=\"sans-serif\" font-size=\"11\">"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" shape-rendering=\"{}\" font-family=\"sans-serif\" font-size=\"11\">",
+        // Without smoothing, or seams show between the pixels of a picture.
+        if f.picture.is_some() { "crispEdges" } else { "auto" }
     );
     if let Some((pw, ph, levels)) = &f.picture {
         let scale = 300.0 / (*pw.max(ph)).max(1) as f64;
@@ -162,7 +166,7 @@ pub fn svg(f: &Figure) -> String {
                 d.join(" ")
             );
         }
-        let (x, y) = (left + 8.0 + 110.0 * (i % 4) as f64, top + 4.0 + 13.0 * (i / 4) as f64);
+        let (x, y) = (left + 8.0 + 110.0 * (i % 4) as f64, 10.0 + 13.0 * (i / 4) as f64);
         let _ = write!(
             out,
             "<path d=\"M{x} {y}h14\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"{}\" y=\"{}\">{}</text>",

@@ -5,10 +5,12 @@
 
 pub mod bench_scene;
 mod figures;
+mod figures_fusion;
 pub mod follow;
 pub mod html;
 pub mod initiation;
 pub mod item;
+mod lms;
 pub mod printed;
 pub mod scene_study;
 pub mod score;
@@ -47,6 +49,18 @@ pub const ITEMS: &[Item] = &[
     Item { name: "srif-2", what: "D3 Table 2: CTSRIF and CTFSRIF", studies: 1, make: srif::table_2 },
     Item { name: "srif-3-4", what: "D3 Tables 3, 4: two imagers and their fusion", studies: 2, make: srif::tables_3_4 },
     Item { name: "filters-4.2", what: "D1 Figure 4.2: mean and median filters", studies: 1, make: spatial::figure_42 },
+    Item {
+        name: "lms-2-4",
+        what: "D2 Figures 2-4: the LMS filter on manoeuvres",
+        studies: 5,
+        make: lms::figures_2_to_4,
+    },
+    Item {
+        name: "ds2-pipeline",
+        what: "data set II through the product's own detector, tracker and life",
+        studies: 3,
+        make: initiation::pipeline_ds2,
+    },
     Item {
         name: "figures",
         what: "D0, D1, D3: the figures of tracking, from one run",

@@ -7,13 +7,18 @@
 mod draw;
 pub mod motion;
 pub mod named;
+pub mod radar;
+pub mod radar_config;
 pub mod random;
 pub mod render;
 pub mod scene;
+mod scene_check;
 mod source;
 
 pub use motion::MotionConfig;
 pub use named::named;
+pub use radar::{Radar, RadarScan};
+pub use radar_config::RadarConfig;
 pub use random::{LevelNoise, LevelTable, Seed};
 pub use render::{PaperTarget, quantise, render_from_normals};
 pub use scene::SceneConfig;

@@ -7,18 +7,21 @@
 //! of the peers' bench (one target of 9 x 9, 150 counts above N(50, 50²)), with a start that the seed draws.
 
 use super::motion::{ConstantVelocity, MotionConfig, Singer, Sinusoid};
+use super::radar_config::{Measures, PositionErrors, RadarConfig};
 use super::random::{Purpose, Seed};
-use super::scene::{Background, Rectangle, SceneConfig, Shape, Spot, Target, White};
+use super::scene::{Background, Clock, Rectangle, SceneConfig, Shape, Spot, Target, White};
 use crate::{Error, ErrorKind, Result};
 use rand::RngExt;
 
 /// Names that [`named`] knows, each with what it shows.
-pub const NAMES: [(&str, &str); 8] = [
+pub const NAMES: [(&str, &str); 10] = [
     ("ds1", "data set I of the thesis: one target N(100, 0) on N(50, 0)"),
     ("ds2", "data set II of the thesis: one target N(100, 10²) on N(50, 50²)"),
     ("ds3", "data set III: two targets as in ds2 that cross at scan 22.5"),
     ("d3-s1", "sensor 1 of the SRIF paper: target N(100, 1²) on N(50, 100²)"),
     ("d3-s2", "sensor 2 of the SRIF paper: target N(100, 5²) on N(50, 100²)"),
+    ("d1-fusion", "imaging sensor and ground radar of the thesis (Table 4.3): data set II and a radar of 2.6 px"),
+    ("d1-fusion-loss", "the same with the imager lost in scans 15-25, the radar in 30-45 (Table 4.4)"),
     ("lms-sines", "the LMS paper's manoeuvres: sines of 40 s and 17 s, amplitude 100 px, 25 frames/s"),
     ("lms-singer", "Singer manoeuvres at 25 frames/s"),
     ("montecarlo", "the Monte Carlo scene of the peers' bench"),
@@ -58,6 +61,13 @@ pub fn named(name: &str, seed: Seed) -> Result<SceneConfig> {
         "ds3" => paper_scene(&[PAPER_START, [10.0, 1.0, 55.0, -1.0]], (100.0, 10.0), (50.0, 50.0)),
         "d3-s1" => one((100.0, 1.0), (50.0, 100.0)),
         "d3-s2" => one((100.0, 5.0), (50.0, 100.0)),
+        "d1-fusion" => SceneConfig { radars: vec![ground_radar(&[])], ..one((100.0, 10.0), (50.0, 50.0)) },
+        // Scan k is frame k - 1.
+        "d1-fusion-loss" => SceneConfig {
+            radars: vec![ground_radar(&[[29.0, 44.0]])],
+            clock: Clock { silent_s: vec![[14.0, 24.0]], ..Clock::default() },
+            ..one((100.0, 10.0), (50.0, 50.0))
+        },
         "lms-sines" => manoeuvre(MotionConfig::Sinusoid(Sinusoid {
             amplitude_px: [100.0, 100.0],
             period_s: [40.0, 17.0],
@@ -74,6 +84,15 @@ pub fn named(name: &str, seed: Seed) -> Result<SceneConfig> {
                 .hint(format!("names: {}; or give a TOML file", known.join(", "))));
         }
     })
+}
+
+/// The thesis' ground radar: positions of 2.62 px, one scan a frame (SPEC L.4; its noise is fitted, none is printed).
+fn ground_radar(silent_s: &[[f64; 2]]) -> RadarConfig {
+    RadarConfig {
+        measures: Measures::Position(PositionErrors { std_px: 2.62, bias_px: [0.0; 2] }),
+        silent_s: silent_s.to_vec(),
+        ..RadarConfig::default()
+    }
 }
 
 fn manoeuvre(motion: MotionConfig) -> SceneConfig {

@@ -3,6 +3,7 @@
 use super::belief::Belief;
 use super::birth::BirthConfig;
 use super::clutter::ClutterConfig;
+use super::cue::CueConfig;
 use super::filter_config::FilterConfig;
 use super::life_config::LifeConfig;
 use super::mht::MhtConfig;
@@ -51,6 +52,9 @@ pub struct TrackerConfig {
     pub life: LifeConfig,
     /// How tracks start.
     pub birth: BirthConfig,
+    /// Targets known before the first scan: confirmed tracks at once. None by default.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cues: Vec<CueConfig>,
     /// What a new track must show, beside its life's rule, before it is reported as confirmed.
     pub proof: ProofConfig,
     /// What a pair costs beside position: size, intensity, class, overlap.
@@ -94,6 +98,7 @@ impl Default for TrackerConfig {
             mht: None,
             life: LifeConfig::default(),
             birth: BirthConfig::default(),
+            cues: Vec::new(),
             proof: ProofConfig::default(),
             terms: TermsConfig::default(),
             two_stage: None,
@@ -178,6 +183,7 @@ impl TrackerConfig {
         }
         self.life.validate(&format!("{at}.life"))?;
         self.birth.validate(&format!("{at}.birth"))?;
+        super::cue::validate(self, at)?;
         self.proof.validate(&format!("{at}.proof"))?;
         self.clutter.validate(&format!("{at}.clutter"))?;
         self.terms.validate(&format!("{at}.terms"))?;

@@ -320,6 +320,8 @@ impl Tracking for Tracker {
         if self.last.is_some() {
             self.expire(scan.time);
             self.pace.note(dt_s);
+        } else {
+            self.take_cues(scan.time)?;
         }
         self.last = Some(scan.time);
         self.table.sort(scan);

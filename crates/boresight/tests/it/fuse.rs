@@ -113,7 +113,7 @@ fn registration_finds_offset_rotation_and_time_and_fusion_then_agrees() {
     let away = |t: f64| Rotation2::new(-turn) * (place(t) - offset);
     let a = [sensed(1, seed, (0..120).map(|k| 0.5 * f64::from(k)), 0.2, place, 0.0)];
     let b = [sensed(7, seed, (0..170).map(|k| 0.1 + 0.35 * f64::from(k)), 0.2, away, lead)];
-    let all = RegistrationConfig { offset: true, rotation: true, time: true };
+    let all = RegistrationConfig { offset: true, rotation: true, time: true, pivot_px: None };
     let f = fuse_tables(&a, &b, &FuseConfig { registration: Some(all), ..FuseConfig::default() }).unwrap();
     let r = f.registration;
     assert!((r.rotation_rad - turn).abs() < 0.004, "{r:?}");
@@ -142,7 +142,7 @@ fn one_straight_path_cannot_tell_time_from_offset_and_is_refused() {
             .collect(),
         size: [1.0; 2],
     };
-    let all = RegistrationConfig { offset: true, rotation: false, time: true };
+    let all = RegistrationConfig { offset: true, rotation: false, time: true, pivot_px: None };
     let config = FuseConfig { registration: Some(all), ..FuseConfig::default() };
     let e = fuse_tables(&[straight(0.0, 1)], &[straight(0.5, 2)], &config).unwrap_err().to_string();
     assert!(e.contains("cannot tell") && e.contains("hint"), "{e}");

@@ -4,6 +4,7 @@ mod auto_real;
 mod background;
 mod colour_real;
 mod fuse;
+mod fuse_real;
 mod golden;
 mod images;
 mod metrics;

@@ -1,7 +1,7 @@
 //! The papers' numbers, in runs reduced for CI: they must agree with the specification's independent Monte Carlo.
 
 use boresight::reproduce::follow::{StartAt, Tuning};
-use boresight::reproduce::initiation::study_ds2;
+use boresight::reproduce::initiation::{Start, study_ds2};
 use boresight::reproduce::scene_study::READING_A;
 use boresight::reproduce::study::{FilterKind, Job, study};
 use boresight::reproduce::{ITEMS, Options};
@@ -27,7 +27,7 @@ fn data_set_two_with_known_start_gives_the_specified_error_and_loses_no_track() 
 #[test]
 fn data_set_two_from_nothing_confirms_the_target_and_nothing_else() {
     // SPEC D.5: 0 false confirmed tracks in 40 runs with n_min >= 8, confirmation at scan 3.05 on average.
-    let all = study_ds2(&options(40, 1), true).unwrap();
+    let all = study_ds2(&options(40, 1), Start::SizeLimits).unwrap();
     assert_eq!(all.iter().map(|r| r.false_tracks).sum::<usize>(), 0);
     let at: Vec<f64> = all.iter().map(|r| r.confirmed_at.expect("the target is found") as f64).collect();
     let mean = at.iter().sum::<f64>() / at.len() as f64;
@@ -36,9 +36,20 @@ fn data_set_two_from_nothing_confirms_the_target_and_nothing_else() {
 }
 
 #[test]
+fn data_set_two_through_the_products_own_pipeline_gives_the_specified_error_and_loses_no_track() {
+    // SPEC D.6 and M: 0.176 ± 0.01 px over 200 runs; here a reduced run whose standard error is 0.037 / sqrt(80) = 0.004.
+    for start in [Start::Known, Start::KnownAnySize] {
+        let all = study_ds2(&options(80, 1), start).unwrap();
+        assert!(all.iter().all(|r| !r.lost && r.held == 1.0), "{start:?}");
+        let mean = all.iter().map(|r| r.values[2]).sum::<f64>() / all.len() as f64;
+        assert!((mean - 0.176).abs() <= 0.01, "{start:?}: mean RMSPE {mean}");
+    }
+}
+
+#[test]
 fn without_size_limits_clutter_is_confirmed_by_the_hundred() {
     // SPEC D.5: about 955 false confirmed tracks a run.
-    let all = study_ds2(&options(2, 1), false).unwrap();
+    let all = study_ds2(&options(2, 1), Start::AnySize).unwrap();
     assert!(all.iter().all(|r| (700..1200).contains(&r.false_tracks)), "{all:?}");
 }
 
@@ -67,4 +78,60 @@ fn the_same_seed_gives_the_same_numbers_for_any_number_of_threads() {
     let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     let run = || (item.make)(&options(12, 3)).unwrap();
     assert_eq!(one.install(run), three.install(run));
+}
+
+/// Mean of a case's measure in an item's tables.
+fn mean_of(item: &str, runs: u64, case: &str, measure: &str) -> f64 {
+    let item = ITEMS.iter().find(|i| i.name == item).unwrap();
+    let output = (item.make)(&options(runs, 1)).unwrap();
+    let rows = output.sections.iter().flat_map(|s| &s.rows);
+    rows.clone().find(|r| r.case == case && r.measure == measure).unwrap().ours.mean
+}
+
+#[test]
+fn the_filters_of_figure_42_give_the_specified_errors() {
+    // SPEC L.6: RMSE of the noisy frame, its mean and its median; printed with two or three digits.
+    let specified = [
+        ("salt & pepper 0.03", [25.7, 9.2, 1.6]),
+        ("Gaussian 1.4", [1.4, 2.25, 1.62]),
+        ("Gaussian 10", [10.0, 4.05, 4.45]),
+        ("Gaussian 25", [25.0, 8.8, 10.6]),
+    ];
+    for (case, values) in specified {
+        for (measure, expected) in ["RMSE noisy", "RMSE mean", "RMSE median"].into_iter().zip(values) {
+            let ours = mean_of("filters-4.2", 60, case, measure);
+            // One frame of the specification against our mean of 60: the rare clusters of salt make the median's error scatter.
+            let share = if case.starts_with("salt") { 0.25 } else { 0.03 };
+            assert!((ours - expected).abs() <= share * expected, "{case} {measure}: {ours}, specified {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_lms_filter_goes_below_the_measurements_error_as_specified() {
+    // SPEC H, 25 frames/s, σ = 5 px: guarded 3.8-3.9, 2.0-2.2, 1.7-1.8 px; two digits and other manoeuvres: ± 15 %.
+    let item = ITEMS.iter().find(|i| i.name == "lms-2-4").unwrap();
+    let output = (item.make)(&options(20, 1)).unwrap();
+    let rows = &output.sections[0].rows;
+    let of = |case: &str| rows.iter().filter(|r| r.case == case).collect::<Vec<_>>();
+    for (row, (low, high)) in of("sines σ=5, guarded").iter().zip([(3.8, 3.9), (2.0, 2.2), (1.7, 1.8)]) {
+        assert!((0.85 * low..=1.15 * high).contains(&row.ours.mean) && row.lost == 0, "{row:?}");
+    }
+    // SPEC H: with α = 1e-10 … 1e-9 nearly every run diverges.
+    assert!(of("sines σ=5, α=1e-9")[0].lost >= 18, "{:?}", of("sines σ=5, α=1e-9"));
+    assert_eq!(output.figures.len(), 6);
+}
+
+#[test]
+fn every_captioned_figure_with_data_is_drawn() {
+    let item = ITEMS.iter().find(|i| i.name == "figures").unwrap();
+    let captions: String =
+        (item.make)(&options(1, 1)).unwrap().figures.iter().map(|f| format!("{};", f.caption)).collect();
+    let d1 = (3..=14).chain(16..=21).filter(|n| *n != 4).map(|n| format!("4.{n}"));
+    for number in d1.chain(["D0 Figure 1".into(), "D0 Figure 3".into(), "D3 Figure 1".into()]) {
+        assert!(
+            captions.contains(&format!("{number}:")) || captions.contains(&format!("{number},")),
+            "{number} in {captions}"
+        );
+    }
 }

@@ -1,0 +1,181 @@
+//! What `fuse` reads: tracks as they are, detections through the tracker, and each table's frame of reference.
+
+use boresight::fuse::plane::{PlaneMap, common_points};
+use boresight::fuse::{MapKind, Timeline, timelines};
+use boresight::io::tables::{TableOptions, read_detections, read_tracks};
+use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, track};
+use nalgebra::Vector2;
+use std::path::Path;
+
+/// One sensor's table.
+pub struct Sensor {
+    /// Its tracks, from the table or made from its detections.
+    pub tracks: Vec<Timeline>,
+    /// Its detections, if the table has no tracks.
+    pub scans: Option<Vec<Scan>>,
+    /// Rate of its scans, 1/s.
+    pub rate_hz: f64,
+}
+
+/// Reads a table of tracks, or one of detections and tracks them with `config` (chosen from the table if none is given).
+pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Result<Sensor> {
+    let options = TableOptions::default();
+    let warn = |all: &[String]| all.iter().for_each(|w| eprintln!("warning: {}: {w}", path.display()));
+    let tracks = read_tracks(path, &options);
+    if let Ok(table) = &tracks
+        && table.frames.iter().any(|f| !f.tracks.is_empty())
+    {
+        warn(&table.warnings);
+        let lines = timelines(table.frames.iter().map(|f| (f.time.as_secs_f64(), f.tracks.as_slice())));
+        let tracks = lines.iter().map(|t| map.timeline(t)).filter(|t| !t.points.is_empty()).collect();
+        return Ok(Sensor { tracks, scans: None, rate_hz: table.rate_hz });
+    }
+    let table = match (read_detections(path, &options), tracks) {
+        (Ok(table), _) => table,
+        // Neither: what stood in the way of tracks is the better answer.
+        (Err(_), Err(e)) | (Err(e), Ok(_)) => return Err(e.into()),
+    };
+    warn(&table.warnings);
+    // Noise and speeds are those of the common frame.
+    let scans: Vec<Scan> = table
+        .scans
+        .into_iter()
+        .map(|s| Scan { detections: s.detections.iter().filter_map(|d| map.detection(d)).collect(), ..s })
+        .collect();
+    let config = tracker_of(&scans, table.rate_hz, config);
+    let states = run_tracker(&config, &scans)?;
+    let tracks = timelines(states.iter().map(|(t, s)| (*t, s.as_slice())));
+    eprintln!(
+        "{}: {} detections in {} scans, {} tracks",
+        path.display(),
+        scans.iter().map(|s| s.detections.len()).sum::<usize>(),
+        scans.len(),
+        tracks.len()
+    );
+    Ok(Sensor { tracks, scans: Some(scans), rate_hz: table.rate_hz })
+}
+
+/// The given configuration, or one chosen for the detections.
+pub fn tracker_of(scans: &[Scan], rate_hz: f64, given: Option<&Config>) -> Config {
+    given.cloned().unwrap_or_else(|| {
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        boresight::auto::for_detections(scans, rate_hz, &mut config, &mut reasons);
+        reasons.iter().for_each(|r| eprintln!("  {r}"));
+        config
+    })
+}
+
+/// Tracks detections; returns the tracks of each scan.
+pub fn run_tracker(config: &Config, scans: &[Scan]) -> Result<Vec<(f64, Vec<TrackState>)>> {
+    let mut tracker = track::build(&config.tracker)?;
+    scans.iter().map(|s| Ok((s.time.as_secs_f64(), tracker.step(s)?.to_vec()))).collect()
+}
+
+/// A map: 6 or 9 numbers, or a file that holds them; `affine:POINTS` or `homography:POINTS`, a table `x,y,X,Y` of points in both
+/// frames. `affine` and `homography` alone are estimated later, from common tracks.
+pub enum MapSpec {
+    /// Known.
+    Known(PlaneMap),
+    /// To be estimated from common tracks.
+    FromTracks(MapKind),
+}
+
+impl MapSpec {
+    /// Reads what stands behind `--map-a` or `--map-b`.
+    pub fn read(text: &str) -> Result<Self> {
+        let kind = |name: &str| match name {
+            "affine" => Some(MapKind::Affine),
+            "homography" => Some(MapKind::Homography),
+            _ => None,
+        };
+        if let Some(kind) = kind(text) {
+            return Ok(Self::FromTracks(kind));
+        }
+        if let Some((name, path)) = text.split_once(':')
+            && let Some(kind) = kind(name)
+        {
+            let points: Vec<_> = numbers_of_file(path)?
+                .chunks(4)
+                .map(|c| match c {
+                    [x, y, u, v] => Ok((Vector2::new(*x, *y), Vector2::new(*u, *v))),
+                    _ => Err(Error::new(ErrorKind::Damaged, "expected four numbers a line: x, y, X, Y").at(path)),
+                })
+                .collect::<Result<_>>()?;
+            let found = PlaneMap::estimate(&points, kind).map_err(|e| e.at(path))?;
+            eprintln!("{name} map from {} points of {path}: rms {:.3}", found.n_points, found.rms);
+            return Ok(Self::Known(found.map));
+        }
+        let rows = match numbers(text) {
+            Some(rows) => rows,
+            None => numbers_of_file(text)?,
+        };
+        Ok(Self::Known(PlaneMap::from_rows(&rows).map_err(|e| e.at(text))?))
+    }
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(|c: char| c == ',' || c == ';' || c.is_whitespace())
+        .filter(|w| !w.is_empty())
+        .map(|w| w.parse().ok())
+        .collect()
+}
+
+/// All numbers of a file; a first line of names is left out.
+fn numbers_of_file(path: &str) -> Result<Vec<f64>> {
+    let text = std::fs::read_to_string(path).map_err(|e| {
+        Error::new(ErrorKind::NotFound, "is neither 6 or 9 numbers nor a file that can be read").at(path).because(e)
+    })?;
+    let mut all = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        match numbers(line) {
+            Some(row) => all.extend(row),
+            None if i == 0 => {}
+            None => return Err(Error::new(ErrorKind::Damaged, "expected numbers").at(format!("{path}:{}", i + 1))),
+        }
+    }
+    Ok(all)
+}
+
+/// Pairs of track numbers `A=B,A=B`.
+pub fn common_tracks(text: &str) -> Result<Vec<(TrackId, TrackId)>> {
+    let bad = || {
+        Error::new(ErrorKind::Config, "expected pairs of track numbers")
+            .at(format!("--common {text}"))
+            .hint("--common 3=7,4=9: track 3 of the first sensor is track 7 of the second")
+    };
+    let id = |w: &str| w.trim().parse().map(TrackId).map_err(|_| bad());
+    text.split(',').map(|p| p.split_once('=').ok_or_else(bad).and_then(|(a, b)| Ok((id(a)?, id(b)?)))).collect()
+}
+
+/// Estimates the map from the second sensor to the first one from tracks that are known to be common.
+pub fn map_from_tracks(
+    kind: MapKind,
+    a: &[Timeline],
+    b: &[Timeline],
+    pairs: &[(TrackId, TrackId)],
+    max_gap_s: f64,
+) -> Result<PlaneMap> {
+    if pairs.is_empty() {
+        let e = Error::new(ErrorKind::Config, "a map is estimated from common tracks, and none are named");
+        return Err(e.at("--map-b").hint("name them: --common 3=7,4=9; or give points: --map-b affine:points.csv"));
+    }
+    let find = |all: &[Timeline], id: TrackId, which: &str| {
+        let found = all.iter().find(|t| t.id == id).cloned();
+        found.ok_or_else(|| {
+            Error::new(ErrorKind::NotFound, format!("the {which} sensor has no track {}", id.0)).at("--common")
+        })
+    };
+    let mut points = Vec::new();
+    for (i, j) in pairs {
+        // From the second frame to the first.
+        points.extend(common_points(&find(a, *i, "first")?, &find(b, *j, "second")?, max_gap_s));
+    }
+    let found = PlaneMap::estimate(&points, kind)?;
+    eprintln!(
+        "map from {} common points: rms {:.3}; rows {:?}",
+        found.n_points,
+        found.rms,
+        found.map.matrix().transpose().as_slice()
+    );
+    Ok(found.map)
+}

@@ -1,0 +1,88 @@
+//! Radars of a scene to disk: `NAME.csv` (a table of detections) and `NAME-plots.csv` (range, azimuth, arrival, origin).
+
+use boresight::io::tables::DetectionsCsv;
+use boresight::sim::{Radar, RadarConfig, Seed};
+use boresight::{Error, ErrorKind, Sink, TrackState, View};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// A file with `[[radars]]`.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RadarFile {
+    radars: Vec<RadarConfig>,
+}
+
+/// Reads the radars of a TOML file.
+pub fn read_radars(path: &Path) -> boresight::Result<Vec<RadarConfig>> {
+    let place = path.display();
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be read").at(&place).because(e))?;
+    let file: RadarFile = toml::from_str(&text).map_err(|e| {
+        Error::new(ErrorKind::Config, e.to_string().trim_end().to_string())
+            .at(&place)
+            .hint("expected [[radars]] tables")
+    })?;
+    for (i, r) in file.radars.iter().enumerate() {
+        r.validate(&format!("radars[{i}]")).map_err(|e| e.at(&place))?;
+    }
+    Ok(file.radars)
+}
+
+struct Station {
+    name: String,
+    radar: Radar,
+    table: DetectionsCsv,
+    plots: String,
+}
+
+/// The radars at work, each with its files.
+pub struct Radars {
+    dir: PathBuf,
+    stations: Vec<Station>,
+}
+
+impl Radars {
+    /// Creates the files of all radars.
+    pub fn create(dir: &Path, configs: &[RadarConfig], seed: Seed) -> boresight::Result<Self> {
+        let stations = configs.iter().enumerate().map(|(i, c)| {
+            Ok(Station {
+                name: c.name.clone(),
+                radar: Radar::new(c, seed, i as u64)?,
+                table: DetectionsCsv::create(dir.join(format!("{}.csv", c.name)))?,
+                plots: String::from("frame,time_s,arrival_s,range_px,azimuth_rad,x_px,y_px,target\n"),
+            })
+        });
+        Ok(Self { dir: dir.to_path_buf(), stations: stations.collect::<boresight::Result<_>>()? })
+    }
+
+    /// Takes the truth of the next frame.
+    pub fn see(&mut self, time_s: f64, truth: &[TrackState]) -> boresight::Result<()> {
+        for s in &mut self.stations {
+            for scan in s.radar.see(time_s, truth)? {
+                s.table.put(&View { frame: None, scan: &scan.scan, tracks: &[] })?;
+                let (t, arrival) = (scan.scan.time.as_secs_f64(), scan.arrival.as_secs_f64());
+                for (d, p) in scan.scan.detections.iter().zip(&scan.plots) {
+                    let target = p.target.map_or(String::new(), |id| id.0.to_string());
+                    let ([r, a], z) = (p.polar, d.position);
+                    let _ = writeln!(s.plots, "{},{t},{arrival},{r},{a},{},{},{target}", scan.scan.index.0, z.x, z.y);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the files; returns their names.
+    pub fn finish(self) -> boresight::Result<Vec<String>> {
+        let mut names = Vec::new();
+        for s in self.stations {
+            Box::new(s.table).finish()?;
+            let (table, plots) = (format!("{}.csv", s.name), format!("{}-plots.csv", s.name));
+            let path = self.dir.join(&plots);
+            std::fs::write(&path, s.plots)
+                .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
+            names.extend([table, plots]);
+        }
+        Ok(names)
+    }
+}
