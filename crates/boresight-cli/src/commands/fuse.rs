@@ -147,7 +147,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             return Err(e.at("--level measurements").hint("tracks are fused with --level tracks").into());
         }
     };
-    write(&args.output, &frames)?;
+    let times: Vec<f64> = frames.iter().map(|(t, _)| *t).collect();
+    let (numbers, own) = a.number(&times);
+    if !own {
+        eprintln!(
+            "note: the times are not all frames of the first sensor: frames are numbered anew, compare by time_s"
+        );
+    }
+    write(&args.output, &frames, &numbers)?;
     eprintln!(
         "{} + {} tracks, {} paired; {} at {} times: {}",
         a.tracks.len(),
@@ -197,13 +204,21 @@ fn together(
     let plain = |scans, registration| SensorScans { scans, map: PlaneMap::IDENTITY, registration };
     let (scans, _) = merge_scans(&[plain(x, Registration::IDENTITY), plain(y, *registration)]);
     let config = input::tracker_of(&scans, a.rate_hz, config);
-    input::run_tracker(&config, &scans)
+    // Of several scans of one time the last one's tracks have taken all of them.
+    let mut frames: Vec<(f64, Vec<TrackState>)> = Vec::new();
+    for (time_s, tracks) in input::run_tracker(&config, &scans)? {
+        match frames.last_mut() {
+            Some((t, last)) if *t == time_s => *last = tracks,
+            _ => frames.push((time_s, tracks)),
+        }
+    }
+    Ok(frames)
 }
 
-fn write(path: &Path, frames: &[(f64, Vec<TrackState>)]) -> boresight::Result<()> {
+fn write(path: &Path, frames: &[(f64, Vec<TrackState>)], numbers: &[u64]) -> boresight::Result<()> {
     let mut out = TracksCsv::create(path)?;
-    for (k, (time_s, tracks)) in frames.iter().enumerate() {
-        let scan = Scan { index: FrameIndex(k as u64), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
+    for (k, (time_s, tracks)) in numbers.iter().zip(frames) {
+        let scan = Scan { index: FrameIndex(*k), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
         out.put(&View { frame: None, scan: &scan, tracks })?;
     }
     Box::new(out).finish()

@@ -15,6 +15,25 @@ pub struct Sensor {
     pub scans: Option<Vec<Scan>>,
     /// Rate of its scans, 1/s.
     pub rate_hz: f64,
+    /// Number and time (s) of its first frame.
+    pub first: (u64, f64),
+}
+
+impl Sensor {
+    /// Numbers the times (s) as this sensor's frames; from 0 on where they are not all frames of their own of its clock.
+    pub fn number(&self, times: &[f64]) -> (Vec<u64>, bool) {
+        let (k0, t0) = self.first;
+        let at = |t: &f64| k0 as f64 + ((t - t0) * self.rate_hz).round();
+        let near = |t: &f64| ((t - t0) * self.rate_hz - ((t - t0) * self.rate_hz).round()).abs() < 0.25;
+        let numbers: Vec<f64> = times.iter().map(at).collect();
+        let fine =
+            times.iter().all(near) && numbers.iter().all(|k| *k >= 0.0) && numbers.windows(2).all(|w| w[0] < w[1]);
+        if fine {
+            (numbers.iter().map(|k| *k as u64).collect(), true)
+        } else {
+            ((0..times.len() as u64).collect(), false)
+        }
+    }
 }
 
 /// Reads a table of tracks, or one of detections and tracks them with `config` (chosen from the table if none is given).
@@ -28,7 +47,8 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
         warn(&table.warnings);
         let lines = timelines(table.frames.iter().map(|f| (f.time.as_secs_f64(), f.tracks.as_slice())));
         let tracks = lines.iter().map(|t| map.timeline(t)).filter(|t| !t.points.is_empty()).collect();
-        return Ok(Sensor { tracks, scans: None, rate_hz: table.rate_hz });
+        let first = table.frames.first().map_or((0, 0.0), |f| (f.index.0, f.time.as_secs_f64()));
+        return Ok(Sensor { tracks, scans: None, rate_hz: table.rate_hz, first });
     }
     let table = match (read_detections(path, &options), tracks) {
         (Ok(table), _) => table,
@@ -52,7 +72,8 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
         scans.len(),
         tracks.len()
     );
-    Ok(Sensor { tracks, scans: Some(scans), rate_hz: table.rate_hz })
+    let first = scans.first().map_or((0, 0.0), |s| (s.index.0, s.time.as_secs_f64()));
+    Ok(Sensor { tracks, scans: Some(scans), rate_hz: table.rate_hz, first })
 }
 
 /// The given configuration, or one chosen for the detections.
