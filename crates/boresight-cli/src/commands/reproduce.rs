@@ -90,12 +90,12 @@ fn text(output: &Output) -> String {
             let lost = if r.lost > 0 { format!("  {} runs lost", r.lost) } else { String::new() };
             let _ = writeln!(
                 out,
-                "  {:<27}{:<13}{:>9}{:>10.4}{:>10.4}{:>12}{:>11}{:>6}{lost}",
+                "  {:<27}{:<13}{:>9}{:>10}{:>10}{:>12}{:>11}{:>6}{lost}",
                 r.case,
                 r.measure,
                 number(r.paper, 4),
-                r.ours.mean,
-                r.ours.std,
+                number(r.ours.kept().map(|s| s.mean), 4),
+                number(r.ours.kept().map(|s| s.std), 4),
                 number(r.ours.percentile, 1),
                 number(r.reference.map(|x| x.0), 4),
                 number(r.standard_errors_off(), 1)

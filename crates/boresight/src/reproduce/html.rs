@@ -57,12 +57,12 @@ fn row(h: &mut String, r: &Row) {
     let odd = r.ours.percentile.is_some_and(|p| !(2.5..=97.5).contains(&p));
     let _ = write!(
         h,
-        "<tr><td>{}<td>{}<td>{}<td>{:.4}<td>{:.4}<td{}>{}<td>{}<td>{}<td>{}</tr>",
+        "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td{}>{}<td>{}<td>{}<td>{}</tr>",
         escape(&r.case),
         escape(&r.measure),
         number(r.paper, 4),
-        r.ours.mean,
-        r.ours.std,
+        number(r.ours.kept().map(|s| s.mean), 4),
+        number(r.ours.kept().map(|s| s.std), 4),
         if odd { " class=\"out\"" } else { "" },
         number(r.ours.percentile, 1),
         number(r.reference.map(|x| x.0), 4),

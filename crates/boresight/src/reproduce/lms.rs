@@ -131,12 +131,15 @@ pub fn figures_2_to_4(options: &Options<'_>) -> Result<Output> {
             lines,
             "Below the measurement's error from the first steps on; the paper's crosses after 200 to 250.",
         );
-        let lines = vec![line("filter", &acceleration)];
+        let mut error = line("filter", &acceleration);
+        // The first steps' second differences (1000 px/s² and more) would hide all the rest.
+        error.points.retain(|p| p[0] > 100.0);
+        let lines = vec![error];
         add(
             "acceleration error",
             "px/s²",
             lines,
-            "Falls at the start and then stays at the size of the manoeuvre's own acceleration.",
+            "From step 100 on: before, it falls from the second differences' own noise of thousands of px/s². It stays at the size of the manoeuvre's acceleration.",
         );
     }
     let (m, lost) = (|i: usize| rows[i].ours.mean, rows[6].lost);

@@ -45,6 +45,13 @@ pub struct Spread {
     pub n: usize,
 }
 
+impl Spread {
+    /// Itself, unless every run was left out.
+    pub fn kept(&self) -> Option<&Self> {
+        (self.n > 0).then_some(self)
+    }
+}
+
 /// Summarises the values of the runs.
 pub fn spread(values: &[f64], paper: Option<f64>) -> Spread {
     let n = values.len();
