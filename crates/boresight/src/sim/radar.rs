@@ -218,7 +218,7 @@ mod tests {
             detection_probability: 0.8,
             clutter_per_scan: 4.0,
             scan_period_s: 0.35,
-            range_px: [20.0, 3000.0],
+            range_px: [20.0, 90_000.0],
             ..RadarConfig::default()
         };
         let scans = run(&config, 700);

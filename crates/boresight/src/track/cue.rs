@@ -7,9 +7,10 @@
 //! independent between axes, position and velocity.
 
 use super::config::{TrackerConfig, not_negative, positive};
+use super::living::Track;
 use super::proof::Proof;
 use super::terms::Look;
-use super::tracker::{Track, Tracker};
+use super::tracker::Tracker;
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::{Filter, Gaussian};
 use nalgebra::{Matrix4, Vector4};
