@@ -1,7 +1,8 @@
 //! ns per predict + update, 4 states and 2 measurements: every form in f64 and f32, alone and for 10 000 tracks.
 //!
 //! `alone`: one filter, 1 000 steps a sample: µs shown = ns a step. `tracks_10k`: 10 000 filters in a vector, one step
-//! each: µs shown / 10 = ns a step. `batch`: the lane batch. Peers in the same run: the plain nalgebra loop, adskalman.
+//! each: µs shown / 10 = ns a step. `batch`: the lane batch. Peers in the same run: the plain nalgebra
+//! loop, adskalman, kfilter, minikalman (no crate offers U-D or square-root information filters).
 //! Run: `cargo bench -p boresight-filters --bench filters` (with `--features simd` for run-time dispatch).
 
 use boresight_filters::batch::{Lanes, Variance, step_all};
@@ -233,6 +234,63 @@ mod peers {
                 s = kf.step(&s, &z.position).unwrap();
             }
             s
+        });
+    }
+
+    #[divan::bench]
+    fn kfilter_alone(bencher: Bencher) {
+        use kfilter::measurement::LinearMeasurement;
+        use kfilter::system::LinearNoInputSystem;
+        use kfilter::{Kalman1M, KalmanFilter, KalmanPredict};
+        use kfilter_nalgebra::{SMatrix, SVector};
+        let z = positions::<f64>(STEPS);
+        let system = LinearNoInputSystem::new(
+            SMatrix::<f64, 4, 4>::from_column_slice(phi().as_slice()),
+            SMatrix::from_column_slice(noise().as_slice()),
+            SVector::zeros(),
+        );
+        let r = SMatrix::<f64, 2, 2>::identity() * 0.49;
+        let seen = LinearMeasurement::new(SMatrix::from_column_slice(h().as_slice()), r, SMatrix::zeros());
+        let p0 = SMatrix::<f64, 4, 4>::from_column_slice(start::<f64>().cov.as_slice());
+        bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
+            let mut f = Kalman1M::<f64, 4, 0, 2, _, _>::new_custom(system.clone(), p0, seen.clone());
+            for z in &z {
+                f.predict().unwrap();
+                f.update(SVector::<f64, 2>::new(z.position[0], z.position[1])).unwrap();
+            }
+            f.state()[0]
+        });
+    }
+
+    #[divan::bench]
+    fn minikalman_alone(bencher: Bencher) {
+        use minikalman::prelude::*;
+        use minikalman::regular::builder::KalmanFilterBuilder;
+        let z = positions::<f64>(STEPS);
+        let (f, q, h, p0) = (phi(), noise(), h(), start::<f64>().cov);
+        let builder = KalmanFilterBuilder::<4, f64>::default();
+        bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
+            let mut filter = builder.build();
+            let mut seen = builder.observations().build::<2>();
+            let cells = || (0..4).flat_map(|r| (0..4).map(move |c| (r, c)));
+            filter.state_transition_mut().apply(|a| cells().for_each(|(r, c)| a.set_at(r, c, f[(r, c)])));
+            filter.estimate_covariance_mut().apply(|a| cells().for_each(|(r, c)| a.set_at(r, c, p0[(r, c)])));
+            filter.direct_process_noise_mut().apply(|a| cells().for_each(|(r, c)| a.set_at(r, c, q[(r, c)])));
+            seen.observation_matrix_mut()
+                .apply(|a| cells().filter(|(r, _)| *r < 2).for_each(|(r, c)| a.set_at(r, c, h[(r, c)])));
+            seen.measurement_noise_covariance_mut().apply(|a| {
+                a.set_at(0, 0, 0.49);
+                a.set_at(1, 1, 0.49);
+            });
+            for z in &z {
+                filter.predict();
+                seen.measurement_vector_mut().apply(|v| {
+                    v.set_row(0, z.position[0]);
+                    v.set_row(1, z.position[1]);
+                });
+                filter.correct(&mut seen);
+            }
+            filter.state_vector().get_row(0)
         });
     }
 }
