@@ -8,6 +8,7 @@ mod crossing_table;
 mod docs;
 mod filter_table;
 mod ir_exam;
+mod link_table;
 mod mot_table;
 mod video_check;
 mod vision_exam;
@@ -40,6 +41,8 @@ enum Chore {
     CrossingTable(crossing_table::Args),
     /// Every filter by name over the sample clip: held, error, NIS.
     FilterTable(filter_table::Args),
+    /// Links against trackpy's and btrack's published ones.
+    LinkTable(link_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
     MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
@@ -64,6 +67,7 @@ fn main() -> anyhow::Result<()> {
         Chore::ClutterTable(args) => clutter_table::run(&args),
         Chore::CrossingTable(args) => crossing_table::run(&args),
         Chore::FilterTable(args) => filter_table::table(&args),
+        Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
         Chore::VisionExam(args) => vision_exam::run(&args),

@@ -1,4 +1,5 @@
-//! Tracks from MOTChallenge detections against SORT's: HOTA, IDF1, MOTA of every sequence, one configuration for all.
+//! Tracks from MOTChallenge detections against SORT's: HOTA, IDF1, MOTA of every sequence, one configuration for all
+//! but the detectors' score thresholds.
 //!
 //! Data: 2D MOT 2015 with SORT's Faster R-CNN detections (SORT's own result beside them) and MOT17 with DPM detections.
 //! Scores are those of `boresight::metrics`, which equal TrackEval's; `--out DIR` writes MOT files for TrackEval itself.
@@ -7,7 +8,7 @@ use anyhow::{Context, Result};
 use boresight::io::tables::{TableOptions, mot_box_of_extent, read_detections};
 use boresight::io::tracks::{ReadOptions, mot};
 use boresight::metrics::{MatchOptions, Rules, Scores, evaluate, hota, preprocess};
-use boresight::track::{self, TrackerConfig};
+use boresight::track::{self, TrackerConfig, TwoStageConfig};
 use boresight::{PixelOrigin, TrackRow, TrackStatus, TrackTable};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,9 @@ pub struct Args {
     /// Tracker configuration (JSON) instead of the built-in one for people.
     #[arg(long)]
     config: Option<PathBuf>,
+    /// Folder with SORT's results on MOT17 (`MOT17-02.txt` …), made by `scripts/sort_peer.py`.
+    #[arg(long)]
+    sort: Option<PathBuf>,
     /// Write the tracks as MOTChallenge text into this folder.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -33,11 +37,18 @@ pub fn run(args: &Args) -> Result<()> {
         Some(path) => serde_json::from_str(&std::fs::read_to_string(path)?)?,
         None => serde_json::from_str(PEOPLE)?,
     };
+    // Score thresholds are in each detector's own scale; all else is the same.
+    let frcnn = TwoStageConfig { high_score: 0.9, low_score: 0.0 };
+    let dpm = TwoStageConfig { high_score: 0.3, low_score: -0.5 };
     let sets = [
-        ("mot15_text", "det_frcnn_sort.txt", Some("result_sort.txt"), Rules::Mot15),
-        ("mot17_text", "det_dpm.txt", None, Rules::Mot17),
+        ("mot15_text", "det_frcnn_sort.txt", Some("result_sort.txt"), Rules::Mot15, frcnn),
+        ("mot17_text", "det_dpm.txt", None, Rules::Mot17, dpm),
     ];
-    for (set, detections, peer, rules) in sets {
+    for (set, detections, peer, rules, two_stage) in sets {
+        let mut config = config.clone();
+        if args.config.is_none() {
+            config.two_stage = Some(two_stage);
+        }
         println!("\n{set}, {detections}            HOTA   IDF1   MOTA   IDSW    FP     FN");
         let mut folders: Vec<PathBuf> = std::fs::read_dir(args.data.join(set))?
             .flatten()
@@ -55,13 +66,15 @@ pub fn run(args: &Args) -> Result<()> {
             }
             ours.push(judged(&truth, &result, rules)?);
             print_row(&format!("{name:16} boresight"), &ours[ours.len() - 1]);
-            if let Some(peer) = peer {
-                peers.push(judged(&truth, &mot::read(&folder.join(peer), ReadOptions::default())?.0, rules)?);
+            let beside = peer.map(|p| folder.join(p)).or_else(|| Some(args.sort.as_ref()?.join(format!("{name}.txt"))));
+            if let Some(peer) = beside {
+                let result = mot::read(&peer, ReadOptions::default()).with_context(|| peer.display().to_string())?.0;
+                peers.push(judged(&truth, &result, rules)?);
                 print_row(&format!("{:16} SORT", ""), &peers[peers.len() - 1]);
             }
         }
         print_row(&format!("{:16} boresight", "all"), &Scores::combined(&ours));
-        if peer.is_some() {
+        if !peers.is_empty() {
             print_row(&format!("{:16} SORT", ""), &Scores::combined(&peers));
         }
     }

@@ -87,6 +87,7 @@ fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
         }),
         coast_s: 6.0,
         coast_scans: 1,
+        sharing: None,
         ..TrackerConfig::default()
     };
     // Another configuration may be tried without building anew.

@@ -49,12 +49,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// What `--list` knows, and the key that holds it.
-const LISTS: [(&str, &str); 8] = [
+const LISTS: [(&str, &str); 11] = [
     ("filters", "tracker.filter"),
+    ("models", "tracker.filter.kf.model"),
+    ("innovations", "tracker.filter.kf.innovation"),
     ("associators", "tracker.associator"),
     ("lives", "tracker.life"),
     ("births", "tracker.birth"),
     ("clutter", "tracker.clutter"),
+    ("terms", "tracker.terms"),
     ("thresholds", "detector.threshold"),
     ("spatial-filters", "detector.filter"),
     ("centroids", "detector.centroid.method"),
@@ -67,7 +70,14 @@ fn list(what: &str) -> anyhow::Result<String> {
             .at(format!("--list {what}"))
             .hint(format!("lists: {names}"))
     })?;
-    explain(key)
+    let mut text = explain(key)?;
+    if what == "associators" {
+        // Its own tracker, so a table of its own; to the user one more way to associate.
+        let mht = boresight::config::explain("tracker.mht")?;
+        let meaning = mht.meaning.lines().next().unwrap_or_default();
+        writeln!(text, "  {:14}  {meaning} (a table of its own, tracker.mht)", "mht")?;
+    }
+    Ok(text)
 }
 
 fn explain(key: &str) -> anyhow::Result<String> {

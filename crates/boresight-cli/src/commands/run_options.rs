@@ -26,6 +26,9 @@ pub struct InputArgs {
     /// Filter of the tracks; `boresight config --list filters` explains each.
     #[arg(long, value_name = "NAME")]
     pub filter: Option<String>,
+    /// How detections are shared out among tracks, or `mht`; `boresight config --list associators` explains each.
+    #[arg(long, value_name = "NAME")]
+    pub associator: Option<String>,
     /// Rate of inputs without times of their own, frames/s.
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
@@ -95,6 +98,11 @@ fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     if let Some(filter) = &args.filter {
         config =
             config.with(&format!("tracker.filter.{filter}={{}}")).map_err(|e| e.at(format!("--filter {filter}")))?;
+    }
+    match args.associator.as_deref() {
+        Some("mht") => config = config.with("tracker.mht={}")?,
+        Some(name) => config = config.with(&format!("tracker.associator.{name}={{}}"))?,
+        None => {}
     }
     for set in &args.sets {
         config = config.with(set)?;
