@@ -30,7 +30,7 @@ impl<M: Model<4> + Clone> TakesSeveral for Srif<M, 4>
 where
     Self: GaussianFilter<4, Real = f64>,
 {
-    /// Stacks pairs: [R y; H_w1 z_w1; H_w2 z_w2] is triangularised once (eq 10).
+    /// Stacks pairs: `[R y; H_w1 z_w1; H_w2 z_w2]` is triangularised once (eq 10).
     fn correct_all(&mut self, all: &[Measurement]) -> std::result::Result<(), FilterError> {
         let mut pairs = all.chunks_exact(2);
         for pair in &mut pairs {

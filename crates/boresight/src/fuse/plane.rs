@@ -1,6 +1,6 @@
 //! Frames of reference: a plane map (affine or homography) brings one sensor's positions, velocities and covariances into another's.
 //!
-//! Map: p' = N / D with [N; D] = M [x; y; 1]; J = ∂p'/∂p = (A − p' cᵀ)/D, v' = J v, ∂v'/∂p = −((c·v) J + v' cᵀ)/D, where A is the
+//! Map: p' = N / D with `[N; D] = M [x; y; 1]`; J = ∂p'/∂p = (A − p' cᵀ)/D, v' = J v, ∂v'/∂p = −((c·v) J + v' cᵀ)/D, where A is the
 //! upper left of M and c = (m31, m32). Covariances go through these derivatives (first order); exact for affine maps.
 //! Estimated from points known in both frames: the linear solution (DLT: R. Hartley, A. Zisserman, *Multiple View Geometry*, 2nd
 //! ed., 2004, 4.1, with their normalisation 4.4.4), then Gauss-Newton on the distances in the second frame.

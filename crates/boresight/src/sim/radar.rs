@@ -52,7 +52,7 @@ pub struct Radar {
 impl Radar {
     /// Starts the radar; `number` tells radars of one scene apart.
     /// # Errors
-    /// [`ErrorKind::Config`] that names a wrong parameter.
+    /// [`crate::ErrorKind::Config`] that names a wrong parameter.
     pub fn new(config: &RadarConfig, seed: Seed, number: u64) -> Result<Self> {
         config.validate("radar")?;
         Ok(Self { config: config.clone(), seed, number, next: 0, last: None })
