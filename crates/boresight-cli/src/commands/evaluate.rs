@@ -250,7 +250,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.distance > 0.0 && args.distance.is_finite()) {
         bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
     }
-    if images::are_frames(&args.truth) && images::are_frames(&args.result) {
+    if images::are_frames(&args.truth) {
         return images::run(&args);
     }
     let mut results = Vec::with_capacity(1 + args.compare.len());

@@ -10,6 +10,7 @@ mod sniff;
 mod still;
 pub mod tables;
 mod tiff_count;
+mod tiff_lzw;
 mod tiff_packed;
 mod tiff_pages;
 pub mod tracks;

@@ -160,7 +160,7 @@ fn sample(row: &[u8], at: usize, n: usize) -> u16 {
 }
 
 /// Reads and unpacks one strip or tile to exactly `expected` bytes.
-fn chunk_bytes(
+pub(super) fn chunk_bytes(
     reader: &mut (impl Read + Seek),
     offset: u64,
     length: u64,
@@ -178,9 +178,17 @@ fn chunk_bytes(
         5 => {
             let mut lzw = weezl::decode::Decoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8);
             out.resize(expected, 0);
-            let done = lzw.decode_bytes(&packed, &mut out);
-            done.status.map_err(|e| damaged("not a whole TIFF", e))?;
-            out.truncate(done.consumed_out);
+            let (mut read, mut written) = (0, 0);
+            // The decoder may stop before the output is full: it goes on until it says that it has ended or has nothing left.
+            while written < expected {
+                let done = lzw.decode_bytes(&packed[read..], &mut out[written..]);
+                let ended = !matches!(done.status.map_err(|e| damaged("not a whole TIFF", e))?, weezl::LzwStatus::Ok);
+                (read, written) = (read + done.consumed_in, written + done.consumed_out);
+                if ended || done.consumed_in + done.consumed_out == 0 {
+                    break;
+                }
+            }
+            out.truncate(written);
         }
         8 | 32946 => {
             flate2::read::ZlibDecoder::new(&packed[..]).take(expected as u64).read_to_end(&mut out).map_err(failed)?;

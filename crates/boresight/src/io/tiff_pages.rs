@@ -8,7 +8,7 @@
 use super::Colour;
 use super::pixels::{Samples, check_size};
 use super::still::{damaged, guarded};
-use super::tiff_packed;
+use super::{tiff_lzw, tiff_packed};
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -85,7 +85,13 @@ impl<R: Read + Seek> TiffPages<R> {
         }
         let colour_type = self.decoder.colortype().map_err(failed)?;
         let mut buffer = DecodingResult::U8(Vec::new());
-        let layout = self.decoder.read_image_to_buffer(&mut buffer).map_err(failed)?;
+        let planes = match tiff_lzw::read(&mut self.decoder, width, height)? {
+            Some(samples) => {
+                buffer = samples;
+                1
+            }
+            None => self.decoder.read_image_to_buffer(&mut buffer).map_err(failed)?.planes,
+        };
         let channels = match colour_type {
             ColorType::Gray(_) => 1,
             ColorType::GrayA(_) => 2,
@@ -97,7 +103,6 @@ impl<R: Read + Seek> TiffPages<R> {
                     .hint("convert the images to grey or RGB"));
             }
         };
-        let planes = layout.planes;
         if channels > 4 {
             return Err(Error::new(ErrorKind::Unsupported, format!("{channels} samples in a pixel: expected 1 to 4"))
                 .hint("write the channel to be tracked as grey pages"));

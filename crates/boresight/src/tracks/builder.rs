@@ -103,11 +103,17 @@ impl TrackTableBuilder {
 
     /// Sorts the rows by frame and the ids by number; the table is at least `min_frames` long.
     /// # Errors
-    /// A frame number above 10⁸, which no sequence reaches and which would eat the memory.
+    /// A frame number that no sequence of so few rows reaches and that would eat the memory: above 10⁶ + 1000 a row, or 10⁸.
     pub fn finish(mut self, min_frames: usize) -> Result<TrackTable> {
         let n_frames = self.frames.iter().max().map_or(0, |&f| f as usize + 1).max(min_frames);
-        if n_frames > 100_000_000 {
-            return Err(Error::new(ErrorKind::Damaged, format!("frame number {} is above 100 000 000", n_frames - 1))
+        let most = self.frames.len().saturating_mul(1000).saturating_add(1_000_000).min(100_000_000);
+        if n_frames > most {
+            let what = format!(
+                "frame number {} in a table of {} rows: expected at most {most}",
+                n_frames - 1,
+                self.frames.len()
+            );
+            return Err(Error::new(ErrorKind::Damaged, what)
                 .at(&self.table.label)
                 .hint("is the frame column really the frame?"));
         }

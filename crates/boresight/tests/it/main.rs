@@ -6,6 +6,7 @@ mod colour_real;
 mod fuse;
 mod fuse_real;
 mod golden;
+mod hostile;
 mod images;
 mod metrics;
 mod reproduce;

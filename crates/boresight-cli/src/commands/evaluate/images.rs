@@ -71,6 +71,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let at = format!("{} and {}, frame {}", args.truth, args.result, frames.len());
         frames.push(values(&frame(&a.pixels, &b.pixels, args.peak).map_err(|e| e.at(at))?));
     }
+    for warning in truth.warnings().iter().chain(result.warnings()) {
+        eprintln!("warning: {warning}");
+    }
     let n = frames.len().max(1) as f64;
     let mean: Vec<f64> = (0..NAMES.len()).map(|k| frames.iter().map(|f| f[k]).sum::<f64>() / n).collect();
     let shown = |v: &[f64]| v.iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>();

@@ -1,0 +1,298 @@
+//! Sound files of every kind, damaged in thousands of seeded ways: an error or a result, never a panic, and little memory.
+//!
+//! The same parsers have targets for `cargo fuzz` in `fuzz/`; this test needs no other toolchain. `BORESIGHT_MUTATIONS`
+//! sets how often each file is damaged (default 60).
+
+use boresight::io::tracks::{Format, ReadOptions, read, write};
+use boresight::io::{OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_tracks};
+use boresight::metrics::{MatchOptions, evaluate};
+use boresight::sim::{SceneConfig, Seed, named};
+use boresight::{Config, Error};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+
+/// Most bytes that one input may have in use at a time. Frames are limited to 2¹⁶ pixels here and files are small; but while
+/// the `tiff` crate opens a file, its own default limits hold (256 MiB, of which damage can bring half to be taken).
+const MOST_BYTES: isize = 320 << 20;
+
+thread_local! {
+    static NOW: Cell<isize> = const { Cell::new(0) };
+    static PEAK: Cell<isize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, which also counts the bytes in use by each thread.
+struct Counting;
+
+impl Counting {
+    fn count(by: isize) {
+        // A thread that ends has no counters any more: nothing is measured then.
+        let _ = NOW.try_with(|now| {
+            now.set(now.get() + by);
+            let _ = PEAK.try_with(|peak| peak.set(peak.get().max(now.get())));
+        });
+    }
+}
+
+// SAFETY: every call goes on to the system's allocator with the same arguments; counting touches plain cells only.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        Self::count(layout.size() as isize);
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        Self::count(layout.size() as isize);
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn dealloc(&self, ptr: *mut u8, layout: Layout) {
+        Self::count(-(layout.size() as isize));
+        // SAFETY: as promised by our caller.
+        unsafe { System.dealloc(ptr, layout) }
+    }
+    unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        Self::count(size as isize - layout.size() as isize);
+        // SAFETY: as promised by our caller.
+        unsafe { System.realloc(ptr, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Runs something and says how many bytes it had in use at most.
+fn peak_of(run: impl FnOnce()) -> isize {
+    let before = NOW.get();
+    PEAK.set(before);
+    run();
+    PEAK.get() - before
+}
+
+/// Damages bytes: hits, cuts, doublings, numbers of extreme size.
+fn damaged(sound: &[u8], seed: u64) -> Vec<u8> {
+    let mut r = ChaCha8Rng::seed_from_u64(seed);
+    let mut bytes = sound.to_vec();
+    for _ in 0..r.random_range(1..6) {
+        if bytes.is_empty() {
+            break;
+        }
+        // Half of the hits go to the front, where sizes, offsets and headers are.
+        let span = if r.random_bool(0.5) { bytes.len().min(200) } else { bytes.len() };
+        let at = r.random_range(0..span);
+        match r.random_range(0..8) {
+            0 => bytes[at] = r.next_u32() as u8,
+            1 => bytes[at] ^= 1 << r.random_range(0..8),
+            2 => bytes.truncate(at),
+            3 => bytes[at] = [0, 1, 0x7f, 0x80, 0xff, b'\n', b',', b'"'][r.random_range(0..8)],
+            4 => {
+                let end = (at + r.random_range(1..32)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+            5 => {
+                let end = (at + r.random_range(1..64)).min(bytes.len());
+                let part = bytes[at..end].to_vec();
+                bytes.splice(at..at, part);
+            }
+            6 => {
+                const NUMBERS: [&str; 10] =
+                    ["-1", "0", "99999999", "4294967296", "18446744073709551616", "1e308", "-1e-320", "NaN", "inf", ""];
+                let text = NUMBERS[r.random_range(0..NUMBERS.len())];
+                // In place of a number, if one is near.
+                let from = (at..bytes.len()).find(|&k| bytes[k].is_ascii_digit()).unwrap_or(at);
+                let to = (from..bytes.len()).find(|&k| !bytes[k].is_ascii_digit()).unwrap_or(bytes.len());
+                bytes.splice(from..to.max(from), text.bytes());
+            }
+            _ => {
+                let end = (at + 4).min(bytes.len());
+                bytes[at..end].fill(0xff);
+            }
+        }
+    }
+    bytes
+}
+
+fn rounds() -> u64 {
+    std::env::var("BORESIGHT_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(60)
+}
+
+/// Damages `sound` again and again and hands each wreck to `each` as a file of this name; both outcomes must occur.
+fn torture(name: &str, sound: &[u8], mut each: impl FnMut(&Path) -> Result<(), Error>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    std::fs::write(&path, sound).unwrap();
+    each(&path).unwrap_or_else(|e| panic!("{name}, undamaged: {e}"));
+    let mut refused = 0;
+    for seed in 0..rounds() {
+        let _ = std::fs::remove_file(&path);
+        std::fs::write(&path, damaged(sound, seed)).unwrap();
+        let peak = peak_of(|| {
+            if let Err(e) = each(&path) {
+                refused += 1;
+                assert!(!e.to_string().is_empty());
+            }
+        });
+        assert!(peak < MOST_BYTES, "{name}, seed {seed}: {peak} bytes in use");
+    }
+    assert!(refused > 0, "{name}: nothing was refused, the damage tests nothing");
+}
+
+fn options() -> OpenOptions {
+    OpenOptions { max_pixels: 1 << 16, ..OpenOptions::default() }
+}
+
+/// Reads all frames, up to a thousand: damage can multiply the frames of an animation.
+fn frames(path: &Path, options: &OpenOptions) -> Result<(), Error> {
+    let mut source = open(&path.to_string_lossy(), options)?;
+    for _ in 0..1000 {
+        let Some(frame) = source.next_frame()? else { break };
+        assert!(frame.pixels.width() * frame.pixels.height() <= 1 << 16);
+    }
+    Ok(())
+}
+
+/// Files of a folder of test data, by extension.
+fn files(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let mut all: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    all.retain(|p| p.extension().is_some_and(|e| extensions.iter().any(|x| e == *x)));
+    all.sort();
+    assert!(!all.is_empty());
+    all
+}
+
+#[test]
+fn damaged_stills_stacks_and_streams_are_survived() {
+    // What no longer looks like itself would go to ffmpeg, which is another program: kept here are the first bytes.
+    for path in files("tests/it/images", &["png", "tif", "jpg", "pgm", "ppm", "pfm", "bmp", "gif", "y4m"]) {
+        let sound = std::fs::read(&path).unwrap();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let head = if name.ends_with("bmp") { 18 } else { 9 };
+        torture(&name, &sound, |p| {
+            let now = std::fs::read(p).unwrap();
+            if now.get(..head) == sound.get(..head) { frames(p, &options()) } else { Ok(()) }
+        });
+    }
+}
+
+#[test]
+fn damaged_clips_are_survived() {
+    for name in ["b_frames", "edit_list", "fragmented", "variable_rate"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/data/video/{name}.mp4"));
+        let sound = std::fs::read(&path).unwrap();
+        torture(&format!("{name}.mp4"), &sound, |p| {
+            let mut source = boresight::io::video::open_mp4(p, &options())?;
+            while source.next_frame()?.is_some() {}
+            Ok(())
+        });
+    }
+}
+
+#[test]
+fn raw_frames_of_any_length_are_survived() {
+    let raw = RawFormat { width: 8, height: 4, pixel: RawType::U16Le };
+    let raw_options = OpenOptions { raw: Some(raw), ..options() };
+    let dir = tempfile::tempdir().unwrap();
+    for n in [0, 1, 63, 64, 65, 200, 640] {
+        let path = dir.path().join(format!("{n}.raw"));
+        std::fs::write(&path, vec![7_u8; n]).unwrap();
+        assert_eq!(frames(&path, &raw_options).is_ok(), n >= 64, "{n} bytes");
+    }
+}
+
+/// Tables of tracks of every kind.
+fn tables() -> Vec<(&'static str, String)> {
+    let lines = |n: usize, of: &dyn Fn(usize) -> String| (0..n).map(of).collect::<String>();
+    vec![
+        ("result.txt", lines(40, &|k| format!("{},{},{}.5,20,10,30.25,0.9,-1,-1,-1\n", 1 + k / 4, 1 + k % 4, 10 * k))),
+        ("gt.txt", lines(40, &|k| format!("{},{},{},20,10,30,1,{},0.5\n", 1 + k / 4, 1 + k % 4, 10 * k, 1 + k % 8))),
+        (
+            "kitti.txt",
+            lines(30, &|k| format!("{} {} Car 0 1 -1.5 {k} 20 80 90.5 1.5 1.6 3.7 1 2 30 0.1 0.8\n", k / 3, k % 3))
+                + "3 -1 DontCare -1 -1 -10 5 6 15 26 -1 -1 -1 -1 -1 -1 -1\n",
+        ),
+        (
+            "points.csv",
+            "frame,particle,x,y,mass\n".to_string() + &lines(40, &|k| format!("{},{},{k}.5,2,9\n", k / 4, k % 4)),
+        ),
+        (
+            "spots.csv",
+            "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,FRAME\nLabel,Spot ID,Track ID,Quality,X,Y,Frame\n\
+Label,Spot ID,Track ID,Quality,X,Y,Frame\n,,,(quality),(pixel),(pixel),\n"
+                .to_string()
+                + &lines(20, &|k| format!("ID{k},{k},{},1,{k}.5,2.5,{}\n", k % 3, k / 3)),
+        ),
+    ]
+}
+
+#[test]
+fn damaged_tables_of_tracks_are_survived_read_judged_and_written() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, sound) in tables() {
+        let path = dir.path().join(name);
+        std::fs::write(&path, &sound).unwrap();
+        let truth = read(&path, None, ReadOptions::default(), false).unwrap().table;
+        for skip_bad_rows in [false, true] {
+            let options = ReadOptions { skip_bad_rows, keep_extra: true, ..ReadOptions::default() };
+            let format = boresight::io::tracks::sniff(&path).unwrap();
+            let mut n_refused = 0;
+            torture(name, sound.as_bytes(), |p| {
+                let read = read(p, Some(format), options, true);
+                // With bad rows left out, only headers and doubled rows are refused: damage to rows counts as well.
+                n_refused += u32::from(read.is_err() || read.as_ref().is_ok_and(|f| f.bad.count > 0));
+                let file = read?;
+                let _ = evaluate(&truth, &file.table, &MatchOptions::default());
+                for to in Format::ALL {
+                    let _ = write(&file.table, to, &mut Vec::new());
+                }
+                if skip_bad_rows && n_refused > 0 {
+                    return Err(Error::new(boresight::ErrorKind::Damaged, "counted"));
+                }
+                Ok(())
+            });
+        }
+    }
+}
+
+#[test]
+fn damaged_tables_of_detections_are_survived() {
+    let own = "frame,time_s,x_px,y_px,var_x_px2,cov_x_y_px2,var_y_px2,left_px,top_px,width_px,height_px,area_px,peak,sum,score\n"
+        .to_string()
+        + &(0..40).map(|k| format!("{},{}.04,{k},20,0.1,0,0.1,5,6,3,3,9,200,900,7\n", k / 4, k / 4)).collect::<String>();
+    let mut all = tables();
+    all.push(("detections.csv", own));
+    for (name, sound) in all {
+        for skip_bad_rows in [false, true] {
+            let options = TableOptions { skip_bad_rows, ..TableOptions::default() };
+            let mut refused = false;
+            let sound_ones = |p: &Path| {
+                let detections = read_detections(p, &options);
+                refused |= detections.is_err() || detections.as_ref().is_ok_and(|t| t.n_skipped > 0);
+                let _ = read_tracks(p, &options);
+                // Not every table of tracks is one of detections: what matters is that nothing breaks.
+                if refused { Err(Error::new(boresight::ErrorKind::Damaged, "refused")) } else { Ok(()) }
+            };
+            if matches!(name, "detections.csv" | "result.txt") {
+                torture(name, sound.as_bytes(), sound_ones);
+            }
+        }
+    }
+}
+
+#[test]
+fn damaged_configurations_and_scenes_are_survived() {
+    let config = toml::to_string(&Config::default()).unwrap();
+    torture("config.toml", config.as_bytes(), |p| {
+        let text = String::from_utf8_lossy(&std::fs::read(p).unwrap()).into_owned();
+        Config::from_toml(&text, "config.toml").map(|_| ())
+    });
+    let seed = Seed::new(1);
+    let scene = toml::to_string(&named("ds2", seed).unwrap()).unwrap();
+    torture("scene.toml", scene.as_bytes(), |p| {
+        let text = String::from_utf8_lossy(&std::fs::read(p).unwrap()).into_owned();
+        let scene = SceneConfig::from_toml(&text)?;
+        scene.build(seed).map(|_| ())
+    });
+}
