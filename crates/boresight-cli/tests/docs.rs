@@ -2,6 +2,7 @@
 //!
 //! Blocks fenced as `sh` hold commands, a line each; blocks fenced as `console` hold commands after `$ ` and what they print
 //! (`...` stands for anything). A chapter's blocks run in order in one folder, in which `samples/` and `configs/` lie.
+//! A block of any kind with `file=NAME` is written to that file first (a scene, a configuration).
 //! After `sh` or `console` may stand: `needs=data` (or any other need: not run here, printed as skipped), `exit=2` (the code expected).
 //! Lines whose command is not `boresight` (cargo, .ci/run) are left to `.ci/run`.
 
@@ -15,6 +16,8 @@ struct Block {
     line: usize,
     console: bool,
     needs: Option<String>,
+    /// Not commands, but the content of this file.
+    file: Option<String>,
     exit: i32,
     lines: Vec<String>,
 }
@@ -41,16 +44,18 @@ fn blocks(text: &str) -> Vec<Block> {
         } else {
             let mut words = fence.split([' ', ',']);
             let kind = words.next().unwrap_or("");
-            if !matches!(kind, "sh" | "bash" | "shell" | "console") {
+            let attributes: Vec<(&str, &str)> = words.filter_map(|w| w.split_once('=')).collect();
+            let get = |name: &str| attributes.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string());
+            let file = get("file");
+            if file.is_none() && !matches!(kind, "sh" | "bash" | "shell" | "console") {
                 other = true;
                 continue;
             }
-            let attributes: Vec<(&str, &str)> = words.filter_map(|w| w.split_once('=')).collect();
-            let get = |name: &str| attributes.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string());
             open = Some(Block {
                 line: k + 1,
                 console: kind == "console",
                 needs: get("needs"),
+                file,
                 exit: get("exit").map_or(0, |e| e.parse().expect("exit=NUMBER")),
                 lines: Vec::new(),
             });
@@ -134,6 +139,10 @@ fn check(chapter: &Path) {
     for block in blocks(&std::fs::read_to_string(chapter).unwrap()) {
         if let Some(needs) = &block.needs {
             println!("{name}:{}: skipped, needs {needs}", block.line);
+            continue;
+        }
+        if let Some(file) = &block.file {
+            std::fs::write(dir.path().join(file), block.lines.join("\n") + "\n").unwrap();
             continue;
         }
         for (command, shown) in commands(&block) {
