@@ -10,8 +10,9 @@ fn docs(name: &str) -> String {
 
 /// The blocks of a chapter in a language, in order.
 fn blocks(text: &str, language: &str) -> Vec<String> {
-    let fence = format!("```{language}\n");
-    text.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_string()).collect()
+    let fence = format!("```{language}");
+    let of = |rest: &str| rest.split_once('\n').unwrap().1.split("```").next().unwrap().to_string();
+    text.split(&fence).skip(1).map(of).collect()
 }
 
 /// Runs a line of a chapter in a shell that finds this build's binary first.

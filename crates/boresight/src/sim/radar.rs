@@ -234,9 +234,9 @@ mod tests {
                 let truth = place(&target(id.0, s.scan.time.as_secs_f64()));
                 dr.push(p.polar[0] - truth.norm());
                 da.push((p.polar[1] - truth.y.atan2(truth.x)).to_degrees());
-                // Biases taken away, the covariance must cover the rest.
-                let (r, a) = (p.polar[0] - 5.0, p.polar[1] + 2f64.to_radians());
-                let off = r * Vector2::new(a.cos(), a.sin()) - truth;
+                // The covariance lies along the biased line of sight: it must cover the way to the biased truth.
+                let (r, a) = (truth.norm() + 5.0, truth.y.atan2(truth.x) - 2f64.to_radians());
+                let off = d.position - r * Vector2::new(a.cos(), a.sin());
                 nees += off.dot(&(d.cov.try_inverse().unwrap() * off));
             }
         }

@@ -10,7 +10,7 @@
 //! Departures, without changing the value: the gain c^p − d^p of assigned pairs is maximised, so only pairs that are ever
 //! nearer than c are unknowns; pairs that share no track with another are assigned throughout; the rest falls apart
 //! into groups that share tracks; frames without a near pair of the group vanish; frames side by side that have only one
-//! near pair, the same, are one. Each group is a linear programme ([`programme`]).
+//! near pair, the same, are one. Each group is a linear programme (`programme`).
 //! Limits: at most [`TrajectoryOptions::max_unknowns`] shares in all.
 
 mod programme;
