@@ -112,7 +112,10 @@ impl<F: GaussianFilter<N, Real = T>, const N: usize, const R: usize, T: Real> Im
         }
         let mut next = self.probability;
         for (p, l) in next.iter_mut().zip(log) {
-            *p *= (*l - largest).exp();
+            // A model of no probability may fit so much better that the factor overflows.
+            if *p > T::zero() {
+                *p *= (*l - largest).exp();
+            }
         }
         let sum = next.sum();
         if !(sum > T::zero() && sum <= T::MAX) {
@@ -203,6 +206,11 @@ impl<F: GaussianFilter<N, Real = T>, const N: usize, const R: usize, T: Real> Ga
         let mut next = self.clone();
         let mut log = [T::zero(); R];
         for j in 0..R {
+            // A model of no probability has no share in the mixture: by itself it takes the weights as they are.
+            if !(probability[j] > T::zero()) {
+                next.filters[j].correct_weighted(hypotheses.clone())?;
+                continue;
+            }
             let mut total = p0;
             for h in hypotheses.clone() {
                 if h.weight > T::zero() {
@@ -252,11 +260,14 @@ impl<F: GaussianFilter<N, Real = T>, const N: usize, const R: usize, T: Real> Ga
         check_measurement(m)?;
         let mut log = [T::zero(); R];
         let mut largest = -T::MAX;
-        for (f, l) in self.filters.iter().zip(&mut log) {
+        for ((f, l), p) in self.filters.iter().zip(&mut log).zip(self.probability.iter()) {
             *l = f.log_likelihood(m)?;
-            largest = largest.max(*l);
+            if *p > T::zero() {
+                largest = largest.max(*l);
+            }
         }
-        let sum = log.iter().zip(self.probability.iter()).fold(T::zero(), |s, (l, p)| s + *p * (*l - largest).exp());
+        let weighed = log.iter().zip(self.probability.iter()).filter(|(_, p)| **p > T::zero());
+        let sum = weighed.fold(T::zero(), |s, (l, p)| s + *p * (*l - largest).exp());
         Ok(largest + sum.ln())
     }
 }
@@ -322,6 +333,28 @@ mod tests {
         }
         assert!(imm.probabilities()[1] > 0.9, "turning: {:?}", imm.probabilities());
         assert!((imm.belief().mean - truth).norm() < 1.0);
+    }
+
+    #[test]
+    fn a_model_of_no_probability_has_no_say_however_well_it_fits() {
+        let models = [0.001, 100.0].map(|q| Cv::continuous(q).unwrap());
+        let start = models.map(|m| Kf::<_, 4>::from_point(m, &Measurement::isotropic(0.0, 0.0, 0.1), 0.1).unwrap());
+        let mut imm = Imm::new(start, [1.0; 2]).unwrap();
+        imm.predict(1.0).unwrap();
+        let imm = imm.with_probabilities([1.0, 0.0]).unwrap();
+        // Hundreds of standard deviations off for the one, a few for the other: the likelihoods' ratio overflows.
+        let z = Measurement::isotropic(60.0, 0.0, 0.1);
+        let mut alone = imm.filters[0];
+        assert_eq!(imm.log_likelihood(&z).unwrap(), alone.log_likelihood(&z).unwrap());
+        alone.correct(&z).unwrap();
+        let (mut plain, mut doubtful) = (imm, imm);
+        plain.correct(&z).unwrap();
+        assert_eq!(plain.probabilities(), [1.0, 0.0]);
+        assert_eq!(plain.belief().mean, alone.belief().mean);
+        doubtful.correct_weighted([Weighted { measurement: z, weight: 0.5 }].into_iter()).unwrap();
+        assert_eq!(doubtful.probabilities(), [1.0, 0.0]);
+        let half = (imm.filters[0].belief().mean + alone.belief().mean) * 0.5;
+        assert!((doubtful.belief().mean - half).norm() < 1e-12);
     }
 
     #[test]
