@@ -3,6 +3,7 @@
 //! Source: Y. Bar-Shalom, "Update with out-of-sequence measurements in tracking: exact solution", IEEE Trans. AES 38(3),
 //! 2002 (algorithm A1); Y. Bar-Shalom, H. Chen, M. Mallick, "One-step solution for the multistep out-of-sequence-
 //! measurement problem in tracking", IEEE Trans. AES 40(1), 2004 (all updates since the lag as one equivalent update).
+//! Now is the time of the newest update; a filter that was predicted beyond it is predicted there again.
 //! With x⁻, P⁻ predicted from the last update before τ to now without the updates since: b = P⁻⁻¹ (x - x⁻),
 //! B = P⁻⁻¹ (P⁻ - P) P⁻⁻¹ are HᵀS⁻¹ν and HᵀS⁻¹H of that equivalent update; Q = Q(now, τ);
 //! x_τ = F (x - Q b), P_τ = F [P + (Q - Q B Q) - (Q - P⁻ B Q) - (..)ᵀ] Fᵀ, P_xz = [P - (Q - P⁻ B Q)] Fᵀ Hᵀ, F = Phi(now→τ).
@@ -67,10 +68,10 @@ impl<F: Clone, M, const K: usize, T: Real> OutOfSequence<F, M, K, T> {
         &self.filter
     }
 
-    fn note(&mut self, measurement: Option<Measurement<T>>) {
+    fn note(&mut self, after: F, measurement: Option<Measurement<T>>, age_s: T) {
         self.past.rotate_right(1);
         if let Some(first) = self.past.first_mut() {
-            *first = Some(Entry { after: self.filter.clone(), measurement, age_s: T::zero() });
+            *first = Some(Entry { after, measurement, age_s });
         }
     }
 
@@ -95,7 +96,9 @@ impl<F: Clone, M, const K: usize, T: Real> OutOfSequence<F, M, K, T> {
             ));
         };
         let replayable = self.past[..at].iter().all(|e| e.as_ref().is_some_and(|e| e.measurement.is_some()));
-        if self.late == Late::Replay && replayable { self.replay(at, age_s, m) } else { self.retrodict(at, age_s, m) }
+        // With no update since, there is nothing to go back over.
+        let replays = at == 0 || (self.late == Late::Replay && replayable);
+        if replays { self.replay(at, age_s, m) } else { self.retrodict(at, age_s, m) }
     }
 
     fn replay<const N: usize>(&mut self, at: usize, age_s: T, m: &Measurement<T>) -> Result<(), FilterError>
@@ -131,10 +134,13 @@ impl<F: Clone, M, const K: usize, T: Real> OutOfSequence<F, M, K, T> {
         F: GaussianFilter<N, Real = T>,
         M: Model<N, T>,
     {
-        let Some(Some(base)) = self.past.get(at) else { return Ok(()) };
-        let now = self.filter.belief();
+        let (Some(Some(base)), Some(Some(newest))) = (self.past.get(at), self.past.first()) else { return Ok(()) };
+        // All is done at the time of the newest update: process noise after it is not correlated with any innovation.
+        let (ahead_s, age_s) = (newest.age_s, age_s - newest.age_s);
+        let mut updated = newest.after.clone();
+        let now = updated.belief();
         let mut blind = base.after.clone();
-        blind.predict(base.age_s)?;
+        blind.predict(base.age_s - ahead_s)?;
         let blind = blind.belief();
         let chol = Cholesky::new(&blind.cov, "the predicted covariance")?;
         let b: SVector<T, N> = chol.solve(&(now.mean - blind.mean));
@@ -165,9 +171,12 @@ impl<F: Clone, M, const K: usize, T: Real> OutOfSequence<F, M, K, T> {
         if !(crate::real::all_finite(&belief.mean) & crate::real::all_finite(&belief.cov)) {
             return Err(FilterError::NotFinite("the result of the step"));
         }
-        self.filter.set_belief(&belief)?;
-        // Now is a new anchor: it holds the late measurement too, and cannot be replayed through.
-        self.note(None);
+        updated.set_belief(&belief)?;
+        let mut filter = updated.clone();
+        filter.predict(ahead_s)?;
+        self.filter = filter;
+        // A new anchor: it holds the late measurement too, and cannot be replayed through.
+        self.note(updated, None, ahead_s);
         Ok(())
     }
 }
@@ -189,7 +198,7 @@ where
 
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
         self.filter.correct(m)?;
-        self.note(Some(*m));
+        self.note(self.filter.clone(), Some(*m), T::zero());
         Ok(())
     }
 
@@ -200,7 +209,7 @@ where
         let (_, n) = check_weighted(hypotheses.clone())?;
         self.filter.correct_weighted(hypotheses)?;
         if n > 0 {
-            self.note(None);
+            self.note(self.filter.clone(), None, T::zero());
         }
         Ok(())
     }
@@ -212,7 +221,7 @@ where
     fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
         self.filter.set_belief(belief)?;
         self.past = [const { None }; K];
-        self.note(None);
+        self.note(self.filter.clone(), None, T::zero());
         Ok(())
     }
 
@@ -251,6 +260,15 @@ mod tests {
 
     /// Steps of 0.5 s with measurement k at step k; `late` comes after step 6, taken 0.2 s after step `before`.
     fn run<F: Start<Cv, 4> + GaussianFilter<4, Real = f64>>(how: Late, before: i32) -> (Gaussian<4>, Gaussian<4>) {
+        run_ahead::<F>(how, before, 0.0)
+    }
+
+    /// [`run`] with the filter predicted `ahead_s` beyond its last update before the late measurement comes.
+    fn run_ahead<F: Start<Cv, 4> + GaussianFilter<4, Real = f64>>(
+        how: Late,
+        before: i32,
+        ahead_s: f64,
+    ) -> (Gaussian<4>, Gaussian<4>) {
         let (cv, first) = start();
         let fresh = F::from_point(cv, &first, 2.0).unwrap();
         let mut in_order = fresh.clone();
@@ -267,7 +285,15 @@ mod tests {
             wrapped.predict(0.5).unwrap();
             wrapped.correct(&z(k)).unwrap();
         }
-        wrapped.correct_late(0.5 * f64::from(6 - before) - 0.2, &late(before)).unwrap();
+        if before == 6 {
+            in_order.predict(0.2).unwrap();
+            in_order.correct(&late(before)).unwrap();
+            in_order.predict(ahead_s - 0.2).unwrap();
+        } else {
+            in_order.predict(ahead_s).unwrap();
+        }
+        wrapped.predict(ahead_s).unwrap();
+        wrapped.correct_late(ahead_s + 0.5 * f64::from(6 - before) - 0.2, &late(before)).unwrap();
         (in_order.belief(), wrapped.belief())
     }
 
@@ -280,6 +306,17 @@ mod tests {
     fn one_step_late_is_as_good_as_in_time() {
         same(run::<Kf<Cv, 4>>(Late::Retrodict, 5), 1e-11);
         same(run::<Ud<Cv, 4>>(Late::Retrodict, 5), 1e-11);
+    }
+
+    #[test]
+    fn one_step_late_is_as_good_as_in_time_when_the_filter_has_been_predicted_on() {
+        for how in [Late::Retrodict, Late::Replay] {
+            // Before the last update, and after it.
+            for before in [5, 6] {
+                same(run_ahead::<Kf<Cv, 4>>(how, before, 0.3), 1e-11);
+                same(run_ahead::<Ud<Cv, 4>>(how, before, 0.3), 1e-11);
+            }
+        }
     }
 
     #[test]
