@@ -2,7 +2,8 @@
 //!
 //! Source: SPEC D.2 (Bierman's measurement update), D.3 (Thornton's time update by weighted Gram-Schmidt); G. J. Bierman,
 //! *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Errata of the paper: SPEC E-D5, E-D6.
-//! Differs from it: a measurement with a full covariance is whitened first (R = L Lᵀ); the PDA update is made in factors
+//! Differs from it: a row of U that is measured itself becomes u r/α, which is u + λ K without its cancellation (P may
+//! exceed r by the square of the working precision); a full R is whitened first (R = L Lᵀ); the PDA update is made in factors
 //! too: P^ = Σ of weighted factors, joined by Gram-Schmidt, so it cannot lose definiteness.
 //! Symbols: x N x 1; u N x N unit upper; d N (variances); a N x 1 row of H; r measurement variance; α innovation variance.
 //! Two uncorrelated axes are filtered apart, side by side (`ud_axes`), until a full R or a PDA update couples them.
@@ -62,6 +63,14 @@ pub fn ud_scalar_update<const N: usize, T: Real>(
     done
 }
 
+/// The state that a measurement row is one times, if it is only one.
+#[inline(always)]
+fn picked<const N: usize, T: Real>(a: &SVector<T, N>) -> Option<usize> {
+    let mut others = (0..N).filter(|i| a[*i] != T::zero());
+    let first = others.next()?;
+    (others.next().is_none() && a[first] == T::one()).then_some(first)
+}
+
 /// The covariance part of Bierman's update: no measurement is needed.
 #[inline(always)]
 pub(crate) fn factor_update<const N: usize, T: Real>(
@@ -82,6 +91,7 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
     }
     let mut gain = SVector::<T, N>::zeros();
     let mut alpha = r;
+    let picked = picked(a);
     for j in 0..N {
         let before = alpha;
         alpha += g[j] * f[j];
@@ -94,6 +104,10 @@ pub(crate) fn factor_update<const N: usize, T: Real>(
             let t = u[(i, j)];
             u[(i, j)] = t + lambda * gain[i];
             gain[i] += g[j] * t;
+        }
+        // t + λ K = t (1 - (α - r)/α) of the row that is measured itself: a product has no cancellation.
+        if let Some(i) = picked.filter(|i| *i < j) {
+            u[(i, j)] = if before > T::zero() { f[j] * (r / before) } else { f[j] };
         }
         gain[j] = g[j];
     }
@@ -298,4 +312,31 @@ pub(crate) fn whitened_rows<const N: usize, T: Real>(
         r1 = (r11 - l * r10).max(T::zero());
     }
     Ok([(a0, z0, r00), (a1, z1, r1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{ConstantVelocity, Dense};
+
+    #[test]
+    fn a_measurement_a_billion_times_sharper_than_the_prediction_leaves_its_own_variance() {
+        let wide = |p: f32| Gaussian { mean: SVector::<f32, 4>::zeros(), cov: SMatrix::identity() * p };
+        for exponent in 0..16 {
+            let q = libm::pow(10.0, f64::from(exponent) - 8.0) as f32;
+            let cv = ConstantVelocity::<f32>::continuous(q).unwrap();
+            let m = Measurement::isotropic(1.0_f32, 2.0, 1e-6);
+            let (mut apart, mut dense) =
+                (Ud::start(cv, wide(1e-6)).unwrap(), Ud::start(Dense(cv), wide(1e-6)).unwrap());
+            apart.predict(700.0).unwrap();
+            dense.predict(700.0).unwrap();
+            let prior = f64::from(apart.predicted().cov[(0, 0)]);
+            apart.correct(&m).unwrap();
+            dense.correct(&m).unwrap();
+            let want = prior * 1e-12 / (prior + 1e-12);
+            for got in [apart.predicted().cov[(1, 1)], dense.predicted().cov[(0, 0)]] {
+                assert!((f64::from(got) / want - 1.0).abs() < 1e-5, "q {q}: {got} instead of {want}");
+            }
+        }
+    }
 }

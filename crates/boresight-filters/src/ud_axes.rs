@@ -2,7 +2,7 @@
 //!
 //! Source: SPEC D.2, D.3, each axis alone: Bierman's update with the row e_at, Thornton's update of K = N/2 states.
 //! Differs from it: the quotients of successive α share one division (1/α_j serves λ_{j+1} and d_j); conditions are
-//! selections, so that both axes stay in step.
+//! selections, so that both axes stay in step; the measured row of U is multiplied by r/α instead of reduced.
 //! Layout: entry (i, j) of either axis' U at the rows 2 i (x) and 2 i + 1 (y) of column j, d likewise; see
 //! [`crate::linalg`]'s `pack_axes`. Symbols: u unit upper triangular; d variances; α innovation variance (px²).
 //! Limits: Phi of an axis must be upper triangular ([`crate::model::Model::AXES`]).
@@ -140,7 +140,8 @@ pub(crate) fn correct<T: Real, const N: usize>(f: &mut UdFactors<N, T>, at: usiz
             let gj = f.d[2 * j + axis] * fj;
             let before = alpha[axis];
             alpha[axis] += gj * fj;
-            let lambda = -fj * inv[axis];
+            let inv_before = inv[axis];
+            let lambda = -fj * inv_before;
             let quotient = T::one() / alpha[axis];
             // Only r = 0 and a direction that is known exactly leave 0.
             inv[axis] = if alpha[axis] > T::zero() { quotient } else { T::zero() };
@@ -150,6 +151,11 @@ pub(crate) fn correct<T: Real, const N: usize>(f: &mut UdFactors<N, T>, at: usiz
                 let t = f.u[(2 * i + axis, j)];
                 f.u[(2 * i + axis, j)] = t + lambda * gain[i][axis];
                 gain[i][axis] += gj * t;
+            }
+            // t + λ K = t (1 - (α - r)/α) of the measured row: a product has no cancellation.
+            if j > at {
+                let share = r[axis] * inv_before;
+                f.u[(2 * at + axis, j)] = if inv_before > T::zero() { fj * share } else { fj };
             }
             gain[j][axis] = gj;
         }
