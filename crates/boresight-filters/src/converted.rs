@@ -39,14 +39,14 @@ pub fn converted<T: Real>(polar: &Polar<T>, origin: &Vector2<T>) -> Result<Measu
     let (s, c) = (a.sin(), a.cos());
     let half = T::of(0.5);
     let u = sa * sa;
-    // λ⁻² - 2 + 1 etc. cancel for small σ_θ; split into the part along and across the line of sight, where
-    // λ⁻² - 2 + (1 + λ⁴)/2 = (λ⁻² - 1) - (1 - λ⁴)/2.
-    let grow = u.exp_m1();
-    let shrink = -(-u * T::of(2.0)).exp_m1();
-    let along = r * r * (grow - half * shrink) + sr * sr * half * (T::of(2.0) - shrink);
+    // λ⁻² - 2 + 1 etc. cancel for small σ_θ; split into the part along and across the line of sight, where with
+    // v = 1 - λ²: λ⁻² - 2 + (1 + λ⁴)/2 = v ((λ⁻² - 1) + v/2) and 1 - λ⁴ = v (2 - v), sums of what is positive.
+    let v = -(-u).exp_m1();
+    let shrink = v * (T::of(2.0) - v);
+    let along = r * r * v * (u.exp_m1() + half * v) + sr * sr * half * (T::of(2.0) - shrink);
     let across = (r * r + sr * sr) * half * shrink;
-    let cross = along - across;
-    let cov = Matrix2::new(across + cross * c * c, cross * s * c, cross * s * c, across + cross * s * s);
+    let cross = (along - across) * s * c;
+    let cov = Matrix2::new(along * c * c + across * s * s, cross, cross, along * s * s + across * c * c);
     let z = Vector2::new(c, s) * (r * (u * half).exp());
     Ok(Measurement { position: origin + z, cov })
 }
@@ -67,6 +67,22 @@ mod tests {
         let r12 = (1.0 / (l * l) - 2.0) * r2 * c * s + 0.5 * (r2 + s2) * libm::pow(l, 4.0) * libm::sin(1.4);
         assert!((m.cov[(0, 0)] - r11).abs() < 1e-8 * r11, "{} {r11}", m.cov[(0, 0)]);
         assert!((m.cov[(0, 1)] - r12).abs() < 1e-8 * r11);
+    }
+
+    #[test]
+    fn a_perfect_range_still_has_a_covariance_that_filters_take() {
+        for k in 0..2000 {
+            let azimuth_std_rad = libm::pow(10.0, -8.0 * f64::from(k) / 2000.0) as f32;
+            let p = Polar { range: 5e4_f32, azimuth_rad: 0.01 * k as f32, range_std: 0.0, azimuth_std_rad };
+            let m = converted(&p, &Vector2::zeros()).unwrap();
+            assert!(crate::filter::check_measurement(&m).is_ok(), "{p:?}: {}", m.cov);
+            // E[(z - x)²] along the line of sight is r² 1.5 σ⁴ to leading order.
+            let straight = converted(&Polar { azimuth_rad: 0.0, ..p }, &Vector2::zeros()).unwrap().cov[(0, 0)];
+            if azimuth_std_rad < 0.01 {
+                let want = 1.5 * 2.5e9 * azimuth_std_rad.powi(4);
+                assert!((straight - want).abs() < 1e-3 * want, "{p:?}: {straight}, not {want}");
+            }
+        }
     }
 
     #[test]
