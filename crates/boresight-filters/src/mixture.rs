@@ -12,7 +12,7 @@ use crate::linalg::{invert_pair, symmetrize};
 use crate::{FilterError, Gaussian, GaussianFilter, Real, Weighted};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// Sums of weights may exceed 1 by the rounding of the sum.
+/// Weights may exceed 1 by their rounding.
 fn weight_slack<T: Real>() -> T {
     T::EPSILON * T::of(64.0)
 }
@@ -21,19 +21,20 @@ fn weight_slack<T: Real>() -> T {
 pub(crate) fn check_weighted<T: Real>(
     hypotheses: impl Iterator<Item = Weighted<T>>,
 ) -> Result<(T, usize), FilterError> {
-    let (mut sum, mut n) = (T::zero(), 0);
+    // In f64 for f32 too: a hundred thousand small weights must not add up to more than 1 by rounding.
+    let (mut sum, mut n) = (0.0, 0);
     for h in hypotheses {
         check_measurement(&h.measurement)?;
         if !(h.weight >= T::zero() && h.weight <= T::one() + weight_slack()) {
             return Err(FilterError::OutOfRange("weights in 0..=1"));
         }
-        sum += h.weight;
+        sum += h.weight.as_f64();
         n += usize::from(h.weight > T::zero());
     }
-    if sum > T::one() + weight_slack() {
+    if sum > 1.0 + weight_slack::<T>().as_f64() + f64::EPSILON * n as f64 {
         Err(FilterError::OutOfRange("weights that sum to at most 1"))
     } else {
-        Ok((sum, n))
+        Ok((T::of(sum), n))
     }
 }
 
@@ -154,4 +155,31 @@ where
     }
     let posterior = mixture_update(&filter.belief(), filter.position_at(), hypotheses)?;
     filter.set_belief(&posterior)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::ConstantVelocity;
+    use crate::{Measurement, Start, Ud};
+
+    fn half_way<T: Real>() {
+        let first = Measurement::isotropic(T::zero(), T::zero(), T::one());
+        let cv = ConstantVelocity::<T>::continuous(T::one()).unwrap();
+        for n in [100, 10_000, 100_000] {
+            let mut f = Ud::<_, 4, T>::from_point(cv, &first, T::one()).unwrap();
+            let measurement = Measurement::isotropic(T::one(), T::zero(), T::one());
+            let one = Weighted { measurement, weight: T::of(1.0 / n as f64) };
+            f.correct_weighted(core::iter::repeat_n(one, n)).unwrap();
+            // All are one measurement with R = P.
+            let x = f.predicted().mean[0].as_f64();
+            assert!((x - 0.5).abs() < 2e-3, "{n}: {x}");
+        }
+    }
+
+    #[test]
+    fn weights_that_sum_to_one_are_taken_however_many_they_are() {
+        half_way::<f64>();
+        half_way::<f32>();
+    }
 }
