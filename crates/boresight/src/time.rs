@@ -19,16 +19,16 @@ impl Timestamp {
         Self { ns }
     }
 
-    /// Builds a time from seconds, rounded to the nearest nanosecond (saturating at about 292 years).
+    /// Builds a time from seconds, rounded to the nearest nanosecond (saturating at about 292 years; NaN gives 0).
     pub fn from_secs_f64(s: f64) -> Self {
         Self { ns: (s * 1e9).round() as i64 }
     }
 
-    /// Builds the exact time `ticks * num / den` seconds, rounded to the nearest nanosecond.
+    /// Builds the exact time `ticks * num / den` seconds, rounded to the nearest nanosecond (saturating); `den` is above 0.
     pub fn from_ticks(ticks: i64, num: i64, den: i64) -> Self {
-        let scaled = i128::from(ticks) * i128::from(num) * 1_000_000_000;
+        let scaled = (i128::from(ticks) * i128::from(num)).saturating_mul(1_000_000_000);
         let den = i128::from(den.max(1));
-        let ns = (scaled + den / 2).div_euclid(den);
+        let ns = scaled.saturating_add(den / 2).div_euclid(den);
         Self { ns: ns.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64 }
     }
 
@@ -58,5 +58,6 @@ mod tests {
     fn differences_of_extreme_times_do_not_overflow() {
         let late = Timestamp::from_ns(i64::MAX);
         assert!(late.seconds_since(Timestamp::from_ns(i64::MIN)) > 9e9);
+        assert_eq!(Timestamp::from_ticks(i64::MAX, i64::MAX, 1), late);
     }
 }

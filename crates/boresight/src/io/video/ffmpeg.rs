@@ -6,17 +6,13 @@
 //! Limits: how many frames there are is not known beforehand; a live stream that is silent for 30 s is given up.
 
 use super::ffmpeg_log::Log;
-use super::nut::{Format, Head, Nut};
-use super::yuv::to_u16;
-use crate::io::{Colour, OpenOptions, gray_of_rgb8};
-use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
-};
+use super::ffmpeg_pictures::{Message, read_all};
+use crate::io::{Colour, OpenOptions};
+use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Pixels, Result, SourceInfo};
 use std::ffi::OsStr;
-use std::io::{BufReader, Read};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::time::Duration;
 
 /// Frames read ahead of the caller.
@@ -29,32 +25,6 @@ yuvj444p|yuv440p|yuvj440p|yuv411p|yuv410p|yuv420p10le|yuv422p10le|yuv444p10le|yu
 yuv420p16le|yuv422p16le|yuv444p16le|rgb24";
 /// Layouts when colour is wanted.
 const COLOUR: &str = "format=gray|gray10le|gray12le|gray14le|gray16le|rgb24";
-
-/// What the reading thread reports.
-enum Message {
-    /// Shape of the frames to come.
-    Format {
-        width: usize,
-        height: usize,
-        kind: PixelKind,
-    },
-    Frame(Frame),
-    /// The pipe ended inside a frame, or held what it must not.
-    Broken(String),
-}
-
-/// How the bytes of a picture become pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Layout {
-    /// First plane, one byte a pixel.
-    Luma8,
-    /// First plane, two bytes a pixel.
-    Luma16,
-    /// RGB triplets, handed out as they are.
-    Rgb,
-    /// RGB triplets, handed out as grey.
-    RgbToGray,
-}
 
 /// The source.
 struct FfmpegSource {
@@ -300,124 +270,4 @@ impl FrameSource for FfmpegSource {
     fn warnings(&self) -> &[String] {
         &self.warnings
     }
-}
-
-/// Reads the pipe to its end; returns when the caller is gone.
-fn read_all(pipe: ChildStdout, colour: Colour, max_pixels: u64, out: &SyncSender<Message>, spare: &Receiver<Pixels>) {
-    let mut nut = match Nut::open(BufReader::with_capacity(1 << 16, pipe)) {
-        Ok(nut) => nut,
-        // Nothing at all: the program itself says why.
-        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => return,
-        Err(e) => return drop(out.send(Message::Broken(e.to_string()))),
-    };
-    let (width, height, layout) = match shape(&nut.format, colour, max_pixels) {
-        Ok(shape) => shape,
-        Err(why) => return drop(out.send(Message::Broken(why))),
-    };
-    let kind = match layout {
-        Layout::Luma8 | Layout::RgbToGray => PixelKind::Gray8,
-        Layout::Luma16 => PixelKind::Gray16,
-        Layout::Rgb => PixelKind::Rgb8,
-    };
-    if out.send(Message::Format { width, height, kind }).is_err() {
-        return;
-    }
-    let mut scratch = Vec::new();
-    let mut index = 0;
-    loop {
-        let read = nut.next_head().and_then(|head| match head {
-            None => Ok(None),
-            Some(head) => {
-                let pixels =
-                    read_picture(&mut nut, head, (width, height), layout, spare.try_recv().ok(), &mut scratch)?;
-                Ok(Some((head.pts, pixels)))
-            }
-        });
-        let message = match read {
-            Ok(None) => return,
-            Ok(Some((pts, pixels))) => {
-                let (num, den) = nut.format.time_base;
-                let time = Timestamp::from_ticks(pts, num as i64, den as i64);
-                index += 1;
-                Message::Frame(Frame { index: FrameIndex(index - 1), time, pixels })
-            }
-            Err(e) => Message::Broken(e.to_string()),
-        };
-        let over = matches!(message, Message::Broken(_));
-        if out.send(message).is_err() || over {
-            return;
-        }
-    }
-}
-
-/// Size and layout, once they are known to be sane.
-fn shape(format: &Format, colour: Colour, max_pixels: u64) -> Result<(usize, usize, Layout), String> {
-    let (w, h) = (format.width, format.height);
-    if w == 0 || h == 0 || w.checked_mul(h).is_none_or(|n| n > max_pixels) {
-        return Err(format!("its header claims {w} x {h} pixels, at most {max_pixels} are accepted"));
-    }
-    let layout = match format.tag.as_slice() {
-        b"Y800" | b"I420" | b"Y42B" | b"444P" | b"440P" | b"Y41B" | b"YUV9" => Layout::Luma8,
-        [b'Y', b'1' | b'3', _, bits] if *bits > 8 => Layout::Luma16,
-        b"RGB\x18" if colour == Colour::Rgb => Layout::Rgb,
-        b"RGB\x18" => Layout::RgbToGray,
-        other => return Err(format!("ffmpeg gives pixels of the unknown kind '{}'", other.escape_ascii())),
-    };
-    let size = |n: u64| usize::try_from(n).map_err(|e| e.to_string());
-    Ok((size(w)?, size(h)?, layout))
-}
-
-fn read_picture<R: Read>(
-    nut: &mut Nut<R>,
-    head: Head,
-    (width, height): (usize, usize),
-    layout: Layout,
-    spare: Option<Pixels>,
-    scratch: &mut Vec<u8>,
-) -> std::io::Result<Pixels> {
-    let n = width * height;
-    let need = match layout {
-        Layout::Luma8 => n,
-        Layout::Luma16 => 2 * n,
-        Layout::Rgb | Layout::RgbToGray => 3 * n,
-    };
-    let wrong = |what: &str| std::io::Error::new(std::io::ErrorKind::InvalidData, what.to_string());
-    if head.size < need as u64 || head.size > need as u64 * 3 + 4096 {
-        return Err(wrong("a picture changes its size"));
-    }
-    let pixels = match (layout, spare) {
-        (Layout::Luma8, spare) => {
-            let mut gray = if let Some(Pixels::Gray8(i)) = spare { i.into_vec() } else { Vec::new() };
-            gray.resize(n, 0);
-            nut.reader.read_exact(&mut gray)?;
-            Image::from_vec(width, height, gray).map(Pixels::Gray8)
-        }
-        (layout, spare) => {
-            scratch.resize(need, 0);
-            nut.reader.read_exact(scratch)?;
-            let triplets = scratch.as_chunks::<3>().0;
-            match (layout, spare) {
-                (Layout::Rgb, spare) => {
-                    let mut rgb = if let Some(Pixels::Rgb8(i)) = spare { i.into_vec() } else { Vec::new() };
-                    rgb.clear();
-                    rgb.extend_from_slice(triplets);
-                    Image::from_vec(width, height, rgb).map(Pixels::Rgb8)
-                }
-                (Layout::Luma16, spare) => {
-                    let mut gray = if let Some(Pixels::Gray16(i)) = spare { i.into_vec() } else { Vec::new() };
-                    to_u16(scratch, &mut gray);
-                    Image::from_vec(width, height, gray).map(Pixels::Gray16)
-                }
-                _ => {
-                    let gray = triplets.iter().map(|&p| gray_of_rgb8(p)).collect();
-                    Image::from_vec(width, height, gray).map(Pixels::Gray8)
-                }
-            }
-        }
-    };
-    let rest = head.size - need as u64;
-    if std::io::copy(&mut nut.reader.by_ref().take(rest), &mut std::io::sink())? < rest {
-        return Err(std::io::ErrorKind::UnexpectedEof.into());
-    }
-    pixels.ok_or_else(|| wrong("a picture changes its size"))
 }

@@ -2,9 +2,11 @@
 
 mod ffmpeg;
 mod ffmpeg_log;
+mod ffmpeg_pictures;
 mod h264;
 mod i420;
 mod mp4;
+mod mp4_encoding;
 mod mp4_source;
 mod mp4_writer;
 mod nut;

@@ -1,33 +1,16 @@
 //! Writes MP4 with H.264 that browsers and ffmpeg play, with the frames' own times.
 //!
-//! Encoder: `openh264` at constant quality, no frame skipped, no reordering; it runs on a thread of its own, so that
-//! drawing the next frame and encoding this one overlap. Container: `shiguredo_mp4`, 720 000 ticks a second, in which
-//! 24, 25, 30, 50 and 60 frames/s and their 1000/1001 versions are exact; other times are rounded to 0.7 us without
-//! drift. The first frame is at time 0.
+//! Frames are encoded on a thread of their own ([`super::mp4_encoding`]), so that drawing the next frame and encoding this
+//! one overlap. The first frame is at time 0; times are rounded to 1/720 000 s without drift.
 //! The file has its name only when it is whole: until then it is `NAME.part`, removed if the writer is dropped.
 //! Limits: 8 bit 4:2:0, at most 3840 x 2160 pixels (level 5.2 of the encoder), one hour between two frames.
 
-use super::i420::I420;
-use crate::io::tables::AtomicFile;
+use super::mp4_encoding::{Encoding, Work};
 use crate::{Error, ErrorKind, Image, Result, Timestamp};
-use openh264::OpenH264API;
-use openh264::encoder::{
-    Complexity, Encoder, EncoderConfig, FrameType, IntraFramePeriod, QpRange, RateControlMode, VuiConfig,
-};
-use openh264::formats::YUVSource;
-use shiguredo_mp4::boxes::{Avc1Box, AvccBox, SampleEntry, VisualSampleEntryFields};
-use shiguredo_mp4::mux::{Mp4FileMuxer, Mp4FileMuxerOptions, Sample, estimate_maximum_moov_box_size};
-use shiguredo_mp4::{TrackKind, Uint};
-use std::io::{Seek, SeekFrom, Write};
-use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
 
-/// Ticks a second.
-const TIMESCALE: u32 = 720_000;
-/// Longest time a frame may stand, ticks.
-const MAX_DURATION: i64 = 3600 * TIMESCALE as i64;
 /// Largest picture that the encoder takes, px (longer side, shorter side).
 pub const MAX_SIZE: (usize, usize) = (3840, 2160);
 
@@ -47,9 +30,6 @@ impl Default for Mp4Options {
         Self { quantiser: 24, key_every: 60, expected_frames: None }
     }
 }
-
-/// A frame to encode, or the wish to end.
-type Work = Option<(Image<[u8; 3]>, Timestamp)>;
 
 /// A video being written.
 pub struct Mp4Writer {
@@ -133,214 +113,9 @@ impl Drop for Mp4Writer {
     }
 }
 
-impl YUVSource for I420 {
-    fn dimensions(&self) -> (usize, usize) {
-        (self.width, self.height)
-    }
-    fn strides(&self) -> (usize, usize, usize) {
-        (self.width, self.width / 2, self.width / 2)
-    }
-    fn y(&self) -> &[u8] {
-        &self.y
-    }
-    fn u(&self) -> &[u8] {
-        &self.u
-    }
-    fn v(&self) -> &[u8] {
-        &self.v
-    }
-}
-
-/// The work of the encoding thread.
-struct Encoding {
-    file: AtomicFile,
-    encoder: Encoder,
-    muxer: Mp4FileMuxer,
-    size: (usize, usize),
-    written: u64,
-    planes: I420,
-    /// The coded frame that waits for its duration: time in ticks, place, size, key.
-    waiting: Option<(i64, u64, usize, bool)>,
-    /// How the frames are coded, until the muxer has it.
-    entry: Option<SampleEntry>,
-    described: bool,
-    first: Option<Timestamp>,
-    last_duration: i64,
-}
-
-fn failed(what: &str, e: impl std::fmt::Display) -> Error {
-    Error::new(ErrorKind::Output, format!("{what}: {e}"))
-}
-
-impl Encoding {
-    fn new(path: &Path, width: usize, height: usize, options: Mp4Options) -> Result<Self> {
-        let q = options.quantiser.clamp(0, 51);
-        let config = EncoderConfig::new()
-            .skip_frames(false)
-            .rate_control_mode(RateControlMode::Off)
-            .qp(QpRange::new(q, q))
-            .complexity(Complexity::Low)
-            .scene_change_detect(false)
-            .adaptive_quantization(false)
-            .background_detection(false)
-            .intra_frame_period(IntraFramePeriod::from_num_frames(options.key_every.max(1)))
-            .vui(VuiConfig::bt709());
-        let encoder = Encoder::with_api_config(OpenH264API::from_source(), config)
-            .map_err(|e| failed("the encoder does not start", e))?;
-        let reserved = options.expected_frames.and_then(|n| usize::try_from(n).ok()).filter(|n| *n < 10_000_000);
-        let muxer = Mp4FileMuxer::with_options(Mp4FileMuxerOptions {
-            reserved_moov_box_size: reserved.map_or(0, |n| estimate_maximum_moov_box_size(&[n])),
-            ..Mp4FileMuxerOptions::default()
-        })
-        .map_err(|e| failed("the file's head cannot be made", e))?;
-        let mut file = AtomicFile::create(path)?;
-        let head = muxer.initial_boxes_bytes();
-        file.write_all(head).map_err(|e| failed("cannot be written", e))?;
-        let written = head.len() as u64;
-        let size = (width, height);
-        Ok(Self {
-            file,
-            encoder,
-            muxer,
-            size,
-            written,
-            planes: I420::default(),
-            waiting: None,
-            entry: None,
-            described: false,
-            first: None,
-            last_duration: i64::from(TIMESCALE / 25),
-        })
-    }
-
-    fn run(mut self, frames: &Receiver<Work>, spare: &Sender<Image<[u8; 3]>>) -> Result<()> {
-        // `None` asks for the end; a channel that closes without it is a writer dropped before its time.
-        while let Some((frame, time)) = match frames.recv() {
-            Ok(work) => work,
-            Err(_) => return Ok(()),
-        } {
-            self.planes.fill(&frame);
-            // The caller may be gone already; then nobody needs the buffer.
-            let _ = spare.send(frame);
-            self.encode(time)?;
-        }
-        self.finish()
-    }
-
-    fn encode(&mut self, time: Timestamp) -> Result<()> {
-        let first = *self.first.get_or_insert(time);
-        let ns = i128::from(time.ns) - i128::from(first.ns);
-        let ticks = (ns * i128::from(TIMESCALE) + 500_000_000).div_euclid(1_000_000_000);
-        let ticks = i64::try_from(ticks).map_err(|e| failed("a frame's time is out of range", e))?;
-        if let Some((start, ..)) = self.waiting {
-            let duration = ticks - start;
-            if !(1..=MAX_DURATION).contains(&duration) {
-                let what = format!(
-                    "frame times must rise by at most an hour; one follows after {} ns",
-                    i128::from(duration) * 12500 / 9
-                );
-                return Err(Error::new(ErrorKind::Output, what));
-            }
-            self.last_duration = duration;
-            self.append()?;
-        }
-        let coded = self.encoder.encode(&self.planes).map_err(|e| failed("a frame cannot be encoded", e))?;
-        let key = matches!(coded.frame_type(), FrameType::IDR);
-        let mut bytes = Vec::new();
-        let (mut sps, mut pps) = (Vec::new(), Vec::new());
-        for layer in (0..coded.num_layers()).filter_map(|i| coded.layer(i)) {
-            for nal in (0..layer.nal_count()).filter_map(|i| layer.nal_unit(i)) {
-                let nal = nal.strip_prefix(&[0, 0, 0, 1]).or_else(|| nal.strip_prefix(&[0, 0, 1])).unwrap_or(nal);
-                match nal.first().map(|b| b & 31) {
-                    Some(7) => sps.push(nal.to_vec()),
-                    Some(8) => pps.push(nal.to_vec()),
-                    Some(_) => {
-                        let len = u32::try_from(nal.len()).map_err(|e| failed("a frame is too large", e))?;
-                        bytes.extend(len.to_be_bytes());
-                        bytes.extend(nal);
-                    }
-                    None => {}
-                }
-            }
-        }
-        if bytes.is_empty() {
-            return Err(Error::new(ErrorKind::Output, "the encoder gave no data for a frame"));
-        }
-        if !self.described {
-            self.entry = Some(sample_entry(self.size, sps, pps)?);
-            self.described = true;
-        }
-        self.file.write_all(&bytes).map_err(|e| failed("cannot be written", e))?;
-        self.waiting = Some((ticks, self.written, bytes.len(), key));
-        self.written += bytes.len() as u64;
-        Ok(())
-    }
-
-    /// Enters the waiting frame in the tables.
-    fn append(&mut self) -> Result<()> {
-        let Some((_, data_offset, data_size, keyframe)) = self.waiting.take() else { return Ok(()) };
-        let sample = Sample {
-            track_kind: TrackKind::Video,
-            sample_entry: self.entry.take(),
-            keyframe,
-            timescale: NonZeroU32::MIN.saturating_add(TIMESCALE - 1),
-            duration: self.last_duration as u32,
-            composition_time_offset: None,
-            data_offset,
-            data_size,
-        };
-        self.muxer.append_sample(&sample).map_err(|e| failed("the file's tables cannot be made", e))
-    }
-
-    fn finish(mut self) -> Result<()> {
-        if self.waiting.is_none() {
-            return Err(Error::new(ErrorKind::Output, "no frame was written, so there is no video"));
-        }
-        self.append()?;
-        let boxes = self.muxer.finalize().map_err(|e| failed("the file's tables cannot be made", e))?;
-        for (offset, bytes) in boxes.offset_and_bytes_pairs() {
-            self.file
-                .seek(SeekFrom::Start(offset))
-                .and_then(|_| self.file.write_all(bytes))
-                .map_err(|e| failed("cannot be written", e))?;
-        }
-        self.file.finish()
-    }
-}
-
-fn sample_entry((width, height): (usize, usize), sps: Vec<Vec<u8>>, pps: Vec<Vec<u8>>) -> Result<SampleEntry> {
-    let Some([_, profile, compatibility, level, ..]) = sps.first().map(Vec::as_slice) else {
-        return Err(Error::new(ErrorKind::Output, "the encoder gave no parameter sets"));
-    };
-    let high = !matches!(*profile, 66 | 77 | 88);
-    let avcc_box = AvccBox {
-        avc_profile_indication: *profile,
-        profile_compatibility: *compatibility,
-        avc_level_indication: *level,
-        length_size_minus_one: Uint::new(3),
-        chroma_format: high.then(|| Uint::new(1)),
-        bit_depth_luma_minus8: high.then(|| Uint::new(0)),
-        bit_depth_chroma_minus8: high.then(|| Uint::new(0)),
-        sps_ext_list: Vec::new(),
-        pps_list: pps,
-        sps_list: sps,
-    };
-    let side = |n: usize| u16::try_from(n.next_multiple_of(2)).map_err(|e| failed("size", e));
-    let visual = VisualSampleEntryFields {
-        data_reference_index: VisualSampleEntryFields::DEFAULT_DATA_REFERENCE_INDEX,
-        width: side(width)?,
-        height: side(height)?,
-        horizresolution: VisualSampleEntryFields::DEFAULT_HORIZRESOLUTION,
-        vertresolution: VisualSampleEntryFields::DEFAULT_VERTRESOLUTION,
-        frame_count: VisualSampleEntryFields::DEFAULT_FRAME_COUNT,
-        compressorname: VisualSampleEntryFields::NULL_COMPRESSORNAME,
-        depth: VisualSampleEntryFields::DEFAULT_DEPTH,
-    };
-    Ok(SampleEntry::Avc1(Avc1Box { visual, avcc_box, unknown_boxes: Vec::new() }))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::i420::I420;
     use super::*;
     use crate::Pixels;
     use crate::io::OpenOptions;

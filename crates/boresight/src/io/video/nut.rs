@@ -13,6 +13,9 @@ const SYNCPOINT: u64 = 0x4e4b_e4ad_eeca_4569;
 const INDEX: u64 = 0x4e58_dd67_2f23_e64e;
 const ID: &[u8; 25] = b"nut/multimedia container\0";
 
+/// Numerators and denominators of a time base.
+const CLOCK: std::ops::Range<u64> = 1..1 << 31;
+
 const FLAG_CODED_PTS: u64 = 8;
 const FLAG_STREAM_ID: u64 = 16;
 const FLAG_SIZE_MSB: u64 = 32;
@@ -233,7 +236,12 @@ impl<R: Read> Nut<R> {
         v(b)?; // largest distance of syncpoints
         let n = v(b)?;
         for _ in 0..n.min(64) {
-            self.time_bases.push((v(b)?, v(b)?));
+            let base = (v(b)?, v(b)?);
+            // The specification's bound; times a 64-bit tick it stays within 127 bits.
+            if !(CLOCK.contains(&base.0) && CLOCK.contains(&base.1)) {
+                return Err(bad("has an absurd clock"));
+            }
+            self.time_bases.push(base);
         }
         let mut row = Code { header: 0, size_mul: 1, ..Code::default() };
         self.codes.clear();
@@ -273,7 +281,7 @@ impl<R: Read> Nut<R> {
                 if self.codes.len() == usize::from(b'N') {
                     self.codes.push(Code { flags: FLAG_INVALID, ..row });
                 } else {
-                    self.codes.push(Code { size_lsb: lsb + j, ..row });
+                    self.codes.push(Code { size_lsb: lsb.saturating_add(j), ..row });
                     j += 1;
                 }
             }
@@ -298,7 +306,7 @@ impl<R: Read> Nut<R> {
         let base = v(b)? as usize;
         self.format.time_base = *self.time_bases.get(base).ok_or_else(|| bad("names no time base"))?;
         self.msb_pts_shift = u32::try_from(v(b)?).unwrap_or(99);
-        if self.msb_pts_shift > 48 || self.format.time_base.0 == 0 || self.format.time_base.1 == 0 {
+        if self.msb_pts_shift > 48 {
             return Err(bad("has an absurd clock"));
         }
         v(b)?; // largest distance in time
@@ -324,6 +332,43 @@ mod tests {
         assert_eq!(s(&mut &[1][..]).unwrap(), 1);
         assert_eq!(s(&mut &[2][..]).unwrap(), -1);
         assert!(v(&mut &[255; 20][..]).is_err());
+    }
+
+    /// A number as the stream writes it.
+    fn number(mut n: u64, out: &mut Vec<u8>) {
+        let mut bytes = vec![(n & 127) as u8];
+        while n >> 7 != 0 {
+            n >>= 7;
+            bytes.push((n & 127) as u8 | 128);
+        }
+        out.extend(bytes.iter().rev());
+    }
+
+    /// A stream that is a main header with these numbers.
+    fn main_header(numbers: &[u64]) -> Vec<u8> {
+        let mut body = Vec::new();
+        numbers.iter().for_each(|n| number(*n, &mut body));
+        let mut out = ID.to_vec();
+        out.extend(MAIN.to_be_bytes());
+        number(body.len() as u64 + 4, &mut out);
+        out.extend(body);
+        out.extend([0; 4]);
+        out
+    }
+
+    #[test]
+    fn clocks_beyond_the_specification_are_refused() {
+        for clock in [[0, 1], [1, 0], [1 << 31, 1], [1, u64::MAX]] {
+            let error = Nut::open(&main_header(&[3, 1, 0, 1, clock[0], clock[1]])[..]).err().unwrap();
+            assert!(error.to_string().contains("clock"), "{error}");
+        }
+    }
+
+    #[test]
+    fn frame_sizes_at_the_end_of_the_numbers_do_not_overflow() {
+        // One row of 256 codes: flags, fields, pts, size_mul, stream, size_lsb, reserved, count; then no elisions.
+        let bytes = main_header(&[3, 1, 0, 1, 1, 25, 0, 6, 0, 1, 0, u64::MAX, 0, 255, 0]);
+        assert_eq!(Nut::open(&bytes[..]).err().map(|e| e.kind()), Some(io::ErrorKind::UnexpectedEof));
     }
 
     #[test]
