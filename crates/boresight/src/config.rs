@@ -7,10 +7,11 @@ mod explain;
 mod reference;
 mod typo;
 
+use explain::is_choice;
 pub use explain::{Explanation, explain, schema};
 pub use reference::reference;
 
-use crate::io::{Colour, OpenOptions, RawFormat, RawType};
+use crate::io::{Colour, OpenOptions, RawFormat};
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
 use crate::{Error, ErrorKind, Result};
@@ -35,95 +36,29 @@ pub struct Config {
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct InputConfig {
     /// Which pixels are wanted: `native` (grey of video, colour of stills), `gray` or `rgb`.
-    pub colour: ColourConfig,
+    pub colour: Colour,
     /// Rate of sequences that carry no times, frames/s, above 0.
     pub rate_hz: f64,
     /// Largest accepted frame, pixels, above 0; what claims more is refused before memory is taken.
     pub max_pixels: u64,
     /// Layout of headerless frames; needed for raw input only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub raw: Option<RawConfig>,
+    pub raw: Option<RawFormat>,
     /// How a table of detections is read; of no effect on frames.
     pub table: crate::io::TableOptions,
-}
-
-/// Which pixels are wanted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ColourConfig {
-    /// What the file holds; of video its luma.
-    #[default]
-    Native,
-    /// Grey always.
-    Gray,
-    /// RGB where there is colour.
-    Rgb,
-}
-
-/// Layout of headerless frames.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct RawConfig {
-    /// Width, px, above 0.
-    pub width: usize,
-    /// Height, px, above 0.
-    pub height: usize,
-    /// Type of a pixel.
-    pub pixel: RawPixel,
-}
-
-/// Type of a pixel of headerless frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawPixel {
-    /// 8-bit grey.
-    U8,
-    /// 16-bit grey, least significant byte first.
-    U16Le,
-    /// 16-bit grey, most significant byte first.
-    U16Be,
-    /// 32-bit float grey, least significant byte first.
-    F32Le,
-    /// 8-bit RGB, interleaved.
-    Rgb8,
 }
 
 impl Default for InputConfig {
     fn default() -> Self {
         let o = OpenOptions::default();
-        Self {
-            colour: ColourConfig::Native,
-            rate_hz: o.rate_hz,
-            max_pixels: o.max_pixels,
-            raw: None,
-            table: Default::default(),
-        }
+        Self { colour: o.colour, rate_hz: o.rate_hz, max_pixels: o.max_pixels, raw: None, table: Default::default() }
     }
 }
 
 impl InputConfig {
     /// What [`crate::io::open`] takes.
     pub fn open_options(&self) -> OpenOptions {
-        OpenOptions {
-            colour: match self.colour {
-                ColourConfig::Native => Colour::Native,
-                ColourConfig::Gray => Colour::Gray,
-                ColourConfig::Rgb => Colour::Rgb,
-            },
-            raw: self.raw.as_ref().map(|r| RawFormat {
-                width: r.width,
-                height: r.height,
-                pixel: match r.pixel {
-                    RawPixel::U8 => RawType::U8,
-                    RawPixel::U16Le => RawType::U16Le,
-                    RawPixel::U16Be => RawType::U16Be,
-                    RawPixel::F32Le => RawType::F32Le,
-                    RawPixel::Rgb8 => RawType::Rgb8,
-                },
-            }),
-            rate_hz: self.rate_hz,
-            max_pixels: self.max_pixels,
-        }
+        OpenOptions { colour: self.colour, raw: self.raw, rate_hz: self.rate_hz, max_pixels: self.max_pixels }
     }
 
     fn validate(&self, at: &str) -> Result<()> {
@@ -211,32 +146,28 @@ impl Config {
     }
 }
 
-/// Keys whose table holds exactly one entry, the chosen variant of an enum: setting a variant replaces the old one.
-const CHOICES: [&str; 9] =
-    ["threshold", "associator", "life", "birth", "filter", "noise", "model", "innovation", "rule"];
-
+/// Puts a value at a key; a choice on the way there holds one entry only, so choosing another replaces the old one.
 fn set(tree: &mut toml::Value, key: &str, value: toml::Value) -> Option<()> {
     let parts: Vec<&str> = key.split('.').collect();
     let (last, path) = parts.split_last()?;
-    let mut at = tree;
-    for (i, part) in path.iter().enumerate() {
-        let choice = i > 0 && CHOICES.contains(&path[i - 1]);
-        if choice && at.get(part).is_none() {
-            *at = toml::Value::Table(toml::Table::new());
-        }
-        if !at.is_table() {
-            *at = toml::Value::Table(toml::Table::new());
-        }
-        at = at.as_table_mut()?.entry(part.to_string()).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+    let schema = schema();
+    let (mut at, mut meaning) = (tree, schema.clone());
+    for part in path {
+        let table = table_for(at, part, is_choice(&schema, &meaning))?;
+        at = table.entry(*part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        let inner = explain::children(&schema, &meaning).into_iter().find(|(name, _)| name == part);
+        meaning = inner.map_or(serde_json::Value::Null, |(_, inner)| inner);
     }
-    if path.last().is_some_and(|p| CHOICES.contains(p)) && at.get(last).is_none() {
-        *at = toml::Value::Table(toml::Table::new());
-    }
-    if !at.is_table() {
-        *at = toml::Value::Table(toml::Table::new());
-    }
-    at.as_table_mut()?.insert((*last).to_string(), value);
+    table_for(at, last, is_choice(&schema, &meaning))?.insert((*last).to_string(), value);
     Some(())
+}
+
+/// The table that is to hold the entry `name`: emptied before, if it is a choice and holds another one.
+fn table_for<'t>(at: &'t mut toml::Value, name: &str, is_choice: bool) -> Option<&'t mut toml::Table> {
+    if !at.is_table() || (is_choice && at.get(name).is_none()) {
+        *at = toml::Value::Table(toml::Table::new());
+    }
+    at.as_table_mut()
 }
 
 #[cfg(test)]
@@ -272,5 +203,35 @@ mod tests {
         assert!(config.with("tracker.gate-probability=2").is_err());
         assert!(config.with("tracker.nonsense=2").is_err());
         assert!(config.with("nonsense").is_err());
+    }
+
+    #[test]
+    fn every_choice_can_be_made_anew_after_another() {
+        let schema = schema();
+        let mut n_choices = 0;
+        visit(&schema, &schema, String::new(), &mut |key, choices| {
+            n_choices += 1;
+            let set = |config: &Config, name: &str| config.with(&format!("{key}.{name}={{}}"));
+            // A choice without parameters is a name, not a table.
+            let tables = choices.iter().filter_map(|name| Some((name, set(&Config::default(), name).ok()?)));
+            let tables: Vec<_> = tables.collect();
+            for pair in tables.windows(2) {
+                let ((first, config), (second, _)) = (&pair[0], &pair[1]);
+                set(config, second).unwrap_or_else(|e| panic!("{second} after {first}: {e}"));
+            }
+        });
+        assert!(n_choices > 10, "{n_choices} choices");
+    }
+
+    /// Calls `each` with the key of every choice, and the names that it takes.
+    fn visit(root: &serde_json::Value, at: &serde_json::Value, key: String, each: &mut impl FnMut(&str, &[String])) {
+        let inner = explain::children(root, at);
+        if is_choice(root, at) {
+            each(&key, &inner.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>());
+        }
+        for (name, child) in inner {
+            let key = if key.is_empty() { name } else { format!("{key}.{name}") };
+            visit(root, &child, key, each);
+        }
     }
 }

@@ -30,7 +30,7 @@ pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
-pub use record::{TrackId, TrackState, TrackStatus};
+pub use record::{TrackFrame, TrackId, TrackState, TrackStatus};
 pub use time::{FrameIndex, Timestamp};
 pub use tracks::{PixelOrigin, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};

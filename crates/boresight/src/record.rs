@@ -1,6 +1,6 @@
 //! What is said of a track at one time: the record that sinks write and metrics read.
 
-use crate::Extent;
+use crate::{Extent, FrameIndex, Timestamp};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -49,4 +49,15 @@ pub struct TrackState {
     pub innovation: Option<Innovation>,
     /// Confidence (existence probability or score mapped to 0..=1).
     pub score: f32,
+}
+
+/// All tracks of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrackFrame {
+    /// Number of the frame, from 0.
+    pub index: FrameIndex,
+    /// Its time.
+    pub time: Timestamp,
+    /// The tracks, in the order of the tracker or table.
+    pub tracks: Vec<TrackState>,
 }

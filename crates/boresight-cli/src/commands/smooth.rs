@@ -1,8 +1,8 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
-use boresight::io::tables::{TRACKS_HEADER, TableOptions, TrackFrame, TracksCsv, read_tracks};
+use boresight::io::tables::{TRACKS_HEADER, TableOptions, TracksCsv, read_tracks};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod, filter_track, predict, smooth_track};
-use boresight::{Config, Extent, FrameIndex, Scan, Sink, Timestamp, TrackState, TrackStatus, View};
+use boresight::{Config, Extent, FrameIndex, Scan, Sink, Timestamp, TrackFrame, TrackState, TrackStatus, View};
 use boresight_filters::Gaussian;
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};

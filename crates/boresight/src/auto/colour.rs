@@ -1,7 +1,7 @@
 //! A single target told by its colour: a ball, a marker; the colour is chosen from the frames looked at.
 
 use super::scene::{Camera, Scene};
-use crate::config::ColourConfig;
+use crate::io::Colour;
 use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
 use crate::vision::config::{CameraConfig, DetectorConfig};
 use crate::vision::threshold::ThresholdConfig;
@@ -46,7 +46,7 @@ pub fn configure(
          of {} frames with motion. So pixels of this colour are detected (input.colour = rgb).",
         reference.hsi.hue_deg, reference.n_frames, scene.n_moving
     ));
-    config.input.colour = ColourConfig::Rgb;
+    config.input.colour = Colour::Rgb;
     let colour = ColourMatchConfig { reference: reference.rgb, ..ColourMatchConfig::default() };
     config.detector = DetectorConfig {
         threshold: ThresholdConfig::Colour(colour),

@@ -19,7 +19,7 @@ pub use further::{FURTHER_FRAMES, open_and_choose};
 pub use open::{Opened, PROBE_FRAMES, open};
 pub use replay::Replay;
 
-use crate::config::ColourConfig;
+use crate::io::Colour;
 use crate::{Config, Frame, Result, SourceInfo};
 use scene::Camera;
 
@@ -65,7 +65,7 @@ fn choose_with(
         scene = scene::look(&more, &SourceInfo { kind: more[0].pixels.kind(), ..info.clone() })?;
     }
     // Who asks for grey gets grey.
-    let coloured = base.input.colour != ColourConfig::Gray;
+    let coloured = base.input.colour != Colour::Gray;
     if let Some(reference) = coloured.then(|| colour::look(&more, &scene)).flatten() {
         colour::configure(&reference, &scene, info, interval_s, &mut config, &mut reasons);
     } else if moving::fits(&scene, info) {

@@ -64,6 +64,11 @@ pub(super) fn describe(root: &serde_json::Value, at: &serde_json::Value) -> Stri
     own.and_then(serde_json::Value::as_str).unwrap_or("").replace('\n', " ")
 }
 
+/// Whether a key takes exactly one of several names.
+pub(super) fn is_choice(root: &serde_json::Value, at: &serde_json::Value) -> bool {
+    resolve(root, at).get("oneOf").is_some()
+}
+
 /// The named parts of a table, or the variants of an enum.
 pub(super) fn children(root: &serde_json::Value, at: &serde_json::Value) -> Vec<(String, serde_json::Value)> {
     let mut at = resolve(root, at);

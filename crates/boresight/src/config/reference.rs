@@ -2,7 +2,7 @@
 //!
 //! `cargo xtask docs` writes it to `docs/parameters.md`; a test fails when that file is out of date.
 
-use super::explain::{children, describe, resolve, schema};
+use super::explain::{children, describe, is_choice, resolve, schema};
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -74,10 +74,6 @@ fn choice(out: &mut String, root: &Value, path: &str, at: &Value) {
     for (key, child) in inner {
         table(out, root, &key, &child);
     }
-}
-
-fn is_choice(root: &Value, at: &Value) -> bool {
-    resolve(root, at).get("oneOf").is_some()
 }
 
 fn is_list(root: &Value, at: &Value) -> bool {

@@ -24,15 +24,18 @@ pub use open::{is_table, open};
 pub use pixels::gray_of_rgb8;
 pub use raw::RawFrames;
 pub use tables::{
-    AtomicFile, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, Output, TableOptions, TrackFrame,
-    TrackTable, TracksCsv, read_detections, read_tracks,
+    AtomicFile, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, Output, StateTable, TableOptions,
+    TracksCsv, read_detections, read_tracks,
 };
 pub use y4m::Y4m;
 
 use crate::{Error, ErrorKind, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Which pixels are wanted from a source that could give several kinds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Colour {
     /// What the file holds: grey stays grey; colour stills give RGB; video gives its luma plane.
     #[default]
@@ -44,7 +47,8 @@ pub enum Colour {
 }
 
 /// Pixel type of headerless (raw) frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum RawType {
     /// 8-bit grey.
     U8,
@@ -59,11 +63,12 @@ pub enum RawType {
 }
 
 /// Layout of headerless (raw) frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RawFormat {
-    /// Width, px.
+    /// Width, px, above 0.
     pub width: usize,
-    /// Height, px.
+    /// Height, px, above 0.
     pub height: usize,
     /// Type of a pixel.
     pub pixel: RawType,

@@ -10,20 +10,9 @@
 
 use super::smooth::{SmoothConfig, filter_track, predict, smooth_track};
 use super::stitch::{Fragment, StitchConfig, stitch};
-use crate::{Error, ErrorKind, FrameIndex, Result, Timestamp, TrackId, TrackState, TrackStatus};
+use crate::{Error, ErrorKind, Result, Timestamp, TrackFrame, TrackId, TrackState, TrackStatus};
 use boresight_filters::Gaussian;
 use std::collections::BTreeMap;
-
-/// All tracks of one scan.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TrackScan {
-    /// Number of the frame.
-    pub index: FrameIndex,
-    /// Its time.
-    pub time: Timestamp,
-    /// The tracks.
-    pub tracks: Vec<TrackState>,
-}
 
 /// What was done to a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +35,7 @@ type Row = (usize, TrackState);
 /// Joins the fragments of a table in place, and smooths it if `smooth`; scans ascend in time.
 /// # Errors
 /// A configuration value outside its range; scans out of order; an id twice in a scan; a covariance that no filter makes.
-pub fn join(scans: &mut [TrackScan], config: &StitchConfig, smooth: bool) -> Result<Joined> {
+pub fn join(scans: &mut [TrackFrame], config: &StitchConfig, smooth: bool) -> Result<Joined> {
     config.validate("stitch")?;
     let model =
         SmoothConfig { acceleration_std_px_per_s2: config.acceleration_std_px_per_s2, ..SmoothConfig::default() };
@@ -79,7 +68,7 @@ pub fn join(scans: &mut [TrackScan], config: &StitchConfig, smooth: bool) -> Res
     Ok(done)
 }
 
-fn by_track(scans: &[TrackScan]) -> Result<BTreeMap<u64, Vec<Row>>> {
+fn by_track(scans: &[TrackFrame]) -> Result<BTreeMap<u64, Vec<Row>>> {
     let mut tracks: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
     for (k, scan) in scans.iter().enumerate() {
         let damaged = |what: String| Error::new(ErrorKind::Damaged, what).at(format!("frame {}", scan.index.0));
@@ -101,7 +90,7 @@ fn by_track(scans: &[TrackScan]) -> Result<BTreeMap<u64, Vec<Row>>> {
 }
 
 /// The two ends of a track: its first row, and its last with a detection; nothing of a track that was never believed.
-fn fragment(id: u64, rows: &[Row], scans: &[TrackScan]) -> Option<Fragment> {
+fn fragment(id: u64, rows: &[Row], scans: &[TrackFrame]) -> Option<Fragment> {
     let believed = rows.iter().any(|r| r.1.status != TrackStatus::Tentative);
     let first = rows.first().filter(|_| believed)?;
     let last = rows.iter().rev().find(|r| r.1.status != TrackStatus::Coasting).unwrap_or(first);
@@ -129,7 +118,7 @@ fn chains(fragments: &[Fragment], ids: &[TrackId]) -> BTreeMap<u64, Vec<u64>> {
 fn each_belief(
     rows: &mut [Row],
     behind: Option<&Row>,
-    scans: &[TrackScan],
+    scans: &[TrackFrame],
     change: impl FnOnce(&[Timestamp], &mut [Gaussian<4>]) -> Result<()>,
 ) -> Result<()> {
     let all = || rows.iter().chain(behind);
@@ -153,7 +142,7 @@ fn moved_to(state: &mut TrackState, kinematics: Gaussian<4>) {
 fn chain(
     id: u64,
     mut parts: Vec<Vec<Row>>,
-    scans: &[TrackScan],
+    scans: &[TrackFrame],
     model: Option<&SmoothConfig>,
     done: &mut Joined,
 ) -> Result<Vec<Row>> {
@@ -187,7 +176,13 @@ fn chain(
 }
 
 /// Rows for the scans between the end of a fragment and the beginning of the next: predicted, coasting.
-fn fill(part: &mut Vec<Row>, begin: usize, scans: &[TrackScan], model: &SmoothConfig, done: &mut Joined) -> Result<()> {
+fn fill(
+    part: &mut Vec<Row>,
+    begin: usize,
+    scans: &[TrackFrame],
+    model: &SmoothConfig,
+    done: &mut Joined,
+) -> Result<()> {
     let Some((last, state)) = part.last().cloned() else { return Ok(()) };
     for k in last + 1..begin {
         let dt_s = scans[k].time.seconds_since(scans[last].time);
@@ -216,17 +211,18 @@ fn fused(a: &Gaussian<4>, b: &Gaussian<4>) -> Result<Gaussian<4>> {
 mod tests {
     use super::*;
     use crate::Extent;
+    use crate::FrameIndex;
     use nalgebra::{Matrix4, Vector4};
 
     /// One target at 1 px a scan (10 scans a second), seen under id 1 until scan 20 and under id 2 from scan 26, with noise.
-    fn table(noise_px: f64) -> Vec<TrackScan> {
+    fn table(noise_px: f64) -> Vec<TrackFrame> {
         let noise = |k: usize, salt: usize| noise_px * (((k * 7919 + salt * 104_729) % 1000) as f64 / 500.0 - 1.0);
         (0..50)
             .map(|k| {
-                let mut scan = TrackScan {
+                let mut scan = TrackFrame {
                     index: FrameIndex(k as u64),
                     time: Timestamp::from_secs_f64(0.1 * k as f64),
-                    ..TrackScan::default()
+                    ..TrackFrame::default()
                 };
                 if k <= 20 || k >= 26 {
                     let mean = Vector4::new(k as f64 + noise(k, 1), 0.0, 5.0 + noise(k, 2), 0.0);
@@ -248,7 +244,7 @@ mod tests {
             .collect()
     }
 
-    fn rms(scans: &[TrackScan]) -> f64 {
+    fn rms(scans: &[TrackFrame]) -> f64 {
         let errors: Vec<f64> = scans
             .iter()
             .enumerate()

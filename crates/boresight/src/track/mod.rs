@@ -38,7 +38,7 @@ pub use cue::CueConfig;
 pub use filter_config::{FilterConfig, TrackFilter};
 pub use filter_model::ModelConfig;
 pub use filter_options::{FormConfig, InnovationConfig};
-pub use join::{Joined, TrackScan, join};
+pub use join::{Joined, join};
 pub use life_config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
 pub use mht::{Mht, MhtConfig};
 pub use proof::ProofConfig;

@@ -76,11 +76,6 @@ impl AtomicFile {
         &self.part
     }
 
-    /// The open file, for writers that need `Seek`.
-    pub fn file_mut(&mut self) -> &mut File {
-        &mut self.file
-    }
-
     /// Makes the content durable and gives it its final name.
     /// # Errors
     /// [`ErrorKind::Output`] if the disk is full or the name cannot be taken.

@@ -2,6 +2,7 @@
 
 mod atomic;
 mod columns;
+mod detection_row;
 mod detections_csv;
 mod json_lines;
 mod mot;
@@ -10,6 +11,7 @@ mod options;
 mod read_detections;
 mod read_tracks;
 mod rows;
+mod scan_times;
 mod seqinfo;
 mod tracks_csv;
 
@@ -20,5 +22,5 @@ pub use json_lines::JsonLines;
 pub use mot::{MotWriter, extent_of_mot_box, mot_box_of_extent};
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
-pub use read_tracks::{TrackFrame, TrackTable, read_tracks};
+pub use read_tracks::{StateTable, read_tracks};
 pub use tracks_csv::{TRACKS_HEADER, TracksCsv};

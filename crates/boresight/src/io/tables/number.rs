@@ -55,9 +55,12 @@ pub(crate) fn parse_seconds(text: &str) -> Option<Timestamp> {
         let ns = seconds * 1_000_000_000 + ns;
         return Some(Timestamp::from_ns(if negative { -ns } else { ns }));
     }
-    let s: f64 = text.parse().ok()?;
-    // About 292 years fit into the nanoseconds of an i64.
-    (s.is_finite() && s.abs() < 9.2e9).then(|| Timestamp::from_secs_f64(s))
+    timestamp_of_seconds(text.parse().ok()?)
+}
+
+/// A time in seconds, if an i64 holds its nanoseconds (about 292 years).
+pub(crate) fn timestamp_of_seconds(s: f64) -> Option<Timestamp> {
+    (s.abs() < 9.2e9).then(|| Timestamp::from_secs_f64(s))
 }
 
 #[cfg(test)]

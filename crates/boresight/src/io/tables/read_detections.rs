@@ -1,17 +1,14 @@
 //! Detections from elsewhere: our `detections.csv`, MOTChallenge text, or any table with named columns.
 //!
-//! Boxes: in MOTChallenge text the first pixel is 1; in our tables `left_px` is the pixel's edge; in all other tables
-//! `left` is taken as the number of the first pixel, from 0. Rows may come in any order; rows of one frame keep theirs.
-//! Frames without rows between the first and the last one become empty scans with times in between. Times come from the
-//! table unless a rate is given.
+//! Rows may come in any order; rows of one frame keep theirs. Frames without rows between the first and the last one become
+//! empty scans with times in between. Times come from the table unless a rate is given.
 
-use super::columns::{Field, Layout};
-use super::mot::extent_of_mot_box;
-use super::number::parse_seconds;
+use super::columns::Field;
+use super::detection_row::RowReader;
 use super::options::TableOptions;
-use super::rows::{Kind, MAX_GAP_FRAMES, Row, Table};
-use crate::{ClassId, Detection, Error, ErrorKind, Extent, FrameIndex, Result, Scan, Timestamp};
-use nalgebra::{Matrix2, Vector2};
+use super::rows::Table;
+use super::scan_times::{scans_of, set_times};
+use crate::{Error, ErrorKind, Result, Scan};
 use std::path::Path;
 
 /// Detections read from a table.
@@ -43,14 +40,6 @@ pub fn read_detections(path: impl AsRef<Path>, options: &TableOptions) -> Result
     detections_of(&table, options, super::seqinfo::rate_beside(path))
 }
 
-/// A row's frame, time, identity and detection.
-struct Seen {
-    frame: u64,
-    id: u64,
-    time: Option<Timestamp>,
-    detection: Detection,
-}
-
 fn detections_of(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<DetectionTable> {
     Ok(identified_of(table, options, rate_beside, false)?.0)
 }
@@ -70,7 +59,7 @@ pub(crate) fn identified_of(
     if !layout.has_position() {
         return Err(table.lacks("where a detection is (x and y, or a box)"));
     }
-    let reader = Reader::new(table, options);
+    let reader = RowReader::new(table, options);
     let mut out = DetectionTable {
         scans: Vec::new(),
         rate_hz: 0.0,
@@ -80,7 +69,7 @@ pub(crate) fn identified_of(
         n_skipped: 0,
         warnings: Vec::new(),
     };
-    let mut seen: Vec<Seen> = Vec::new();
+    let mut seen = Vec::new();
     let mut n_loose = 0;
     for row in table.rows() {
         out.n_rows += 1;
@@ -112,8 +101,12 @@ pub(crate) fn identified_of(
     }
     seen.sort_by_key(|s| s.frame);
     let ids = seen.iter().map(|s| s.id).collect();
-    out.scans = scans_of(table, seen)?;
-    set_times(&mut out, table, options, rate_beside)?;
+    let (mut scans, times) = scans_of(table, seen)?;
+    let rate = set_times(&mut scans, &times, table, options, rate_beside)?;
+    (out.scans, out.rate_hz) = (scans, rate.rate_hz);
+    if rate.is_assumed {
+        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", table.label, rate.rate_hz));
+    }
     if !layout.has(&[Field::VarX]) && !layout.has(&[Field::StdX]) && !out.scans.is_empty() {
         out.warnings.push(format!(
             "{} has no position errors: a standard deviation of {} px was taken.",
@@ -123,248 +116,12 @@ pub(crate) fn identified_of(
     Ok((out, ids))
 }
 
-/// Groups sorted rows into one scan a frame. Times are kept only if every row has one (`i64::MIN` marks none).
-fn scans_of(table: &Table, seen: Vec<Seen>) -> Result<Vec<Scan>> {
-    const NO_TIME: Timestamp = Timestamp::from_ns(i64::MIN);
-    let mut scans: Vec<Scan> = Vec::new();
-    for one in seen {
-        let time = one.time.unwrap_or(NO_TIME);
-        match scans.last_mut() {
-            Some(last) if last.index.0 == one.frame => last.detections.push(one.detection),
-            last => {
-                let next = last.map_or(one.frame, |l| l.index.0 + 1);
-                if one.frame - next > MAX_GAP_FRAMES {
-                    let what = format!(
-                        "frame {} follows frame {}: expected a hole of at most {MAX_GAP_FRAMES} frames",
-                        one.frame,
-                        next - 1
-                    );
-                    return Err(Error::new(ErrorKind::Damaged, what).at(&table.label));
-                }
-                scans.extend((next..one.frame).map(|f| Scan {
-                    index: FrameIndex(f),
-                    time: NO_TIME,
-                    ..Scan::default()
-                }));
-                scans.push(Scan {
-                    index: FrameIndex(one.frame),
-                    time,
-                    detections: vec![one.detection],
-                    ..Scan::default()
-                });
-            }
-        }
-    }
-    Ok(scans)
-}
-
-/// Gives every scan its time: from the table, with holes filled evenly, or from a rate.
-fn set_times(out: &mut DetectionTable, table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<()> {
-    let timed: Vec<usize> = (0..out.scans.len()).filter(|&i| !out.scans[i].detections.is_empty()).collect();
-    let has_times =
-        options.rate_hz.is_none() && !timed.is_empty() && timed.iter().all(|&i| out.scans[i].time.ns != i64::MIN);
-    if !has_times {
-        let rate = options.rate_hz.or(rate_beside);
-        if rate.is_none() && !out.scans.is_empty() {
-            out.warnings.push(format!("{} says nothing of time: 25 frames/s were taken.", table.label));
-        }
-        out.rate_hz = rate.unwrap_or(25.0);
-        for scan in &mut out.scans {
-            scan.time = Timestamp::from_secs_f64(scan.index.0 as f64 / out.rate_hz);
-        }
-        return Ok(());
-    }
-    let mut periods: Vec<f64> = Vec::new();
-    for pair in timed.windows(2) {
-        let (a, b) = (pair[0], pair[1]);
-        let (from, to) = (out.scans[a].time, out.scans[b].time);
-        if to <= from {
-            let what = format!(
-                "times must grow with the frames, but frame {} is at {} s and frame {} at {} s",
-                out.scans[a].index.0,
-                from.as_secs_f64(),
-                out.scans[b].index.0,
-                to.as_secs_f64()
-            );
-            return Err(Error::new(ErrorKind::Damaged, what)
-                .at(&table.label)
-                .hint("give a rate to make times from frame numbers"));
-        }
-        let n = (b - a) as i128;
-        let step = i128::from(to.ns) - i128::from(from.ns);
-        periods.push(step as f64 / n as f64 * 1e-9);
-        for k in 1..b - a {
-            out.scans[a + k].time = Timestamp::from_ns((i128::from(from.ns) + step * k as i128 / n) as i64);
-        }
-    }
-    periods.sort_by(f64::total_cmp);
-    out.rate_hz = periods.get(periods.len() / 2).map_or_else(|| rate_beside.unwrap_or(25.0), |p| 1.0 / p);
-    Ok(())
-}
-
-/// What is the same for all rows.
-struct Reader<'t> {
-    table: &'t Table,
-    layout: &'t Layout,
-    options: &'t TableOptions,
-    /// From the table's left and top to pixel edges.
-    edge_shift_px: f64,
-    first_frame: u64,
-}
-
-impl<'t> Reader<'t> {
-    fn new(table: &'t Table, options: &'t TableOptions) -> Self {
-        let edges =
-            table.layout.column(Field::Left).and_then(|at| table.header.get(at)).is_some_and(|h| h == "left_px");
-        let first_frame = options.first_frame.unwrap_or(if table.kind == Kind::Mot { 1 } else { 0 });
-        Self { table, layout: &table.layout, options, edge_shift_px: if edges { 0.0 } else { -0.5 }, first_frame }
-    }
-
-    fn format(&self) -> String {
-        if self.table.kind == Kind::Mot {
-            return "MOTChallenge".to_string();
-        }
-        if self.table.header.join(",") == super::detections_csv::DETECTIONS_HEADER {
-            return "boresight detections".to_string();
-        }
-        let fields = [Field::Frame, Field::TimeS, Field::X, Field::Y, Field::Left, Field::Top];
-        let used: Vec<_> = fields
-            .into_iter()
-            .filter_map(|f| self.table.header.get(self.layout.column(f)?))
-            .map(String::as_str)
-            .collect();
-        format!("CSV ({})", used.join(", "))
-    }
-
-    fn read(&self, row: &Row<'_>, identified: bool, class_names: &mut Vec<String>) -> Result<Seen> {
-        row.check_length()?;
-        let id = if identified { row.need(Field::Id)? } else { 0.0 };
-        if id.fract() != 0.0 || id >= 1e15 {
-            return Err(row.wrong(Field::Id, row.word(Field::Id).unwrap_or_default(), "a whole number"));
-        }
-        let frame = row.need(Field::Frame)?;
-        let first = self.first_frame as f64;
-        if frame < first || frame.fract() != 0.0 || frame >= 1e15 {
-            let found = row.word(Field::Frame).unwrap_or_default();
-            return Err(row.wrong(Field::Frame, found, &format!("a whole number from {first}")));
-        }
-        let time = match (row.word(Field::TimeS), self.layout.time_scale) {
-            (None, _) => None,
-            (Some(text), None) => {
-                Some(parse_seconds(text).ok_or_else(|| row.wrong(Field::TimeS, text, "a time in seconds"))?)
-            }
-            (Some(_), Some(scale)) => Some(Timestamp::from_secs_f64(row.need(Field::TimeS)? * scale)),
-        };
-        let area = row.maybe(Field::Area)?.filter(|a| *a > 0.0);
-        let boxed = self.extent(row)?;
-        let position = match (&boxed, self.layout.has(&[Field::X, Field::Y])) {
-            (_, true) => {
-                let origin = self.options.first_pixel;
-                Vector2::new(row.need(Field::X)? - origin, row.need(Field::Y)? - origin)
-            }
-            (Some(e), false) => Vector2::new(e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0),
-            (None, false) => return Err(row.bad("neither a centre nor a box")),
-        };
-        let extent = boxed.unwrap_or_else(|| {
-            let side = area.map_or(self.options.box_px, f64::sqrt);
-            Extent {
-                left_px: position.x - side / 2.0,
-                top_px: position.y - side / 2.0,
-                width_px: side,
-                height_px: side,
-            }
-        });
-        let cov = self.cov(row, &extent)?;
-        let area = area.unwrap_or(extent.width_px * extent.height_px).round().clamp(1.0, f64::from(u32::MAX)) as u32;
-        let detection = Detection {
-            position,
-            cov,
-            extent,
-            area_px: area,
-            peak: row.maybe(Field::Peak)?.unwrap_or(0.0) as f32,
-            sum: row.maybe(Field::Sum)?.unwrap_or(0.0),
-            score: row.maybe(Field::Score)?.unwrap_or(1.0) as f32,
-            class: row.word(Field::Class).and_then(|word| class_of(word, class_names)),
-        };
-        Ok(Seen { frame: frame as u64 - self.first_frame, id: id as u64, time, detection })
-    }
-
-    fn extent(&self, row: &Row<'_>) -> Result<Option<Extent>> {
-        if !self.layout.has(&[Field::Left, Field::Top]) {
-            // A size without a place: a box around the centre.
-            if self.layout.has(&[Field::Width, Field::Height, Field::X, Field::Y])
-                && let (Some(w), Some(h)) = (row.maybe(Field::Width)?, row.maybe(Field::Height)?)
-                && w >= 0.0
-                && h >= 0.0
-            {
-                let (x, y) =
-                    (row.need(Field::X)? - self.options.first_pixel, row.need(Field::Y)? - self.options.first_pixel);
-                return Ok(Some(Extent { left_px: x - w / 2.0, top_px: y - h / 2.0, width_px: w, height_px: h }));
-            }
-            return Ok(None);
-        }
-        let (left, top) = (row.need(Field::Left)?, row.need(Field::Top)?);
-        let (width, height) = if self.layout.has(&[Field::Width, Field::Height]) {
-            (row.need(Field::Width)?, row.need(Field::Height)?)
-        } else if self.layout.has(&[Field::Right, Field::Bottom]) {
-            (row.need(Field::Right)? - left, row.need(Field::Bottom)? - top)
-        } else {
-            return Ok(None);
-        };
-        for (field, size) in [(Field::Width, width), (Field::Height, height)] {
-            if size < 0.0 {
-                return Err(row.wrong(field, &size.to_string(), "a size of at least 0 px"));
-            }
-        }
-        if self.table.kind == Kind::Mot {
-            return Ok(Some(extent_of_mot_box([left, top, width, height])));
-        }
-        let shift = self.edge_shift_px - self.options.first_pixel;
-        Ok(Some(Extent { left_px: left + shift, top_px: top + shift, width_px: width, height_px: height }))
-    }
-
-    fn cov(&self, row: &Row<'_>, extent: &Extent) -> Result<Matrix2<f64>> {
-        if let (Some(xx), Some(yy)) = (row.maybe(Field::VarX)?, row.maybe(Field::VarY)?) {
-            let xy = row.maybe(Field::CovXy)?.unwrap_or(0.0);
-            if !(xx > 0.0 && yy > 0.0 && xx * yy > xy * xy) {
-                let found = format!("{xx}, {xy}, {yy}");
-                return Err(row.wrong(Field::VarX, &found, "a positive definite covariance"));
-            }
-            return Ok(Matrix2::new(xx, xy, xy, yy));
-        }
-        let side = |s: f64| (s * self.options.std_per_side).max(self.options.std_px);
-        // trackpy gives 0 or less where it could not tell the error.
-        let x = row.maybe(Field::StdX)?.filter(|s| *s > 0.0).unwrap_or(side(extent.width_px));
-        let y = row.maybe(Field::StdY)?.filter(|s| *s > 0.0).unwrap_or(side(extent.height_px));
-        Ok(Matrix2::new(x * x, 0.0, 0.0, y * y))
-    }
-}
-
-/// Most names of classes that are told apart.
-const MAX_CLASSES: usize = 1000;
-
-/// A class by number, or by name in the order of appearance.
-fn class_of(word: &str, names: &mut Vec<String>) -> Option<ClassId> {
-    if names.is_empty()
-        && let Some(number) = word.parse::<f64>().ok().filter(|v| v.fract() == 0.0 && (0.0..4e9).contains(v))
-    {
-        return Some(ClassId(number as u32));
-    }
-    if let Some(i) = names.iter().position(|n| n == word) {
-        return Some(ClassId(i as u32));
-    }
-    if names.len() >= MAX_CLASSES {
-        return None;
-    }
-    names.push(word.to_string());
-    Some(ClassId(names.len() as u32 - 1))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::io::{DetectionsCsv, Output};
-    use crate::{Sink, View};
+    use crate::{Detection, Extent, FrameIndex, Sink, Timestamp, View};
+    use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
 
     fn read(text: &str, options: &TableOptions) -> Result<DetectionTable> {
@@ -427,6 +184,15 @@ mod tests {
         }
         let far = read("frame,x,y\n0,1,1\n999999999999,1,1\n", &TableOptions::default());
         assert!(far.unwrap_err().to_string().contains("hole"));
+        let wild = read("frame,x,y,time_ns\n0,1,1,0\n1,1,1,1e30\n", &TableOptions::default());
+        assert!(wild.unwrap_err().to_string().contains("column time_ns: found '1e30'"));
+    }
+
+    #[test]
+    fn many_holes_are_refused_before_they_take_the_memory() {
+        let rows: String = (0..100).map(|k| format!("{},1,1\n", k * 999_999)).collect();
+        let error = read(&format!("frame,x,y\n{rows}"), &TableOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("10000000 in all"), "{error}");
     }
 
     #[test]

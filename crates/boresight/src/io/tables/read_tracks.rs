@@ -8,25 +8,14 @@ use super::options::TableOptions;
 use super::read_detections::identified_of;
 use super::rows::{Row, Table};
 use super::tracks_csv::{TRACKS_HEADER, status_word};
-use crate::{Extent, FrameIndex, Result, Timestamp, TrackId, TrackState, TrackStatus};
+use crate::{Extent, FrameIndex, Result, Timestamp, TrackFrame, TrackId, TrackState, TrackStatus};
 use boresight_filters::Gaussian;
 use nalgebra::{SMatrix, SVector};
 use std::path::Path;
 
-/// All tracks of one frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TrackFrame {
-    /// Number of the frame, from 0.
-    pub index: FrameIndex,
-    /// Its time.
-    pub time: Timestamp,
-    /// The tracks, in the table's order.
-    pub tracks: Vec<TrackState>,
-}
-
-/// Tracks read from a table.
+/// Tracks read from a table, as states of a filter; boxes alone are a [`crate::TrackTable`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct TrackTable {
+pub struct StateTable {
     /// The frames that have tracks, in order.
     pub frames: Vec<TrackFrame>,
     /// Rate, frames/s: given, or found from the times.
@@ -40,7 +29,7 @@ pub struct TrackTable {
 /// Reads tracks from a table.
 /// # Errors
 /// As [`super::read_detections`]; also if no column names the track.
-pub fn read_tracks(path: impl AsRef<Path>, options: &TableOptions) -> Result<TrackTable> {
+pub fn read_tracks(path: impl AsRef<Path>, options: &TableOptions) -> Result<StateTable> {
     options.validate("table")?;
     let path = path.as_ref();
     let table = Table::open(path, &options.columns)?;
@@ -51,8 +40,8 @@ pub fn read_tracks(path: impl AsRef<Path>, options: &TableOptions) -> Result<Tra
 }
 
 /// Our own table: nothing is guessed, every number comes back to the bit.
-fn own_tracks(table: &Table, options: &TableOptions) -> Result<TrackTable> {
-    let mut out = TrackTable { frames: Vec::new(), rate_hz: 0.0, n_skipped: 0, warnings: Vec::new() };
+fn own_tracks(table: &Table, options: &TableOptions) -> Result<StateTable> {
+    let mut out = StateTable { frames: Vec::new(), rate_hz: 0.0, n_skipped: 0, warnings: Vec::new() };
     for row in table.rows() {
         match own_row(table, &row) {
             Ok((index, time, state)) => match out.frames.last_mut() {
@@ -123,13 +112,13 @@ fn own_row(table: &Table, row: &Row<'_>) -> Result<(FrameIndex, Timestamp, Track
 }
 
 /// Any other table: its rows are read as detections and get their identities.
-fn foreign_tracks(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<TrackTable> {
+fn foreign_tracks(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<StateTable> {
     if !table.layout.has(&[Field::Id]) {
         return Err(table.lacks("which track a row belongs to"));
     }
     let (read, ids) = identified_of(table, options, rate_beside, true)?;
     let mut out =
-        TrackTable { frames: Vec::new(), rate_hz: read.rate_hz, n_skipped: read.n_skipped, warnings: read.warnings };
+        StateTable { frames: Vec::new(), rate_hz: read.rate_hz, n_skipped: read.n_skipped, warnings: read.warnings };
     let mut ids = ids.into_iter();
     for scan in read.scans {
         if scan.detections.is_empty() {

@@ -7,9 +7,6 @@ use crate::{Error, ErrorKind, Result};
 use std::io::Read;
 use std::path::Path;
 
-/// A sequence of frames with a hole larger than this is taken for a wrong number, not for a pause.
-pub(crate) const MAX_GAP_FRAMES: u64 = 1_000_000;
-
 /// Tables longer than this are refused: 4 GiB hold some 40 million rows.
 const MAX_BYTES: u64 = 4 << 30;
 

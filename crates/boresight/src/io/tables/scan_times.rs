@@ -1,0 +1,113 @@
+//! Scans from the rows of a table: one for each frame, empty frames included, each with its time.
+//!
+//! Times come from the table, with frames without rows placed evenly in between; if a row has none, or a rate is given,
+//! they are made from the frame numbers.
+
+use super::detection_row::Seen;
+use super::options::TableOptions;
+use super::rows::Table;
+use crate::{Error, ErrorKind, FrameIndex, Result, Scan, Timestamp};
+
+/// A sequence of frames with a hole larger than this is taken for a wrong number, not for a pause.
+const MAX_GAP_FRAMES: u64 = 1_000_000;
+
+/// All holes of a table together may have this many frames: empty scans take memory as well (10⁷ of them about 0.8 GB).
+const MAX_EMPTY_FRAMES: u64 = 10_000_000;
+
+/// Rate of a table that says nothing of time, frames/s.
+const USUAL_RATE_HZ: f64 = 25.0;
+
+/// Groups rows, sorted by frame, into one scan a frame; with the time of each frame as far as its first row has one.
+/// # Errors
+/// [`ErrorKind::Damaged`] for holes that no pause explains.
+pub(super) fn scans_of(table: &Table, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec<Option<Timestamp>>)> {
+    let mut scans: Vec<Scan> = Vec::new();
+    let mut times = Vec::new();
+    let mut n_empty = 0;
+    for one in seen {
+        match scans.last_mut() {
+            Some(last) if last.index.0 == one.frame => last.detections.push(one.detection),
+            last => {
+                let next = last.map_or(one.frame, |l| l.index.0 + 1);
+                let hole = one.frame - next;
+                n_empty += hole;
+                if hole > MAX_GAP_FRAMES || n_empty > MAX_EMPTY_FRAMES {
+                    let what = format!(
+                        "frame {} follows frame {}: expected holes of at most {MAX_GAP_FRAMES} frames, {MAX_EMPTY_FRAMES} in all",
+                        one.frame,
+                        next - 1
+                    );
+                    return Err(Error::new(ErrorKind::Damaged, what)
+                        .at(&table.label)
+                        .hint("is the frame column really the frame?"));
+                }
+                scans.extend((next..one.frame).map(|f| Scan { index: FrameIndex(f), ..Scan::default() }));
+                times.resize(scans.len(), None);
+                scans.push(Scan { index: FrameIndex(one.frame), detections: vec![one.detection], ..Scan::default() });
+                times.push(one.time);
+            }
+        }
+    }
+    Ok((scans, times))
+}
+
+/// What [`set_times`] found.
+pub(super) struct Rate {
+    /// Rate, frames/s.
+    pub rate_hz: f64,
+    /// Whether the rate was assumed, since neither the table nor anything else tells.
+    pub is_assumed: bool,
+}
+
+/// Gives every scan its time: from the table, with holes filled evenly, or from a rate; `rate_beside` (frames/s) is what a
+/// file beside the table says.
+/// # Errors
+/// [`ErrorKind::Damaged`] for times that do not rise.
+pub(super) fn set_times(
+    scans: &mut [Scan],
+    times: &[Option<Timestamp>],
+    table: &Table,
+    options: &TableOptions,
+    rate_beside: Option<f64>,
+) -> Result<Rate> {
+    // The frames that have rows, with their times; `None` if one of them has no time.
+    let with_rows = scans.iter().zip(times).enumerate().filter(|(_, (scan, _))| !scan.detections.is_empty());
+    let timed: Option<Vec<(usize, Timestamp)>> = with_rows.map(|(i, (_, time))| time.map(|t| (i, t))).collect();
+    let Some(timed) = timed.filter(|t| options.rate_hz.is_none() && !t.is_empty()) else {
+        let known = options.rate_hz.or(rate_beside);
+        let rate_hz = known.unwrap_or(USUAL_RATE_HZ);
+        for scan in scans.iter_mut() {
+            scan.time = Timestamp::from_secs_f64(scan.index.0 as f64 / rate_hz);
+        }
+        return Ok(Rate { rate_hz, is_assumed: known.is_none() && !scans.is_empty() });
+    };
+    for (i, time) in &timed {
+        scans[*i].time = *time;
+    }
+    let mut periods_s: Vec<f64> = Vec::new();
+    for pair in timed.windows(2) {
+        let ((a, from), (b, to)) = (pair[0], pair[1]);
+        if to <= from {
+            let what = format!(
+                "times must grow with the frames, but frame {} is at {} s and frame {} at {} s",
+                scans[a].index.0,
+                from.as_secs_f64(),
+                scans[b].index.0,
+                to.as_secs_f64()
+            );
+            return Err(Error::new(ErrorKind::Damaged, what)
+                .at(&table.label)
+                .hint("give a rate to make times from frame numbers"));
+        }
+        let n = (b - a) as i128;
+        let step_ns = i128::from(to.ns) - i128::from(from.ns);
+        periods_s.push(step_ns as f64 / n as f64 * 1e-9);
+        for k in 1..b - a {
+            scans[a + k].time = Timestamp::from_ns((i128::from(from.ns) + step_ns * k as i128 / n) as i64);
+        }
+    }
+    periods_s.sort_by(f64::total_cmp);
+    let median_s = periods_s.get(periods_s.len() / 2);
+    let rate_hz = median_s.map_or_else(|| rate_beside.unwrap_or(USUAL_RATE_HZ), |p| 1.0 / p);
+    Ok(Rate { rate_hz, is_assumed: false })
+}
