@@ -12,8 +12,10 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, Default)]
 pub struct Groups {
     parent: Vec<u32>,
+    /// First row that gates each detection.
     claimed_by: Vec<u32>,
-    n_claims: Vec<u32>,
+    /// Where the next row of each root goes.
+    ends: Vec<u32>,
     starts: Vec<u32>,
     rows: Vec<u32>,
 }
@@ -39,27 +41,27 @@ impl Groups {
                 }
             }
         }
-        // Counting sort of the rows by root; singletons skip it in `for_each`.
-        self.n_claims.clear();
-        self.n_claims.resize(n + 1, 0);
+        // Counting sort of the rows by root.
+        self.ends.clear();
+        self.ends.resize(n + 1, 0);
         for i in 0..n as u32 {
             if !gates.row(i as usize).is_empty() {
                 let r = root(&mut self.parent, i);
-                self.n_claims[r as usize + 1] += 1;
+                self.ends[r as usize + 1] += 1;
             }
         }
         for i in 0..n {
-            self.n_claims[i + 1] += self.n_claims[i];
+            self.ends[i + 1] += self.ends[i];
         }
         self.starts.clear();
-        self.starts.extend_from_slice(&self.n_claims);
+        self.starts.extend_from_slice(&self.ends);
         self.rows.clear();
         self.rows.resize(self.starts[n] as usize, 0);
         for i in 0..n as u32 {
             if !gates.row(i as usize).is_empty() {
                 let r = root(&mut self.parent, i) as usize;
-                self.rows[self.n_claims[r] as usize] = i;
-                self.n_claims[r] += 1;
+                self.rows[self.ends[r] as usize] = i;
+                self.ends[r] += 1;
             }
         }
     }

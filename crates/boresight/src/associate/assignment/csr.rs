@@ -6,11 +6,8 @@
 
 use super::super::global_nearest::{GlobalNearest, GlobalNearestConfig};
 use super::super::{Assignment, Associator, Gates, Pair, Prior};
-use super::sparse::UNASSIGNED;
+use super::sparse::{FORBIDDEN, UNASSIGNED};
 use crate::{Error, ErrorKind, Result};
-
-/// A cost that no true solution reaches.
-const FORBIDDEN: f64 = 1e15;
 
 /// Solves compressed problems one after the other; keeps its memory.
 #[derive(Clone, Debug)]

@@ -26,6 +26,7 @@ pub struct Dense {
     row_of: Vec<u32>,
     column_of: Vec<u32>,
     free: Vec<u32>,
+    n_columns: Vec<u32>,
     scanned: Vec<u32>,
     reached: Vec<f64>,
 }
@@ -70,7 +71,9 @@ impl Dense {
         for (i, row) in cost.chunks_exact(n).enumerate() {
             least_by_column(row, i as u64, &mut self.v, &mut self.from);
         }
-        let mut n_columns = vec![0u32; n];
+        let n_columns = &mut self.n_columns;
+        n_columns.clear();
+        n_columns.resize(n, 0);
         for j in (0..n).rev() {
             let i = self.from[j] as usize;
             n_columns[i] += 1;
@@ -236,20 +239,13 @@ fn two_least(row: &[f64], v: &[f64]) -> (f64, f64, u64, u64) {
 /// Relaxes all open columns from one row and returns the least distance among them.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn relax(row: &[f64], v: &[f64], shift: f64, i: u64, closed: &[f64], open: &mut [f64], from: &mut [u64]) -> f64 {
-    let n = row.len();
-    let (v, closed, open, from) = (&v[..n], &closed[..n], &mut open[..n], &mut from[..n]);
     let mut least = [f64::INFINITY; LANES];
-    let blocks = n / LANES * LANES;
-    for at in (0..blocks).step_by(LANES) {
-        let (c, v, closed): (&[f64; LANES], &[f64; LANES], &[f64; LANES]) = (
-            row[at..].first_chunk().unwrap_or(&[0.0; LANES]),
-            v[at..].first_chunk().unwrap_or(&[0.0; LANES]),
-            closed[at..].first_chunk().unwrap_or(&[0.0; LANES]),
-        );
-        let (Some(open), Some(from)) = (open[at..].first_chunk_mut::<LANES>(), from[at..].first_chunk_mut::<LANES>())
-        else {
-            break;
-        };
+    let (row, row_rest) = row.as_chunks::<LANES>();
+    let (v, v_rest) = v.as_chunks::<LANES>();
+    let (closed, closed_rest) = closed.as_chunks::<LANES>();
+    let (open, open_rest) = open.as_chunks_mut::<LANES>();
+    let (from, from_rest) = from.as_chunks_mut::<LANES>();
+    for ((((c, v), closed), open), from) in row.iter().zip(v).zip(closed).zip(open).zip(from) {
         for l in 0..LANES {
             let d = c[l] - v[l] - shift + closed[l];
             let nearer = d < open[l];
@@ -259,13 +255,14 @@ fn relax(row: &[f64], v: &[f64], shift: f64, i: u64, closed: &[f64], open: &mut 
         }
     }
     let mut out = least.iter().copied().fold(f64::INFINITY, f64::min);
-    for j in blocks..n {
-        let d = row[j] - v[j] - shift + closed[j];
-        if d < open[j] {
-            open[j] = d;
-            from[j] = i;
+    let rest = row_rest.iter().zip(v_rest).zip(closed_rest).zip(open_rest).zip(from_rest);
+    for ((((c, v), closed), open), from) in rest {
+        let d = c - v - shift + closed;
+        if d < *open {
+            *open = d;
+            *from = i;
         }
-        out = out.min(open[j]);
+        out = out.min(*open);
     }
     out
 }

@@ -5,12 +5,9 @@
 //! Cost: at most k · rows solutions of the sparse problem. Limits: memory grows with k · rows parts.
 
 use super::super::{Gates, Pair, Prior};
-use super::sparse::{SparseSolver, UNASSIGNED};
+use super::sparse::{FORBIDDEN, SparseSolver, UNASSIGNED};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-
-/// A cost that no true solution reaches.
-const FORBIDDEN: f64 = 1e15;
 
 /// One assignment and its cost.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,6 +13,9 @@ use std::collections::BinaryHeap;
 /// A track left without a detection.
 pub const UNASSIGNED: u32 = u32::MAX;
 
+/// A cost that no true solution reaches: pairs and misses that must not be.
+pub(super) const FORBIDDEN: f64 = 1e15;
+
 /// Relaxations spent on one group before it is finished greedily.
 pub const WORK_LIMIT: u64 = 1_000_000_000;
 

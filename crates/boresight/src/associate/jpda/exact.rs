@@ -77,7 +77,8 @@ impl Exact {
                 return false;
             }
             let total: f64 = level.iter().map(|s| s.1).sum();
-            if total <= 0.0 {
+            // Not a number either: weights that cannot be summed.
+            if !(total > 0.0 && total.is_finite()) {
                 return false;
             }
             for s in level {
