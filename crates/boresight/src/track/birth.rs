@@ -105,11 +105,6 @@ impl BirthConfig {
             }
         }
     }
-
-    /// Whether a start needs a left-over of the scan before.
-    pub fn needs_two(&self) -> bool {
-        !matches!(self, Self::OnePoint(_))
-    }
 }
 
 /// First belief from one point: velocity zero, variance as given (px²/s²).

@@ -89,14 +89,15 @@ pub(super) struct Clutter {
     seen: [f64; 4],
     /// Density of each cell, 1/px².
     map: BTreeMap<(i64, i64), f64>,
-    counts: BTreeMap<(i64, i64), u32>,
+    /// Cells of the detections that nobody took, sorted: scratch.
+    free: Vec<(i64, i64)>,
 }
 
 impl Clutter {
     pub fn new(config: &ClutterConfig, given: f64) -> Self {
         let inf = f64::INFINITY;
-        let (map, counts) = (BTreeMap::new(), BTreeMap::new());
-        Self { config: config.clone(), given, one: given, seen: [inf, inf, -inf, -inf], map, counts }
+        let seen = [inf, inf, -inf, -inf];
+        Self { config: config.clone(), given, one: given, seen, map: BTreeMap::new(), free: Vec::new() }
     }
 
     /// Whether each detection has a density of its own.
@@ -135,21 +136,19 @@ impl Clutter {
                 }
             }
             ClutterConfig::Map(c) => {
-                self.counts.clear();
-                for (d, taken) in scan.detections.iter().zip(taken) {
-                    if !taken {
-                        *self.counts.entry(cell(d.position.x, d.position.y, c.cell_px)).or_insert(0) += 1;
-                    }
-                }
+                self.free.clear();
+                let free = scan.detections.iter().zip(taken).filter(|(_, taken)| !**taken);
+                self.free.extend(free.map(|(d, _)| cell(d.position.x, d.position.y, c.cell_px)));
+                self.free.sort_unstable();
                 let keep = (-dt_s / c.memory_s).exp();
                 for v in self.map.values_mut() {
                     *v *= keep;
                 }
-                for (key, n) in &self.counts {
+                for same in self.free.chunk_by(|a, b| a == b) {
                     let full = self.map.len() >= MOST_CELLS;
-                    if !full || self.map.contains_key(key) {
-                        let v = self.map.entry(*key).or_insert(self.given);
-                        *v += (1.0 - keep) * f64::from(*n) / (c.cell_px * c.cell_px);
+                    if !full || self.map.contains_key(&same[0]) {
+                        let v = self.map.entry(same[0]).or_insert(self.given);
+                        *v += (1.0 - keep) * same.len() as f64 / (c.cell_px * c.cell_px);
                     }
                 }
             }

@@ -8,7 +8,7 @@ use super::proof::{CameraWay, Proof};
 use super::terms::Look;
 use crate::record::Innovation;
 use crate::{Detection, Extent, Timestamp, TrackId, TrackState, TrackStatus};
-use boresight_filters::Filter;
+use boresight_filters::{Filter, Gaussian};
 
 /// One living track.
 #[derive(Clone)]
@@ -69,24 +69,38 @@ impl Track {
     pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
         let kinematics = self.belief.kinematics();
         let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], camera, outcome.hit);
-        let [width_px, height_px] = self.look.size;
-        TrackState {
-            id: TrackId(self.id),
-            status: match (self.life.confirmed && proven, outcome.hit) {
-                (false, _) => TrackStatus::Tentative,
-                (true, true) => TrackStatus::Confirmed,
-                (true, false) => TrackStatus::Coasting,
-            },
-            extent: Extent {
-                left_px: kinematics.mean[0] - 0.5 * width_px,
-                top_px: kinematics.mean[2] - 0.5 * height_px,
-                width_px,
-                height_px,
-            },
-            kinematics,
-            detection: outcome.detection,
-            innovation: outcome.innovation,
-            score: config.life.confidence(&self.life),
-        }
+        state_of(self.id, kinematics, &self.look, &self.life, proven, outcome, config)
+    }
+}
+
+/// The record of a track after a scan; `proven` says whether it has shown what it must beside its life's rule.
+#[inline]
+pub(super) fn state_of(
+    id: u64,
+    kinematics: Gaussian<4>,
+    look: &Look,
+    life: &Life,
+    proven: bool,
+    outcome: &Outcome,
+    config: &TrackerConfig,
+) -> TrackState {
+    let [width_px, height_px] = look.size;
+    TrackState {
+        id: TrackId(id),
+        status: match (life.confirmed && proven, outcome.hit) {
+            (false, _) => TrackStatus::Tentative,
+            (true, true) => TrackStatus::Confirmed,
+            (true, false) => TrackStatus::Coasting,
+        },
+        extent: Extent {
+            left_px: kinematics.mean[0] - 0.5 * width_px,
+            top_px: kinematics.mean[2] - 0.5 * height_px,
+            width_px,
+            height_px,
+        },
+        kinematics,
+        detection: outcome.detection,
+        innovation: outcome.innovation,
+        score: config.life.confidence(life),
     }
 }

@@ -3,6 +3,7 @@
 //! Budgets are in seconds; the interval only says what a scan is when a budget has a floor in scans, and keeps a gap
 //! (dropped frames, an hour's pause) from being taken for one.
 
+/// Intervals kept.
 const KEPT: usize = 9;
 
 /// The usual interval between scans.

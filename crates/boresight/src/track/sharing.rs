@@ -56,6 +56,7 @@ pub(super) struct Part {
 pub(super) struct Sharing {
     members: Vec<(u32, u32)>,
     pub parts: Vec<Part>,
+    group: Vec<u32>,
     order: Vec<usize>,
 }
 
@@ -100,13 +101,16 @@ impl Sharing {
             let j = self.members[from].0;
             let to = from + self.members[from..].iter().take_while(|m| m.0 == j).count();
             let took = taker[j as usize];
-            let mut group: Vec<u32> = self.members[from..to].iter().map(|m| m.1).collect();
+            let mut group = std::mem::take(&mut self.group);
+            group.clear();
+            group.extend(self.members[from..to].iter().map(|m| m.1));
             if took != u32::MAX {
                 group.push(took);
             }
             if group.len() > 1 {
                 self.split(config, scan, table, predicted, &look, j, took, &group);
             }
+            self.group = group;
             from = to;
         }
         self.parts.sort_unstable_by_key(|p| p.track);

@@ -124,11 +124,9 @@ impl Tracker {
             }
             (None, prior) => {
                 let (velocity, variance) = prior.unwrap_or_default();
-                {
-                    let start = from_one_point(&d.position, &n.matrix(), velocity, variance);
-                    let Ok(belief) = config.belief(&start, d.extent.height_px) else { return };
-                    (belief, 1.0)
-                }
+                let start = from_one_point(&d.position, &n.matrix(), velocity, variance);
+                let Ok(belief) = config.belief(&start, d.extent.height_px) else { return };
+                (belief, 1.0)
             }
         };
         let n_points = if first.is_some() { 2 } else { 1 };

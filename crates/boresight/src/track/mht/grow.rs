@@ -3,7 +3,7 @@
 //! A leaf whose life ends (score, existence, coasting budget) is cut at once. New targets start from one point with
 //! unknown velocity; those that the next scans do not bear out die by their score.
 
-use super::super::birth::{BirthConfig, from_one_point};
+use super::super::birth::from_one_point;
 use super::super::gating::{Noise, Predicted, innovation_cov, normalised_square};
 use super::super::life::{Evidence, Verdict};
 use super::super::living::Outcome;
@@ -132,10 +132,6 @@ impl Mht {
         let (velocity, variance) =
             c.birth.velocity_prior().unwrap_or((Vector2::zeros(), Vector2::repeat(third * third)));
         let weak = c.two_stage.as_ref().map_or(f32::NEG_INFINITY, |t| t.high_score);
-        debug_assert!(matches!(
-            c.birth,
-            BirthConfig::OnePoint(_) | BirthConfig::TwoPoint(_) | BirthConfig::VelocityBounds(_)
-        ));
         for (j, d) in scan.detections.iter().enumerate() {
             if d.score < weak || !c.proof.may_start(d.score) || self.trees.len() >= c.max_tracks as usize {
                 continue;

@@ -20,12 +20,12 @@ use super::clutter::Clutter;
 use super::config::{TrackerConfig, check, positive};
 use super::gating::{Predicted, ScanTable};
 use super::life::Life;
-use super::living::Outcome;
+use super::living::{Outcome, state_of};
 use super::pace::Pace;
 use super::proof::Proof;
 use super::terms::{Look, Terms};
 use crate::associate::Gates;
-use crate::{Error, ErrorKind, Extent, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
+use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackState};
 use boresight_filters::Filter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -155,11 +155,6 @@ impl Mht {
         })
     }
 
-    /// Number of histories alive.
-    pub fn n_hypotheses(&self) -> usize {
-        self.trees.iter().map(|t| t.leaves.len()).sum()
-    }
-
     fn coast_budget_s(&self) -> f64 {
         self.config.coast_s.max(f64::from(self.config.coast_scans) * self.pace.interval_s())
     }
@@ -170,7 +165,7 @@ impl Mht {
         if pace_s > 0.0 {
             for tree in &mut self.trees {
                 tree.leaves.retain(|l| {
-                    let silent_s = now.seconds_since(Timestamp::from_ns(l.life.last_hit_ns));
+                    let silent_s = now.seconds_since(Timestamp::from_ns(l.life.last_seen_ns()));
                     silent_s - pace_s < budget_s - 1e-9
                 });
             }
@@ -216,25 +211,8 @@ impl Mht {
             let kinematics = leaf.belief.kinematics();
             let at = [kinematics.mean[0], kinematics.mean[2]];
             let proven = leaf.proof.holds(&self.config.proof, at, self.table.camera, leaf.outcome.hit);
-            let [width_px, height_px] = leaf.look.size;
-            self.states.push(TrackState {
-                id: TrackId(tree.id),
-                status: match (leaf.life.confirmed && proven, leaf.outcome.hit) {
-                    (false, _) => TrackStatus::Tentative,
-                    (true, true) => TrackStatus::Confirmed,
-                    (true, false) => TrackStatus::Coasting,
-                },
-                extent: Extent {
-                    left_px: kinematics.mean[0] - 0.5 * width_px,
-                    top_px: kinematics.mean[2] - 0.5 * height_px,
-                    width_px,
-                    height_px,
-                },
-                kinematics,
-                detection: leaf.outcome.detection,
-                innovation: leaf.outcome.innovation,
-                score: self.config.life.confidence(&leaf.life),
-            });
+            let state = state_of(tree.id, kinematics, &leaf.look, &leaf.life, proven, &leaf.outcome, &self.config);
+            self.states.push(state);
         }
         self.states.sort_by_key(|s| s.id);
     }
