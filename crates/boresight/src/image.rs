@@ -1,11 +1,23 @@
 //! A plain image: rows of pixels without padding, any pixel type.
 
 /// A `width` x `height` image, row by row from the top, no padding; `(x, y)` = (column, row).
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct Image<T> {
     width: usize,
     height: usize,
     data: Vec<T>,
+}
+
+impl<T: Clone> Clone for Image<T> {
+    fn clone(&self) -> Self {
+        Self { width: self.width, height: self.height, data: self.data.clone() }
+    }
+
+    /// As [`Clone::clone`], into the memory that is there.
+    fn clone_from(&mut self, source: &Self) {
+        (self.width, self.height) = (source.width, source.height);
+        self.data.clone_from(&source.data);
+    }
 }
 
 impl<T: Copy> Image<T> {

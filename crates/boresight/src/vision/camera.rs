@@ -13,10 +13,15 @@ use super::pixel::Pixel;
 use crate::{Image, Pixels};
 use nalgebra::Vector2;
 
+/// Side of a patch, reduced px.
 const PATCH: usize = 12;
+/// How far a patch is looked for around where the last one was found, reduced px.
 const SEARCH: i64 = 10;
+/// Cells of the key frame in x and y, each with one patch.
 const CELLS: (usize, usize) = (8, 6);
+/// Patches that must agree.
 const MIN_PATCHES: usize = 6;
+/// Wider frames are reduced to at most this width, px.
 const REDUCED_PX: usize = 320;
 /// Texture below this many times that of the image's quiet quarter has no vote.
 const QUIET_TIMES: f32 = 2.0;
@@ -33,6 +38,16 @@ struct Patch {
     y: usize,
     /// Weight of its vote: the texture above the noise, capped.
     weight: f64,
+}
+
+/// The most textured patch of a cell of the key frame.
+#[derive(Clone, Copy, Debug)]
+struct Textured {
+    texture: f32,
+    /// Number of the cell, row by row.
+    cell: usize,
+    x: usize,
+    y: usize,
 }
 
 /// Where one patch was found, relative to the key frame, reduced px.
@@ -53,6 +68,7 @@ pub struct CameraMotion {
     from_key: Vector2<f64>,
     votes: Vec<Vote>,
     textures: Vec<f32>,
+    best: Vec<Textured>,
 }
 
 impl CameraMotion {
@@ -96,12 +112,12 @@ impl CameraMotion {
             return;
         }
         self.textures.clear();
-        let mut best: Vec<(f32, usize, usize)> = Vec::with_capacity(CELLS.0 * CELLS.1);
+        self.best.clear();
         for cy in 0..CELLS.1 {
             for cx in 0..CELLS.0 {
                 let (x0, x1) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
                 let (y0, y1) = (h * cy / CELLS.1, h * (cy + 1) / CELLS.1);
-                let mut top: Option<(f32, usize, usize)> = None;
+                let mut top: Option<Textured> = None;
                 for y in (y0..y1).step_by(4) {
                     for x in (x0..x1).step_by(4) {
                         if x + PATCH + 1 >= w || y + PATCH + 1 >= h {
@@ -110,13 +126,13 @@ impl CameraMotion {
                         let texture = texture(image, x, y);
                         if texture.is_finite() {
                             self.textures.push(texture);
-                            if top.as_ref().is_none_or(|t| texture > t.0) {
-                                top = Some((texture, x, y));
+                            if top.as_ref().is_none_or(|t| texture > t.texture) {
+                                top = Some(Textured { texture, cell: cy * CELLS.0 + cx, x, y });
                             }
                         }
                     }
                 }
-                best.extend(top);
+                self.best.extend(top);
             }
         }
         if self.textures.is_empty() {
@@ -126,15 +142,15 @@ impl CameraMotion {
         // Before a sky the quiet quarter is noise, whose fixed pattern stands still whatever the camera does, and the most textured
         // of many patches of noise has a little more of it: only what is above has a vote, and the more the stronger.
         let quiet = QUIET_TIMES * self.textures[(self.textures.len() - 1) / 4];
-        best.retain(|b| b.0 > quiet);
-        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.best.retain(|b| b.texture > quiet);
+        self.best.sort_unstable_by(|a, b| b.texture.total_cmp(&a.texture).then(a.cell.cmp(&b.cell)));
         // A few outstanding things may be targets: they count no more than the next. The square holds down the many weak ones, which
         // in a compressed video are often mere copies of the frame before.
-        let Some(cap) = best.get(MIN_PATCHES - 1).map(|b| b.0 - quiet) else { return };
-        self.patches.extend(best.iter().map(|&(t, x, y)| Patch {
-            x,
-            y,
-            weight: f64::from((t - quiet).min(cap) / cap).powi(2),
+        let Some(cap) = self.best.get(MIN_PATCHES - 1).map(|b| b.texture - quiet) else { return };
+        self.patches.extend(self.best.iter().map(|b| Patch {
+            x: b.x,
+            y: b.y,
+            weight: f64::from((b.texture - quiet).min(cap) / cap).powi(2),
         }));
     }
 

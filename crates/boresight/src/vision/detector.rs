@@ -10,6 +10,7 @@ use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
 use super::stage::Stage;
+use super::strongest::Strongest;
 use super::threshold::band::words;
 use super::threshold::grid::BackgroundGrid;
 use super::threshold::level::{band_edge, one_band, one_side};
@@ -70,6 +71,7 @@ struct ThresholdDetector {
     bright: Clusterer,
     dark: Clusterer,
     samples: Vec<f32>,
+    strongest: Strongest,
     isolated: IsolatedDetector,
     spots: Option<SpotDetector>,
     colour: Option<ColourMask>,
@@ -111,6 +113,7 @@ impl ThresholdDetector {
             bright: Clusterer::new(&config.cluster),
             dark: Clusterer::new(&config.cluster),
             samples: Vec::new(),
+            strongest: Strongest::default(),
             isolated: IsolatedDetector::default(),
             config,
         })
@@ -189,14 +192,14 @@ impl ThresholdDetector {
     ) {
         if let ThresholdConfig::Isolated(c) = &self.config.threshold {
             self.isolated.run(image, &self.config, c, scan);
-            keep_strongest(&mut scan.detections, self.config.max_detections);
+            self.strongest.keep(&mut scan.detections, self.config.max_detections);
             return;
         }
         if let Some(spots) = &mut self.spots {
             spots.detect(image, (variance, gain), &mut scan.detections);
             let extra = nalgebra::Matrix2::identity() * self.config.centroid.extra_sd_px.powi(2);
             scan.detections.iter_mut().for_each(|d| d.cov += extra);
-            keep_strongest(&mut scan.detections, self.config.max_detections);
+            self.strongest.keep(&mut scan.detections, self.config.max_detections);
             return;
         }
         let above_background = self.above_background();
@@ -274,7 +277,7 @@ impl ThresholdDetector {
                 scan.detections.push(detection(region, image, &self.config, method, &around, dark));
             }
         }
-        keep_strongest(&mut scan.detections, self.config.max_detections);
+        self.strongest.keep(&mut scan.detections, self.config.max_detections);
     }
 }
 
@@ -307,25 +310,6 @@ fn detection<T: Pixel>(
         score,
         class: None,
     }
-}
-
-/// Keeps the `limit` detections with the largest score, in their order.
-fn keep_strongest(detections: &mut Vec<Detection>, limit: Option<u32>) {
-    let Some(limit) = limit.map(|l| l as usize) else { return };
-    if detections.len() <= limit {
-        return;
-    }
-    let mut order: Vec<usize> = (0..detections.len()).collect();
-    order.sort_by(|&a, &b| detections[b].score.total_cmp(&detections[a].score).then(a.cmp(&b)));
-    let mut keep = vec![false; detections.len()];
-    for &i in order.iter().take(limit) {
-        keep[i] = true;
-    }
-    let mut i = 0;
-    detections.retain(|_| {
-        i += 1;
-        keep[i - 1]
-    });
 }
 
 impl Detector for ThresholdDetector {

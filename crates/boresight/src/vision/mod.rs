@@ -20,6 +20,7 @@ pub mod region;
 mod runs;
 pub mod spatial;
 mod stage;
+mod strongest;
 pub mod tbd;
 pub mod threshold;
 pub mod window;

@@ -9,6 +9,7 @@ use super::pixel::Pixel;
 use super::threshold::grid::median_and_deviation;
 use crate::Image;
 
+/// Pixels looked at, at most: the error of a MAD from so many is below 2 %.
 const MAX_SAMPLES: usize = 8192;
 
 /// Returns the standard deviation of one pixel's noise, counts; `samples` is scratch.

@@ -109,6 +109,7 @@ pub struct BandProposal {
     pub background: Level,
 }
 
+/// Bins of the histogram, for 8 bits a level each.
 const BINS: usize = 256;
 
 /// Proposes the band that separates a target from the ring of `margin_px` around it.

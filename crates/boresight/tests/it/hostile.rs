@@ -3,6 +3,7 @@
 //! The same parsers have targets for `cargo fuzz` in `fuzz/`; this test needs no other toolchain. `BORESIGHT_MUTATIONS`
 //! sets how often each file is damaged (default 60).
 
+use super::memory::peak_of;
 use boresight::io::tracks::{Format, ReadOptions, read, write};
 use boresight::io::{OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_tracks};
 use boresight::metrics::{MatchOptions, evaluate};
@@ -10,66 +11,11 @@ use boresight::sim::{SceneConfig, Seed, named};
 use boresight::{Config, Error};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 /// Most bytes that one input may have in use at a time. Frames are limited to 2¹⁶ pixels here and files are small; but while
 /// the `tiff` crate opens a file, its own default limits hold (256 MiB, of which damage can bring half to be taken).
 const MOST_BYTES: isize = 320 << 20;
-
-thread_local! {
-    static NOW: Cell<isize> = const { Cell::new(0) };
-    static PEAK: Cell<isize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, which also counts the bytes in use by each thread.
-struct Counting;
-
-impl Counting {
-    fn count(by: isize) {
-        // A thread that ends has no counters any more: nothing is measured then.
-        let _ = NOW.try_with(|now| {
-            now.set(now.get() + by);
-            let _ = PEAK.try_with(|peak| peak.set(peak.get().max(now.get())));
-        });
-    }
-}
-
-// SAFETY: every call goes on to the system's allocator with the same arguments; counting touches plain cells only.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        Self::count(layout.size() as isize);
-        // SAFETY: as promised by our caller.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        Self::count(layout.size() as isize);
-        // SAFETY: as promised by our caller.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-    unsafe fn dealloc(&self, ptr: *mut u8, layout: Layout) {
-        Self::count(-(layout.size() as isize));
-        // SAFETY: as promised by our caller.
-        unsafe { System.dealloc(ptr, layout) }
-    }
-    unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        Self::count(size as isize - layout.size() as isize);
-        // SAFETY: as promised by our caller.
-        unsafe { System.realloc(ptr, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Runs something and says how many bytes it had in use at most.
-fn peak_of(run: impl FnOnce()) -> isize {
-    let before = NOW.get();
-    PEAK.set(before);
-    run();
-    PEAK.get() - before
-}
 
 /// Damages bytes: hits, cuts, doublings, numbers of extreme size.
 fn damaged(sound: &[u8], seed: u64) -> Vec<u8> {

@@ -8,6 +8,7 @@ mod fuse_real;
 mod golden;
 mod hostile;
 mod images;
+mod memory;
 mod metrics;
 mod reproduce;
 mod rooms;

@@ -12,7 +12,7 @@ use boresight::vision::{Detector, build};
 use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
 
 /// Every threshold; the match makes a new one fail to compile until it is here.
-fn thresholds() -> Vec<ThresholdConfig> {
+pub fn thresholds() -> Vec<ThresholdConfig> {
     let local = |polarity| ThresholdConfig::Local(LocalConfig { k: 2.0, polarity, cell_px: 8, min_contrast: 0.0 });
     let spot = |polarity| ThresholdConfig::Spot(SpotConfig { size_px: 5.0, k: 2.0, polarity, ..Default::default() });
     let all = vec![
@@ -47,7 +47,7 @@ fn thresholds() -> Vec<ThresholdConfig> {
     all
 }
 
-fn source(width: usize, height: usize, kind: PixelKind) -> SourceInfo {
+pub fn source(width: usize, height: usize, kind: PixelKind) -> SourceInfo {
     SourceInfo {
         label: "test".into(),
         reader: "test".into(),

@@ -57,6 +57,8 @@ pub struct Background<T: BackgroundPixel> {
     n_averaged: u64,
     /// Frames of the start-up, evenly spread in time.
     samples: Vec<Image<T>>,
+    /// Scratch: the deviations on the grid, counts.
+    deviations: Vec<f32>,
     typical: f32,
     light: Light,
     grid: Grid,
@@ -82,6 +84,7 @@ impl<T: BackgroundPixel> Background<T> {
             n_frames: 0,
             n_averaged: 0,
             samples: Vec::new(),
+            deviations: Vec::new(),
             typical: 1.0,
             light: light::SAME,
             grid: Grid::default(),
@@ -236,7 +239,8 @@ impl<T: BackgroundPixel> Background<T> {
 
     /// Median of the deviations on the grid, counts.
     fn typical_deviation(&mut self) -> f32 {
-        let mut all = Vec::new();
+        let all = &mut self.deviations;
+        all.clear();
         for y in (0..self.mean.height()).step_by(GRID_PX) {
             all.extend(self.deviation.row(y).iter().step_by(GRID_PX).map(|&d| T::counts(d)));
         }

@@ -20,12 +20,24 @@ pub enum CleanUp {
 }
 
 /// A black and white image, 64 pixels a word.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct BitImage {
     width: usize,
     height: usize,
     words: usize,
     bits: Vec<u64>,
+}
+
+impl Clone for BitImage {
+    fn clone(&self) -> Self {
+        Self { bits: self.bits.clone(), ..*self }
+    }
+
+    /// As [`Clone::clone`], into the memory that is there.
+    fn clone_from(&mut self, source: &Self) {
+        (self.width, self.height, self.words) = (source.width, source.height, source.words);
+        self.bits.clone_from(&source.bits);
+    }
 }
 
 impl BitImage {

@@ -25,7 +25,9 @@ pub struct Reference {
     pub area_px: f64,
 }
 
+/// Windows of hue, 15 degrees each.
 const WINDOWS: usize = 24;
+/// Below this saturation a pixel has no hue worth the name.
 const MIN_SATURATION: f64 = 0.1;
 /// Difference of a channel from the background that counts as moving, counts.
 const MOVED: u8 = 25;

@@ -8,6 +8,7 @@ use crate::Image;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::Side;
 
+/// Pixels looked at for the two quantiles, at most.
 const MAX_SAMPLES: usize = 16_384;
 
 /// Writes the levels for `side`, from the background towards the extreme.
@@ -53,7 +54,7 @@ pub fn choose<T: Pixel>(
         // Between two whole values all levels are the same.
         levels.iter_mut().for_each(|l| *l = l.ceil());
     }
-    levels.sort_by(f64::total_cmp);
+    levels.sort_unstable_by(f64::total_cmp);
     let apart = f64::from(T::STEP).max(0.5 * noise);
     let mut last = low;
     levels.retain(|&l| {

@@ -23,6 +23,7 @@ use super::config::{DetectorConfig, NoiseConfig, wrong};
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
 use super::region::Region;
+use super::strongest::Strongest;
 use super::threshold::band::words;
 use super::threshold::{Polarity, Side};
 use crate::{Detection, Extent, Image, Result, Scan};
@@ -101,6 +102,8 @@ struct Candidate {
     background: f64,
     peak: f64,
     score: f64,
+    /// Place in the order of the levels and, within one, of the rows.
+    number: usize,
 }
 
 /// Finds isolated blobs; keeps its memory between frames.
@@ -113,6 +116,7 @@ pub struct IsolatedDetector {
     bits: Vec<u64>,
     candidates: Vec<Candidate>,
     taken: Vec<bool>,
+    strongest: Strongest,
 }
 
 impl IsolatedDetector {
@@ -135,7 +139,10 @@ impl IsolatedDetector {
                 self.side(image, config, isolated, side, noise, scan);
             }
         }
-        scan.detections.sort_by(|a, b| b.score.total_cmp(&a.score));
+        // One side's are in that order already.
+        if isolated.polarity == Polarity::Both {
+            self.strongest.sort(&mut scan.detections);
+        }
     }
 
     fn side<T: Pixel>(
@@ -171,13 +178,14 @@ impl IsolatedDetector {
                 if let Some(c) = self.ring.judge(image, side, level, &blob, noise)
                     && c.score >= isolated.min_score
                 {
-                    self.candidates.push(c);
+                    self.candidates.push(Candidate { number: self.candidates.len(), ..c });
                 }
             }
         }
         // Best first; ties by place, so that the order never depends on anything else.
-        self.candidates.sort_by(|a, b| {
-            b.score.total_cmp(&a.score).then(a.blob.top.cmp(&b.blob.top)).then(a.blob.seed.cmp(&b.blob.seed))
+        self.candidates.sort_unstable_by(|a, b| {
+            let place = |c: &Candidate| (c.blob.top, c.blob.seed, c.number);
+            b.score.total_cmp(&a.score).then(place(a).cmp(&place(b)))
         });
         let candidates = std::mem::take(&mut self.candidates);
         let mut taken = std::mem::take(&mut self.taken);

@@ -10,6 +10,7 @@ use crate::vision::pixel::Pixel;
 use crate::vision::threshold::Side;
 use nalgebra::{Matrix3, Vector3};
 
+/// Pixels of a ring looked at, at most and at least; a plane has three parameters.
 const MAX_SAMPLES: f64 = 600.0;
 const MIN_SAMPLES: usize = 8;
 
@@ -75,7 +76,7 @@ impl Ring {
         }
         let unit = noise + f64::from(T::STEP) + spread;
         let score = if unit > 0.0 { height / unit } else { f64::from(f32::MAX) };
-        Some(Candidate { blob: *blob, level, background: sign * plane[0], peak, score })
+        Some(Candidate { blob: *blob, level, background: sign * plane[0], peak, score, number: 0 })
     }
 }
 

@@ -13,6 +13,7 @@ pub const SD_PER_MAD: f64 = 1.482_602_218_505_602;
 
 /// Samples of one frame are at most about this many.
 const SAMPLE_BUDGET: usize = 1 << 17;
+/// But a cell has at least so many, so that its median means something.
 const MIN_SAMPLES_PER_CELL: usize = 64;
 
 /// Median and deviation of the local background.

@@ -6,6 +6,7 @@
 use crate::Image;
 use crate::vision::pixel::Pixel;
 
+/// Bins of the histogram, for 8 bits a level each.
 const BINS: usize = 1024;
 
 /// Returns the level between two pixel values that splits the image best, counts, or `None` if all values are the same.

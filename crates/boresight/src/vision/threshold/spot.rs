@@ -58,6 +58,7 @@ pub struct SpotDetector {
     grid: BackgroundGrid,
     level: Vec<f32>,
     spots: Vec<Spot>,
+    keep: Vec<bool>,
     found: Vec<Found>,
 }
 
@@ -93,6 +94,7 @@ impl SpotDetector {
             grid: BackgroundGrid::new(cell),
             level: Vec::new(),
             spots: Vec::new(),
+            keep: Vec::new(),
             found: Vec::new(),
         }
     }
@@ -124,7 +126,7 @@ impl SpotDetector {
             }));
             self.found = found;
         }
-        self.found.sort_by_key(|f| (f.peak.1, f.peak.0));
+        self.found.sort_unstable_by_key(|f| (f.peak.1, f.peak.0));
         let kept = (0..self.found.len()).filter(|&i| !self.is_side_lobe(i));
         out.extend(kept.map(|i| self.found[i].detection.clone()));
         self.found.clear();
@@ -236,7 +238,8 @@ impl SpotDetector {
     /// Of spots closer than size / 2 the strongest stays.
     fn drop_doubles(&mut self) {
         let reach2 = (self.config.size_px / 2.0).powi(2);
-        let mut keep = vec![true; self.spots.len()];
+        self.keep.clear();
+        self.keep.resize(self.spots.len(), true);
         // Spots come in raster order of their peaks, and no position is further from its peak than the disc moves.
         let window = self.radius + 10;
         for i in 0..self.spots.len() {
@@ -246,15 +249,12 @@ impl SpotDetector {
                     break;
                 }
                 if (a.position - b.position).norm_squared() < reach2 {
-                    keep[if b.mass > a.mass { i } else { j }] = false;
+                    self.keep[if b.mass > a.mass { i } else { j }] = false;
                 }
             }
         }
-        let mut i = 0;
-        self.spots.retain(|_| {
-            i += 1;
-            keep[i - 1]
-        });
+        let mut keep = self.keep.iter();
+        self.spots.retain(|_| keep.next().is_none_or(|k| *k));
     }
 
     fn detection(&self, spot: &Spot, (variance, gain): (f64, f64), sign: f32) -> Detection {
