@@ -37,7 +37,7 @@ pub struct Compared {
 /// Draws `n_draws` times and compares; `units[r][u]` are the scores of result r on unit u, `whole[r]` its score on all.
 /// `measure` picks the number to compare. The same `seed` gives the same intervals.
 /// # Errors
-/// Fewer than two units; results of different numbers of units; a level outside (0, 1).
+/// Fewer than two units; results of different numbers of units; a level outside (0, 1); no draws.
 pub fn compare(
     units: &[Vec<Scores>],
     whole: &[Scores],
@@ -56,6 +56,9 @@ pub fn compare(
     }
     if !(level > 0.0 && level < 1.0) {
         return Err(Error::new(ErrorKind::Config, "expected a probability in (0, 1)").at(format!("level = {level}")));
+    }
+    if n_draws == 0 {
+        return Err(Error::new(ErrorKind::Config, "expected at least one draw").at("draws = 0"));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut draws: Vec<Vec<f64>> = vec![Vec::with_capacity(n_draws); units.len()];
@@ -94,7 +97,7 @@ pub fn compare(
             Compared {
                 score: interval(draws[r].clone(), value[r], piecewise[r]),
                 difference: interval(difference, value[r] - value[0], piecewise[r] - piecewise[0]),
-                share_above: above / n_draws.max(1) as f64,
+                share_above: above / n_draws as f64,
             }
         })
         .collect())
@@ -124,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_fixes_the_interval_and_one_unit_is_refused() {
+    fn the_seed_fixes_the_interval_and_too_few_units_or_draws_are_refused() {
         let a: Vec<Scores> = (0..5).map(|k| unit(60 + 7 * k, 5)).collect();
         let run = |seed| {
             compare(std::slice::from_ref(&a), &[Scores::combined(&a)], |s| s.clear.mota(), 0.9, 100, seed).unwrap()[0]
@@ -132,5 +135,6 @@ mod tests {
         };
         assert_eq!(run(1), run(1));
         assert!(compare(&[vec![unit(1, 1)]], &[unit(1, 1)], |s| s.clear.mota(), 0.9, 10, 1).is_err());
+        assert!(compare(std::slice::from_ref(&a), &[unit(1, 1)], |s| s.clear.mota(), 0.9, 0, 1).is_err());
     }
 }

@@ -101,17 +101,6 @@ pub fn average(values: &[f64], dimension: usize, probability: f64) -> Result<Con
     })
 }
 
-/// Averages over runs for each scan: `runs[r][k]` is the value of run r at scan k.
-/// # Errors
-/// As [`average`]; runs of different lengths.
-pub fn average_over_runs(runs: &[Vec<f64>], dimension: usize, probability: f64) -> Result<Vec<Consistency>> {
-    let n_scans = runs.first().map_or(0, Vec::len);
-    if runs.iter().any(|r| r.len() != n_scans) {
-        return Err(Error::new(ErrorKind::Config, "expected runs of the same number of scans"));
-    }
-    (0..n_scans).map(|k| average(&runs.iter().map(|r| r[k]).collect::<Vec<_>>(), dimension, probability)).collect()
-}
-
 /// Noncredibility index: 10 times the mean of |log10(ε / ε*)|, with ε* from the true mean square error; 0 is credible.
 /// The second number, the inclination indicator, has the sign kept: above 0 the filter is optimistic.
 /// # Errors

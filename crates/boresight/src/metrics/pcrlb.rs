@@ -61,11 +61,6 @@ pub fn rmspe_without_prior(r_px2: f64, n_scans: usize) -> f64 {
     (2.0 * (1..=n_scans).map(|k| variance(k as f64)).sum::<f64>() / n_scans.max(1) as f64).sqrt()
 }
 
-/// A measured RMS error over its bound: 1 is perfect, below 1 the model or the bound is wrong.
-pub fn ratio_to_bound(rms_error: f64, bounds_variance: &[f64]) -> f64 {
-    rms_error / (bounds_variance.iter().sum::<f64>() / bounds_variance.len().max(1) as f64).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -36,12 +36,8 @@ pub enum KittiClass {
     Pedestrian,
 }
 
-/// Class numbers of KITTI's names, as in TrackEval.
-pub const KITTI_CLASSES: [(&str, i32); 8] =
-    [("car", 1), ("van", 2), ("truck", 3), ("pedestrian", 4), ("person", 5), ("cyclist", 6), ("tram", 7), ("misc", 8)];
-
 impl KittiClass {
-    /// The class and its neighbour.
+    /// The class and its neighbour (car and van, pedestrian and person), by TrackEval's numbers, which the reader gives.
     fn numbers(self) -> (i32, i32) {
         match self {
             Self::Car => (1, 2),
@@ -50,6 +46,7 @@ impl KittiClass {
     }
 }
 
+/// KITTI's limits, as in TrackEval: lower boxes and more hidden truths are neither demanded nor punished.
 const MIN_HEIGHT_PX: f64 = 25.0;
 const MAX_OCCLUSION: i32 = 2;
 

@@ -10,7 +10,7 @@ mod column;
 pub use builder::TrackTableBuilder;
 pub use column::Column;
 
-use crate::{Error, ErrorKind, Extent, Result};
+use crate::{Extent, Result};
 use std::ops::Range;
 
 /// What a table's coordinates count from.
@@ -148,26 +148,6 @@ impl TrackTable {
         if self.starts.len() < n_frames + 1 {
             self.starts.resize(n_frames + 1, last);
         }
-    }
-
-    /// Shifts all frame numbers by `by` (negative: towards 0); frames that would fall below 0 make it fail.
-    /// # Errors
-    /// Rows below frame 0.
-    pub fn shift_frames(&mut self, by: i64) -> Result<()> {
-        if by >= 0 {
-            let zeros = std::iter::repeat_n(0, by as usize);
-            self.starts = zeros.chain(self.starts.iter().copied()).collect();
-        } else {
-            let n = by.unsigned_abs() as usize;
-            if self.starts.get(n).copied().unwrap_or(u32::MAX) != 0 {
-                return Err(Error::new(ErrorKind::Config, format!("rows stand before frame {n}")).at(&self.label));
-            }
-            self.starts.drain(..n);
-        }
-        for (frame, _) in &mut self.ignore {
-            *frame = (i64::from(*frame) + by).clamp(0, i64::from(u32::MAX)) as u32;
-        }
-        Ok(())
     }
 
     /// A row's box in boresight's pixel-edge coordinates.

@@ -15,6 +15,7 @@ use sparse::{Edges, SparseMatcher};
 
 /// No partner.
 pub const NONE: u32 = u32::MAX;
+/// Largest problem that is laid out in full, entries (512 MB); larger ones are solved on their positive pairs.
 const DENSE_LIMIT: usize = 1 << 26;
 
 /// A positive pair of a frame: row (truth), column (result), weight.
