@@ -101,7 +101,11 @@ fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     }
     match args.associator.as_deref() {
         Some("mht") => config = config.with("tracker.mht={}")?,
-        Some(name) => config = config.with(&format!("tracker.associator.{name}={{}}"))?,
+        Some(name) => {
+            config = config.with(&format!("tracker.associator.{name}={{}}"))?;
+            // Multiple hypotheses would take its place.
+            config.tracker.mht = None;
+        }
         None => {}
     }
     for set in &args.sets {
@@ -198,4 +202,29 @@ pub fn outcome(summary: &Summary, broken: Option<Error>) -> anyhow::Result<ExitC
         return Err(e.hint(format!("the {} frames before it are in the results", summary.frames)).into());
     }
     Ok(if summary.interrupted { ExitCode::from(130) } else { ExitCode::SUCCESS })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_associator_that_is_asked_for_replaces_multiple_hypotheses() {
+        let mut args = InputArgs {
+            input: "-".into(),
+            config: None,
+            sets: Vec::new(),
+            filter: None,
+            associator: Some("mht".into()),
+            rate_hz: None,
+            columns: None,
+            skip_bad_rows: false,
+            quiet: true,
+        };
+        let mht = changed(Config::default(), &args).unwrap();
+        assert!(mht.tracker.mht.is_some());
+        args.associator = Some("jpda".into());
+        let jpda = changed(mht, &args).unwrap();
+        assert!(jpda.tracker.mht.is_none() && jpda.to_toml().unwrap().contains("[tracker.associator.jpda]"));
+    }
 }
