@@ -94,10 +94,18 @@ impl<const W: usize, T: Real> NoiseLearner<W, T> {
 
     /// Takes the innovation of an update: what was predicted and the measurement as it was used.
     /// # Errors
-    /// [`FilterError::NotPositiveDefinite`] if the innovation covariance cannot be factored.
+    /// [`FilterError::NotPositiveDefinite`] if the innovation covariance cannot be factored; nothing is then learnt.
     pub fn learn(&mut self, predicted: &Gaussian<2, T>, m: &Measurement<T>) -> Result<(), FilterError> {
         let nu = m.position - predicted.mean;
         let sample = nu * nu.transpose() - predicted.cov;
+        if self.config.process_noise {
+            let s = invert_pair(&(predicted.cov + m.cov), "the innovation covariance")?;
+            let ratio = s.distance2(&nu).min(T::of(9.0)) * T::of(0.5);
+            // E[ln(χ²₂/2)] = -γ (Euler): centred, so that a consistent filter keeps its scale.
+            let ln = ratio.max(T::of(1e-6)).ln() + T::of(0.577_215_664_901_532_9);
+            let step = (ln * self.config.scale_rate).exp();
+            self.scale = (self.scale * step).max(T::of(1e-6)).min(T::of(1e6));
+        }
         match self.config.memory {
             Memory::Windowed => {
                 let at = self.n % W;
@@ -113,14 +121,6 @@ impl<const W: usize, T: Real> NoiseLearner<W, T> {
             }
         }
         self.n += 1;
-        if self.config.process_noise {
-            let s = invert_pair(&(predicted.cov + m.cov), "the innovation covariance")?;
-            let ratio = s.distance2(&nu).min(T::of(9.0)) * T::of(0.5);
-            // E[ln(χ²₂/2)] = -γ (Euler): centred, so that a consistent filter keeps its scale.
-            let ln = ratio.max(T::of(1e-6)).ln() + T::of(0.577_215_664_901_532_9);
-            let step = (ln * self.config.scale_rate).exp();
-            self.scale = (self.scale * step).max(T::of(1e-6)).min(T::of(1e6));
-        }
         Ok(())
     }
 
@@ -215,23 +215,5 @@ where
         )
     }
 
-    fn belief(&self) -> Gaussian<N, T> {
-        self.filter.belief()
-    }
-
-    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
-        self.filter.set_belief(belief)
-    }
-
-    fn position_at(&self) -> [usize; 2] {
-        self.filter.position_at()
-    }
-
-    fn kinematics(&self) -> Gaussian<4, T> {
-        self.filter.kinematics()
-    }
-
-    fn predicted(&self) -> Gaussian<2, T> {
-        self.filter.predicted()
-    }
+    crate::filter::belief_of_the_filter_inside!();
 }

@@ -125,6 +125,32 @@ where
     }
 }
 
+/// The parts of [`GaussianFilter`] that a wrapper leaves to the filter inside (its field `filter`).
+macro_rules! belief_of_the_filter_inside {
+    () => {
+        fn belief(&self) -> Gaussian<N, T> {
+            self.filter.belief()
+        }
+
+        fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
+            self.filter.set_belief(belief)
+        }
+
+        fn position_at(&self) -> [usize; 2] {
+            self.filter.position_at()
+        }
+
+        fn kinematics(&self) -> Gaussian<4, T> {
+            self.filter.kinematics()
+        }
+
+        fn predicted(&self) -> Gaussian<2, T> {
+            self.filter.predicted()
+        }
+    };
+}
+pub(crate) use belief_of_the_filter_inside;
+
 /// Makes a [`Filter`] of a [`GaussianFilter`] with N states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked<F, const N: usize>(pub F);

@@ -130,21 +130,8 @@ impl<F: GaussianFilter<N, Real = T>, const N: usize, T: Real> GaussianFilter<N> 
         self.innovation.remember(mean);
         Ok(())
     }
-    fn belief(&self) -> Gaussian<N, T> {
-        self.filter.belief()
-    }
-    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
-        self.filter.set_belief(belief)
-    }
-    fn position_at(&self) -> [usize; 2] {
-        self.filter.position_at()
-    }
-    fn kinematics(&self) -> Gaussian<4, T> {
-        self.filter.kinematics()
-    }
-    fn predicted(&self) -> Gaussian<2, T> {
-        self.filter.predicted()
-    }
+
+    crate::filter::belief_of_the_filter_inside!();
 }
 
 #[cfg(test)]

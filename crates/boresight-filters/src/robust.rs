@@ -24,7 +24,7 @@ pub enum Innovation<T = f64> {
         /// Threshold k in standard deviations, above 0.
         threshold: T,
     },
-    /// Student-t weight (n + 2)/(n + d²), at most 1. 4 is a common choice; infinity is the plain filter.
+    /// Student-t weight (n + 2)/(n + d²), at most 1. 4 is a common choice; the larger, the nearer to the plain filter.
     StudentT {
         /// Degrees of freedom n, above 0.
         degrees_of_freedom: T,
@@ -123,21 +123,8 @@ impl<F: GaussianFilter<N, Real = T>, const N: usize, T: Real> GaussianFilter<N> 
             weight: h.weight,
         }))
     }
-    fn belief(&self) -> Gaussian<N, T> {
-        self.filter.belief()
-    }
-    fn set_belief(&mut self, belief: &Gaussian<N, T>) -> Result<(), FilterError> {
-        self.filter.set_belief(belief)
-    }
-    fn position_at(&self) -> [usize; 2] {
-        self.filter.position_at()
-    }
-    fn kinematics(&self) -> Gaussian<4, T> {
-        self.filter.kinematics()
-    }
-    fn predicted(&self) -> Gaussian<2, T> {
-        self.filter.predicted()
-    }
+
+    crate::filter::belief_of_the_filter_inside!();
 }
 
 #[cfg(test)]

@@ -95,15 +95,6 @@ impl<const N: usize, T: Real> Cholesky<N, T> {
         }
         x
     }
-
-    /// Returns ln det A.
-    pub fn ln_det(&self) -> T {
-        let mut sum = T::zero();
-        for i in 0..N {
-            sum += self.l[(i, i)].ln();
-        }
-        sum * T::of(2.0)
-    }
 }
 
 #[cfg(test)]
