@@ -14,6 +14,7 @@ use gif::{ColorOutput, DecodeOptions, Decoder, DisposalMethod, MemoryLimit};
 use std::io::Read;
 use std::num::NonZeroU64;
 
+/// A GIF counts delays in hundredths of a second; one of 0 is shown for a tenth, as browsers do.
 const NS_PER_DELAY: i64 = 10_000_000;
 const NS_OF_NO_DELAY: i64 = 100_000_000;
 

@@ -16,6 +16,7 @@ use boresight_filters::Gaussian;
 use boresight_filters::linear::{correct_linear, predict_linear};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector4};
 
+/// Gate on d² (no unit): four standard deviations.
 const GATE: f64 = 16.0;
 
 /// Memory of the runs.

@@ -210,6 +210,7 @@ impl Mover {
                 }
             }
             MotionConfig::Singer(s) => {
+                // Steps between two frames; within each the acceleration is taken as a straight line.
                 const SUB_STEPS: usize = 16;
                 let h = dt / SUB_STEPS as f64;
                 if h > 0.0 {
