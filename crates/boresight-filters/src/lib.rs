@@ -1,7 +1,6 @@
 //! Kalman-family filters for tracking: `no_std`, no heap, interchangeable, numerically robust.
 //!
-//! Outside a filter there is only measurement space (position 2x1, covariance 2x2) and kinematics
-//! ([`Gaussian`]`<4>`, order `[x, vx, y, vy]`). The size of a filter's own state never leaks.
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 // `!(x > 0)` is meant: NaN must take the refusing branch.
@@ -64,7 +63,5 @@ pub use srif::Srif;
 pub use ud::Ud;
 pub use ukf::Ukf;
 
-/// The README's example is a test.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+/// The matrices of the beliefs, in the version that this crate is built with.
+pub use nalgebra;

@@ -1,7 +1,66 @@
-//! boresight turns image sequences into tracks one can trust.
+//! Image sequences in, trustworthy tracks out: detection, sub-pixel centroids, tracking, fusion, evaluation.
 //!
-//! The way of the data: [`io`] reads frames, [`vision`] turns a frame into detections, [`track`] (with [`associate`])
-//! turns detections into tracks, [`metrics`] says how good they are. `ARCHITECTURE.md` holds the map and the rules.
+//! The way of the data: a [`FrameSource`] gives [`Frame`]s, a [`vision::Detector`] makes a [`Scan`] of each, a [`track::Tracking`]
+//! makes [`TrackState`]s of the scans, and [`Sink`]s write what they see. Uncertainty goes all the way: a detection has a
+//! covariance, the filter uses it, the track reports its own, [`metrics`] tests it. Times are real ([`Timestamp`]); frames may be
+//! missing or uneven. The same input and configuration give the same bits.
+//!
+//! # Detect and track
+//!
+//! A simulated scene stands in for a video here; [`io::open`] gives the frames of a file, a folder or a stream.
+//!
+//! ```
+//! use boresight::{Config, FrameSource, Scan, TrackStatus, sim, track, vision};
+//!
+//! # fn main() -> boresight::Result<()> {
+//! let config = Config::from_toml(
+//!     "[detector.threshold.band]          # target pixels have values of 90 to 110
+//!      low = 90
+//!      high = 110
+//!      [detector.cluster]
+//!      min-area-px = 25
+//!      [tracker]
+//!      acceleration-std-px-per-s2 = 0.1
+//!      max-speed-px-per-s = 8.0
+//!      coast-s = 5.0",
+//!     "example",
+//! )?;
+//! let mut frames = sim::named("ds2", sim::Seed::new(1))?.build(sim::Seed::new(1))?;
+//! let mut detector = vision::build(&config.detector, frames.info())?;
+//! let mut tracker = track::build(&config.tracker)?;
+//! let mut scan = Scan::default();
+//! let mut last = None;
+//! while let Some(frame) = frames.next_frame()? {
+//!     detector.detect(&frame, &mut scan)?;
+//!     for t in tracker.step(&scan)?.iter().filter(|t| t.status == TrackStatus::Confirmed) {
+//!         last = Some((t.kinematics.mean[0], t.kinematics.cov[(0, 0)].sqrt())); // x ± its standard deviation, px
+//!     }
+//!     frames.recycle(frame);
+//! }
+//! let truth = frames.truth()[0].kinematics.mean[0];
+//! assert!(last.is_some_and(|(x, std)| (x - truth).abs() < 4.0 * std));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`auto::open`] chooses the configuration from the first frames; [`pipeline::run`] drives frames, detector, tracker and sinks,
+//! with times and a summary.
+//!
+//! # Where is what
+//!
+//! | to | see |
+//! | --- | --- |
+//! | read frames; read and write tables and video | [`io`], [`report`], [`draw`] |
+//! | turn frames into detections | [`vision`], [`DetectorConfig`](vision::DetectorConfig) |
+//! | turn detections into tracks; smooth and stitch them | [`track`], [`TrackerConfig`](track::TrackerConfig), [`associate`] |
+//! | filter by hand, without std or heap | the crate [`boresight_filters`] |
+//! | fuse several sensors | [`fuse`] |
+//! | judge tracks against a truth | [`metrics`], [`TrackTable`] |
+//! | make scenes with a known truth | [`sim`], [`reproduce`] |
+//! | configure all of it from one file | [`Config`], [`config`] |
+//!
+//! Positions are (x, y) = (column, row) in pixels, the centre of the top-left pixel is (0, 0); frames count from 0; states are
+//! `[x, vx, y, vy]` in px and px/s. What can fail returns [`Error`], which says what, where and how to mend it.
 
 pub mod associate;
 pub mod auto;
@@ -35,9 +94,10 @@ pub use time::{FrameIndex, Timestamp};
 pub use tracks::{PixelOrigin, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 
-/// The README's and the chapters' examples are compiled and run with the tests.
+/// The filters, and with them the matrices (`boresight_filters::nalgebra`), in the version that this crate is built with.
+pub use boresight_filters;
+
+/// The README's examples are compiled with the tests.
 #[cfg(doctest)]
-mod chapters {
-    #[doc = include_str!("../../../README.md")]
-    mod readme {}
-}
+#[doc = include_str!("../../../README.md")]
+struct Readme;
