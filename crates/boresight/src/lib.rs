@@ -62,6 +62,9 @@
 //! Positions are (x, y) = (column, row) in pixels, the centre of the top-left pixel is (0, 0); frames count from 0; states are
 //! `[x, vx, y, vy]` in px and px/s. What can fail returns [`Error`], which says what, where and how to mend it.
 
+#[macro_use]
+mod macros;
+
 pub mod associate;
 pub mod auto;
 pub mod config;

@@ -18,6 +18,8 @@ pub enum Input {
     Scans(Vec<Scan>),
 }
 
+opaque_debug!(Input);
+
 /// Time spent in each stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageTimes {

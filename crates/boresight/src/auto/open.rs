@@ -22,6 +22,8 @@ pub struct Opened {
     pub reasons: Vec<String>,
 }
 
+opaque_debug!(Opened);
+
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also further on.
 ///
 /// `base` says how the input is read; its other parts are where the choice starts from.

@@ -15,6 +15,8 @@ pub struct Replay {
     rest: Box<dyn FrameSource>,
 }
 
+opaque_debug!(Replay);
+
 impl Replay {
     /// Reads up to `n` frames ahead (fewer when they are large).
     pub fn new(mut source: Box<dyn FrameSource>, n: usize) -> Self {

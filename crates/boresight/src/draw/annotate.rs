@@ -85,6 +85,8 @@ pub struct Annotator {
     points: Vec<(f64, f64)>,
 }
 
+opaque_debug!(Annotator);
+
 /// From image to canvas coordinates.
 #[derive(Clone, Copy)]
 struct Zoom(f64);

@@ -20,6 +20,8 @@ pub struct AnnotatedVideo {
     large: Image<Rgb>,
 }
 
+opaque_debug!(AnnotatedVideo);
+
 impl AnnotatedVideo {
     /// Will write to `path`.
     /// # Errors
@@ -84,6 +86,8 @@ pub struct PngFolder {
     annotator: Annotator,
     picture: Image<Rgb>,
 }
+
+opaque_debug!(PngFolder);
 
 impl PngFolder {
     /// Makes the folder.

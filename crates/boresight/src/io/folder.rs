@@ -32,6 +32,8 @@ pub struct ImageFiles {
     warnings: Vec<String>,
 }
 
+opaque_debug!(ImageFiles);
+
 impl ImageFiles {
     /// Opens a list of files, already in order.
     /// # Errors

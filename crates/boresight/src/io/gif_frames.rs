@@ -35,6 +35,8 @@ pub struct GifFrames<R: Read> {
     ended: bool,
 }
 
+opaque_debug!(GifFrames<R: Read>);
+
 impl<R: Read + Send> GifFrames<R> {
     /// Opens the stream and reads its first frame.
     /// # Errors

@@ -29,6 +29,8 @@ pub struct RawFrames {
     warnings: Vec<String>,
 }
 
+opaque_debug!(RawFrames);
+
 impl RawType {
     /// Bytes of a pixel.
     pub fn bytes(self) -> usize {

@@ -31,6 +31,8 @@ pub struct Y4m<R> {
     ended: bool,
 }
 
+opaque_debug!(Y4m<R>);
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Layout {
     width: usize,

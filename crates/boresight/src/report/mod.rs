@@ -57,11 +57,15 @@ pub struct HtmlReport {
     late: Option<LateReport>,
 }
 
+opaque_debug!(HtmlReport);
+
 /// A report whose page is written after the run, when the times of all stages are known.
 ///
 /// Its sink only hands over what it saw; dropped unwritten, no file appears.
 #[derive(Clone, Default)]
 pub struct LateReport(Arc<Mutex<Option<(AtomicFile, ReportNotes, collect::Collected)>>>);
+
+opaque_debug!(LateReport);
 
 impl LateReport {
     /// Adds what is known at last and writes the page; nothing happens if the sink was not finished.

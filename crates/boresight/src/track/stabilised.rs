@@ -22,6 +22,8 @@ pub struct Stabilised {
     states: Vec<TrackState>,
 }
 
+opaque_debug!(Stabilised);
+
 impl Stabilised {
     /// Puts a tracker on steady ground.
     pub fn new(inner: Box<dyn Tracking>, field_px: Option<[f64; 2]>) -> Self {

@@ -62,6 +62,8 @@ pub struct Tracker {
     pub(super) next_id: u64,
 }
 
+opaque_debug!(Tracker);
+
 impl Tracker {
     /// Builds a tracker.
     /// # Errors

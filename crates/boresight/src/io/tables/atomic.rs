@@ -126,6 +126,8 @@ pub enum Output {
     Stream(Box<dyn Write + Send>),
 }
 
+opaque_debug!(Output);
+
 impl Output {
     /// A file that appears whole; unfinished, its lines stay readable under `path.part`. A device or a pipe gets the lines
     /// as they come.

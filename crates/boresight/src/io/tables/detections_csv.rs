@@ -20,6 +20,8 @@ pub struct DetectionsCsv {
     lines: String,
 }
 
+opaque_debug!(DetectionsCsv);
+
 impl DetectionsCsv {
     /// Creates the file and writes the header.
     /// # Errors

@@ -16,6 +16,8 @@ pub struct JsonLines {
     line: String,
 }
 
+opaque_debug!(JsonLines);
+
 impl JsonLines {
     /// Creates the file.
     /// # Errors

@@ -29,6 +29,8 @@ pub struct MotWriter {
     coasting: bool,
 }
 
+opaque_debug!(MotWriter);
+
 impl MotWriter {
     /// Creates the file; only confirmed tracks with a detection in the frame are written.
     /// # Errors

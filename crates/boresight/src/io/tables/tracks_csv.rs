@@ -33,6 +33,8 @@ pub struct TracksCsv {
     lines: String,
 }
 
+opaque_debug!(TracksCsv);
+
 impl TracksCsv {
     /// Creates the file and writes the header.
     /// # Errors

@@ -40,6 +40,8 @@ pub struct Mp4Writer {
     thread: Option<JoinHandle<Result<()>>>,
 }
 
+opaque_debug!(Mp4Writer);
+
 impl Mp4Writer {
     /// Starts a video of `width` x `height` pixels.
     /// # Errors

@@ -131,6 +131,8 @@ pub struct Mht {
     next_id: u64,
 }
 
+opaque_debug!(Mht);
+
 impl Mht {
     /// Builds the tracker.
     /// # Errors
