@@ -46,14 +46,14 @@ struct Inner {
     kind: ErrorKind,
     place: Option<String>,
     what: String,
-    hint: Option<String>,
+    hints: Vec<String>,
     source: Option<Box<dyn std::error::Error + Send + Sync>>,
 }
 
 impl Error {
     /// Builds an error from what was found and expected.
     pub fn new(kind: ErrorKind, what: impl Into<String>) -> Self {
-        Self { inner: Box::new(Inner { kind, place: None, what: what.into(), hint: None, source: None }) }
+        Self { inner: Box::new(Inner { kind, place: None, what: what.into(), hints: Vec::new(), source: None }) }
     }
 
     /// Names the place: file, line, key, frame. A place named before stays, behind the new one.
@@ -66,10 +66,10 @@ impl Error {
         self
     }
 
-    /// Says how to mend it.
+    /// Says how to mend it. A hint given before stays, on the line before.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.inner.hint = Some(hint.into());
+        self.inner.hints.push(hint.into());
         self
     }
 
@@ -95,10 +95,7 @@ impl fmt::Display for Error {
         if let Some(source) = &self.inner.source {
             write!(f, " ({source})")?;
         }
-        if let Some(hint) = &self.inner.hint {
-            write!(f, "\nhint: {hint}")?;
-        }
-        Ok(())
+        self.inner.hints.iter().try_for_each(|hint| write!(f, "\nhint: {hint}"))
     }
 }
 
@@ -111,5 +108,16 @@ impl std::error::Error for Error {
 impl From<boresight_filters::FilterError> for Error {
     fn from(e: boresight_filters::FilterError) -> Self {
         Self::new(ErrorKind::Numeric, e.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_later_hint_does_not_hide_the_first() {
+        let e = Error::new(ErrorKind::Damaged, "the size changes").at("f").hint("give one sequence").hint("5 frames are kept");
+        assert_eq!(e.to_string(), "f: the size changes\nhint: give one sequence\nhint: 5 frames are kept");
     }
 }

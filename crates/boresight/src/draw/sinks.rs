@@ -8,10 +8,14 @@ use crate::{Error, ErrorKind, Image, Result, Sink, View};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// Shortest side that the encoder takes, px.
+const MIN_SIDE: usize = 16;
+
 /// Writes `annotated.mp4`: every frame with what was found in it.
 ///
 /// The file is created with the first frame, has its name only when whole, and is removed if the sink is dropped
-/// unfinished. Pictures beyond the encoder's size are halved as often as needed.
+/// unfinished. Pictures beyond the encoder's size are made smaller by a whole number, smaller ones than it takes get a black
+/// margin at the right and below.
 pub struct AnnotatedVideo {
     path: PathBuf,
     annotator: Annotator,
@@ -39,7 +43,11 @@ impl Sink for AnnotatedVideo {
         let shrink = shrink_for(picture.width(), picture.height());
         if shrink > 1 {
             std::mem::swap(&mut picture, &mut self.large);
-            halve(&self.large, shrink, &mut picture);
+            reduce(&self.large, shrink, &mut picture);
+        }
+        if picture.width().min(picture.height()) < MIN_SIDE {
+            std::mem::swap(&mut picture, &mut self.large);
+            margin(&self.large, &mut picture);
         }
         if self.writer.is_none() {
             self.writer = Some(Mp4Writer::create(&self.path, picture.width(), picture.height(), self.options)?);
@@ -61,20 +69,28 @@ fn shrink_for(width: usize, height: usize) -> usize {
     long.div_ceil(MAX_SIZE.0).max(short.div_ceil(MAX_SIZE.1)).max(1)
 }
 
-/// Takes the mean of `n` x `n` blocks.
-fn halve(large: &Image<Rgb>, n: usize, out: &mut Image<Rgb>) {
-    let (w, h) = (large.width() / n, large.height() / n);
-    out.reset(w, h, [0; 3]);
-    for y in 0..h {
+/// Takes the mean of `n` x `n` blocks; a side shorter than a block makes one smaller block.
+fn reduce(large: &Image<Rgb>, n: usize, out: &mut Image<Rgb>) {
+    let (across, down) = (n.min(large.width()), n.min(large.height()));
+    out.reset((large.width() / n).max(1), (large.height() / n).max(1), [0; 3]);
+    for y in 0..out.height() {
         for (x, o) in out.row_mut(y).iter_mut().enumerate() {
             let mut sum = [0u32; 3];
-            for row in 0..n {
-                for p in &large.row(y * n + row)[x * n..(x + 1) * n] {
+            for row in 0..down {
+                for p in &large.row(y * n + row)[x * n..x * n + across] {
                     sum.iter_mut().zip(p).for_each(|(s, v)| *s += u32::from(*v));
                 }
             }
-            *o = sum.map(|s| (s / (n * n) as u32) as u8);
+            *o = sum.map(|s| (s / (across * down) as u32) as u8);
         }
+    }
+}
+
+/// Puts a picture into the corner of a black one whose sides the encoder takes.
+fn margin(small: &Image<Rgb>, out: &mut Image<Rgb>) {
+    out.reset(small.width().max(MIN_SIDE), small.height().max(MIN_SIDE), [0; 3]);
+    for y in 0..small.height() {
+        out.row_mut(y)[..small.width()].copy_from_slice(small.row(y));
     }
 }
 
@@ -183,7 +199,27 @@ mod tests {
     fn pictures_beyond_the_encoder_are_made_smaller_by_a_whole_number() {
         assert_eq!((shrink_for(3840, 2160), shrink_for(8192, 8192), shrink_for(100, 4000)), (1, 4, 2));
         let mut out = Image::default();
-        halve(&Image::from_vec(2, 2, vec![[0; 3], [4; 3], [8; 3], [12; 3]]).unwrap(), 2, &mut out);
+        reduce(&Image::from_vec(2, 2, vec![[0; 3], [4; 3], [8; 3], [12; 3]]).unwrap(), 2, &mut out);
         assert_eq!(out.as_slice(), [[6; 3]]);
+        reduce(&Image::from_vec(1, 2, vec![[4; 3], [8; 3]]).unwrap(), 2, &mut out);
+        assert_eq!(out.as_slice(), [[6; 3]]);
+    }
+
+    #[test]
+    fn a_single_pixel_and_the_line_of_a_line_camera_make_a_video_too() {
+        for (width, height) in [(1, 1), (1, 50), (9000, 1)] {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("annotated.mp4");
+            let mut sink =
+                Box::new(AnnotatedVideo::create(&path, DrawOptions::default(), Mp4Options::default()).unwrap());
+            for k in 0..2 {
+                let frame = Frame { pixels: Pixels::Gray8(Image::filled(width, height, 60)), ..frame(k) };
+                let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
+                sink.put(&View { frame: Some(&frame), scan: &scan, tracks: &[] }).unwrap();
+            }
+            sink.finish().unwrap();
+            let source = crate::io::video::open_mp4(&path, &crate::io::OpenOptions::default()).unwrap();
+            assert_eq!(source.info().n_frames, Some(2), "{width} x {height}");
+        }
     }
 }

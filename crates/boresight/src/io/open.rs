@@ -50,7 +50,7 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
 pub fn is_table(input: &str) -> bool {
     let path = Path::new(input);
     let head = path.is_file().then(|| sniff::read_up_to(&mut File::open(path).ok()?, sniff::SNIFF_BYTES).ok());
-    head.flatten().is_some_and(|head| sniff(&head) == Format::Text)
+    head.flatten().is_some_and(|head| matches!(sniff(&head), Format::Text | Format::Utf16))
 }
 
 fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
@@ -64,7 +64,7 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
     let whole = BufReader::new(Cursor::new(head.clone()).chain(file));
     match sniff(&head) {
         Format::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
-        Format::Text => Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
+        Format::Text | Format::Utf16 => Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
             .at(input)
             .hint("a table of detections goes to 'boresight track' as it is, and needs no frames")),
         Format::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),

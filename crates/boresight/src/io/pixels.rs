@@ -116,7 +116,7 @@ pub(crate) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(us
             ErrorKind::Damaged,
             format!("the header claims {width} x {height} pixels, more than the {max_pixels} allowed"),
         )
-        .hint("if the file is sound, raise max-pixels")),
+        .hint("if the file is sound, raise the limit: --set input.max-pixels=NUMBER")),
     }
 }
 

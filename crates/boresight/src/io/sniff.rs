@@ -20,6 +20,8 @@ pub(crate) enum Format {
     Mp4,
     /// Text: a table, a list, a configuration.
     Text,
+    /// Text in UTF-16, as some spreadsheets save it.
+    Utf16,
     Empty,
     /// Anything else: left to ffmpeg.
     Other,
@@ -38,6 +40,7 @@ impl Format {
             Self::Y4m => "YUV4MPEG2",
             Self::Mp4 => "MP4",
             Self::Text => "text",
+            Self::Utf16 => "UTF-16 text",
             Self::Empty => "an empty file",
             Self::Other => "unknown content",
         }
@@ -76,6 +79,9 @@ pub(crate) fn sniff(head: &[u8]) -> Format {
         _ if matches!(head.get(4..8), Some(b"ftyp" | b"moov" | b"mdat" | b"wide" | b"free" | b"skip" | b"styp")) => {
             Format::Mp4
         }
+        // Audio frames may begin with FF FE as well; Latin letters in UTF-16 leave every second byte 0.
+        [0xff, 0xfe, rest @ ..] if rest.iter().skip(1).step_by(2).all(|b| *b == 0) => Format::Utf16,
+        [0xfe, 0xff, rest @ ..] if rest.iter().step_by(2).all(|b| *b == 0) => Format::Utf16,
         _ if is_text(head) => Format::Text,
         _ => Format::Other,
     }
@@ -98,6 +104,8 @@ mod tests {
         assert_eq!(sniff(b"P5,a,b"), Format::Text);
         assert_eq!(sniff(b"BMW,x,y\n1,2,3\n4,5,6"), Format::Text);
         assert_eq!(sniff(b"\0\0\0\x20ftypisom"), Format::Mp4);
+        assert_eq!(sniff(b"\xff\xfef\0r\0"), Format::Utf16);
+        assert_eq!(sniff(b"\xfe\xff\0f\0r"), Format::Utf16);
         assert_eq!(sniff(b"RIFF\0\0\0\0AVI "), Format::Other);
     }
 }

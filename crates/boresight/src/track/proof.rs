@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ProofConfig {
-    /// Least score of a detection that starts a track, 0 or more; weaker ones only continue tracks.
+    /// Least score of a detection that starts a track, 0 or more; weaker ones only continue tracks. 0 asks for no score: some
+    /// detectors give negative ones.
     pub start_score: f64,
     /// Mean score of a track's detections from which it is sure to be a thing, 0 or more; it then needs to travel less.
     pub sure_score: f64,
@@ -46,7 +47,7 @@ impl ProofConfig {
     /// Whether a detection of this score may start a track.
     #[inline]
     pub fn may_start(&self, score: f32) -> bool {
-        f64::from(score) >= self.start_score
+        self.start_score <= 0.0 || f64::from(score) >= self.start_score
     }
 }
 
@@ -131,6 +132,13 @@ mod tests {
 
     fn way(way_px: f64) -> CameraWay {
         CameraWay { way_px, ..CameraWay::default() }
+    }
+
+    #[test]
+    fn without_a_least_score_every_detection_starts_a_track() {
+        // Scores of the public MOT17 detections by DPM go below 0.
+        assert!(ProofConfig::default().may_start(-0.3));
+        assert!(!ProofConfig { start_score: 0.1, ..ProofConfig::default() }.may_start(-0.3));
     }
 
     #[test]

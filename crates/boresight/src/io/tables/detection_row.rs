@@ -68,7 +68,12 @@ impl<'t> RowReader<'t> {
         let first = self.first_frame as f64;
         if frame < first || frame.fract() != 0.0 || frame >= 1e15 {
             let found = row.word(Field::Frame).unwrap_or_default();
-            return Err(row.wrong(Field::Frame, found, &format!("a whole number from {first}")));
+            let error = row.wrong(Field::Frame, found, &format!("a whole number from {first}"));
+            return Err(if self.table.kind == Kind::Mot && frame == 0.0 {
+                error.hint("MOTChallenge counts frames from 1; if this table counts from 0: --set input.table.first-frame=0")
+            } else {
+                error
+            });
         }
         let time = match (row.word(Field::TimeS), self.layout.time_scale) {
             (None, _) => None,

@@ -54,10 +54,10 @@ pub(crate) fn identified_of(
 ) -> Result<(DetectionTable, Vec<u64>)> {
     let layout = &table.layout;
     if !layout.has(&[Field::Frame]) {
-        return Err(table.lacks("which frame a row belongs to"));
+        return Err(table.lacks("which frame a row belongs to", "frame"));
     }
     if !layout.has_position() {
-        return Err(table.lacks("where a detection is (x and y, or a box)"));
+        return Err(table.lacks("where a detection is (x and y, or a box)", "x=NAME,y"));
     }
     let reader = RowReader::new(table, options);
     let mut out = DetectionTable {
@@ -85,7 +85,7 @@ pub(crate) fn identified_of(
                 out.n_skipped += 1;
                 out.warnings.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
             }
-            Err(e) => return Err(e.hint("mend the row, or leave bad rows out (skip-bad-rows)")),
+            Err(e) => return Err(e.hint("mend the row, or leave such rows out with --skip-bad-rows")),
         }
     }
     if out.n_skipped > 0 && options.skip_bad_rows {
@@ -95,6 +95,12 @@ pub(crate) fn identified_of(
         return Err(
             Error::new(ErrorKind::Damaged, format!("none of its {} rows can be read", out.n_rows)).at(&table.label)
         );
+    }
+    if let Some(unit) = &table.unit {
+        out.warnings.push(format!(
+            "{}: positions are in {unit}, and were taken as pixels: export them in pixels, or read all results in {unit}.",
+            table.label
+        ));
     }
     if n_loose > 0 {
         out.warnings.push(format!("{}: {n_loose} rows belong to no track and were left out.", table.label));
@@ -152,6 +158,24 @@ mod tests {
         assert_eq!(zero.position, Vector2::new(68.0, 157.0)); // pixels 64..=72
         let one = d("frame,xmin,ymin,xmax,ymax\n0,65,154,74,163\n", 1.0);
         assert_eq!(one.extent, zero.extent);
+    }
+
+    #[test]
+    fn a_table_in_micrometres_is_said_to_be_one() {
+        let of = |unit: &str| {
+            format!("LABEL,TRACK_ID,POSITION_X,POSITION_Y,FRAME\nLabel,Track ID,X,Y,Frame\nLabel,Track ID,X,Y,Frame\n,,({unit}),({unit}),\nID1,0,1.5,2,0\n")
+        };
+        assert!(plain(&of("micron")).warnings.iter().any(|w| w.contains("in micron")));
+        assert!(!plain(&of("pixel")).warnings.iter().any(|w| w.contains("positions are")));
+    }
+
+    #[test]
+    fn a_mot_table_counted_from_zero_is_named_as_one_and_read_when_told_so() {
+        let text = "0,-1,1,1,1,1,0.5,-1,-1,-1\n1,-1,11,21,4,2,7\n";
+        let error = read(text, &TableOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("line 1") && error.contains("first-frame=0"), "{error}");
+        let told = TableOptions { first_frame: Some(0), ..TableOptions::default() };
+        assert_eq!(read(text, &told).unwrap().scans.len(), 2);
     }
 
     #[test]

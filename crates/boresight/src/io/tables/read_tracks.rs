@@ -59,7 +59,7 @@ fn own_tracks(table: &Table, options: &TableOptions) -> Result<StateTable> {
                 out.n_skipped += 1;
                 out.warnings.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
             }
-            Err(e) => return Err(e.hint("mend the row, or leave bad rows out (skip-bad-rows)")),
+            Err(e) => return Err(e.hint("mend the row, or leave such rows out with --skip-bad-rows")),
         }
     }
     let mut periods: Vec<f64> = out
@@ -114,7 +114,7 @@ fn own_row(table: &Table, row: &Row<'_>) -> Result<(FrameIndex, Timestamp, Track
 /// Any other table: its rows are read as detections and get their identities.
 fn foreign_tracks(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<StateTable> {
     if !table.layout.has(&[Field::Id]) {
-        return Err(table.lacks("which track a row belongs to"));
+        return Err(table.lacks("which track a row belongs to", "id"));
     }
     let (read, ids) = identified_of(table, options, rate_beside, true)?;
     let mut out =

@@ -29,6 +29,8 @@ pub(crate) struct Table {
     delimiter: Delimiter,
     /// Lines to be passed over before the first row: the header and what belongs to it.
     skip: usize,
+    /// Unit of positions, where the table names one that is not the pixel.
+    pub unit: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,6 +117,12 @@ impl Table {
 
     /// Finds the columns of a text.
     pub fn of_text(label: String, bytes: &[u8], columns: &Columns) -> Result<Self> {
+        if matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..]) {
+            let what = "expected a text table in UTF-8, found UTF-16";
+            return Err(Error::new(ErrorKind::Unsupported, what)
+                .at(label)
+                .hint("save it as \"CSV UTF-8\", or convert it: iconv -f UTF-16 -t UTF-8"));
+        }
         if bytes.contains(&0) {
             let what = "expected a text table (CSV, MOTChallenge), found binary data";
             return Err(Error::new(ErrorKind::Damaged, what).at(label).hint("save it as UTF-8 text"));
@@ -142,18 +150,21 @@ impl Table {
                 .hint("add a header such as frame,x,y; or name the columns by number: frame=1,x=2,y=3"));
         };
         // TrackMate writes three more lines of names and units below its header.
+        let mut unit = None;
         if header.iter().any(|h| h == "POSITION_X") {
-            let frame = layout.column(Field::Frame);
+            let (frame, x) = (layout.column(Field::Frame), layout.column(Field::X));
             for line in text.lines().skip(skip).take(3) {
                 split(line, delimiter, &mut fields);
                 let is_row = frame.and_then(|at| fields.get(at)).is_some_and(|f| number(f, delimiter).is_some());
                 if is_row {
                     break;
                 }
+                let named = x.and_then(|at| fields.get(at)).and_then(|u| u.strip_prefix('(')?.strip_suffix(')'));
+                unit = named.filter(|u| !["pixel", "pixels", "px"].contains(u)).map(String::from).or(unit);
                 skip += 1;
             }
         }
-        Ok(Self { label, kind, header, layout, text, delimiter, skip })
+        Ok(Self { label, kind, header, layout, text, delimiter, skip, unit })
     }
 
     /// The rows in file order.
@@ -167,11 +178,30 @@ impl Table {
         })
     }
 
-    /// An error about the columns as a whole.
-    pub fn lacks(&self, what: &str) -> Error {
+    /// An error about the columns as a whole; `key` is a meaning that `--columns` could give a column.
+    pub fn lacks(&self, what: &str, key: &str) -> Error {
         Error::new(ErrorKind::Unsupported, format!("no column says {what}"))
             .at(&self.label)
-            .hint(format!("the columns are {}; name one, for example x=NAME", self.header.join(", ")))
+            .hint(format!("the columns are {}; name one, for example --columns {key}=NAME", list(&self.header)))
+    }
+}
+
+/// Names in a row; of very many the first ones.
+fn list(names: &[String]) -> String {
+    const SHOWN: usize = 20;
+    let mut text = names.iter().take(SHOWN).map(|n| short(n)).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        text.push_str(&format!(" and {} more", names.len() - SHOWN));
+    }
+    text
+}
+
+/// A cell's text as far as it helps.
+fn short(text: &str) -> String {
+    const SHOWN: usize = 40;
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_string(),
     }
 }
 
@@ -213,15 +243,24 @@ impl<'t> Row<'t> {
         self.maybe(field)?.ok_or_else(|| self.wrong(field, self.text(field).unwrap_or(""), "a finite number"))
     }
 
-    /// Whether the row has a cell for every column of the header.
+    /// Whether the row has a cell for every column of the header, and none that says something beyond it.
     pub fn check_length(&self) -> Result<()> {
         let (got, want) = (self.fields.len(), self.table.header.len());
         // MOTChallenge rows end where the writer had no more to say.
-        let least = if self.table.kind == Kind::Mot { 6 } else { want };
-        if got >= least {
-            return Ok(());
+        let mot = self.table.kind == Kind::Mot;
+        let least = if mot { 6 } else { want };
+        if got < least {
+            return Err(self.bad(format!("{got} fields, expected {least}")));
         }
-        Err(self.bad(format!("{got} fields, expected {least}")))
+        if !mot && self.fields.iter().skip(want).any(|f| !f.is_empty()) {
+            let error = self.bad(format!("{got} fields, expected {want}"));
+            // 1,5 for 1.5 in a table parted by commas would shift all behind it.
+            return Err(match self.table.delimiter {
+                Delimiter::Char(',') => error.hint("are there decimal commas? part the fields by semicolons then"),
+                _ => error,
+            });
+        }
+        Ok(())
     }
 
     /// An error about this row.
@@ -236,7 +275,7 @@ impl<'t> Row<'t> {
             Kind::Named => self.table.header.get(at).cloned().unwrap_or_default(),
             Kind::Mot => format!("{} ({field:?})", at + 1).to_lowercase(),
         };
-        let found = if found.is_empty() { "nothing".to_string() } else { format!("'{found}'") };
+        let found = if found.is_empty() { "nothing".to_string() } else { format!("'{}'", short(found)) };
         self.bad(format!("column {name}: found {found}, expected {expected}"))
     }
 }
@@ -268,6 +307,25 @@ mod tests {
         let t = table("frame,x,y\n0,1,2\n1,abc,3\n").unwrap();
         let error = t.rows().nth(1).unwrap().need(Field::X).unwrap_err();
         assert_eq!(error.to_string(), "t.csv: line 3: column x: found 'abc', expected a finite number");
+    }
+
+    #[test]
+    fn a_row_with_more_cells_than_the_header_is_refused_unless_they_are_empty() {
+        let length = |text: &str| table(text).unwrap().rows().last().unwrap().check_length();
+        assert!(length("frame,x,y\n0,1,2,,\n").is_ok());
+        // Decimal commas: 1.5 and 2.5.
+        let error = length("frame,x,y\n0,1,5,2,5\n").unwrap_err().to_string();
+        assert!(error.contains("line 2: 5 fields, expected 3") && error.contains("decimal commas"), "{error}");
+        assert!(length("frame;x;y\n0;1,5;2,5\n").is_ok());
+    }
+
+    #[test]
+    fn messages_about_endless_lines_stay_short() {
+        let header: Vec<String> = (0..5000).map(|i| format!("c{i}")).collect();
+        let wide = table(&format!("{}\n", header.join(","))).unwrap();
+        assert!(wide.lacks("where it is", "x").to_string().len() < 300);
+        let t = table(&format!("frame,x,y\n0,{},3\n", "z".repeat(100_000))).unwrap();
+        assert!(t.rows().next().unwrap().need(Field::X).unwrap_err().to_string().len() < 200);
     }
 
     #[test]

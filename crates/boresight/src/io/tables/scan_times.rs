@@ -97,7 +97,7 @@ pub(super) fn set_times(
             );
             return Err(Error::new(ErrorKind::Damaged, what)
                 .at(&table.label)
-                .hint("give a rate to make times from frame numbers"));
+                .hint("--rate-hz makes times from the frames' numbers"));
         }
         let n = (b - a) as i128;
         let step_ns = i128::from(to.ns) - i128::from(from.ns);

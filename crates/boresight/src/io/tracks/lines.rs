@@ -42,7 +42,8 @@ impl BadRows {
     }
 }
 
-/// Calls `each(line number from 1, line)` for the lines of a file, without their ends; empty lines are left out.
+/// Calls `each(line number from 1, line)` for the lines of a file, without their ends; empty lines and those that begin with
+/// # are left out.
 /// # Errors
 /// A file that cannot be read; a line of more than 1 MiB; what `each` fails with.
 pub fn each_line(path: &Path, mut each: impl FnMut(u64, &[u8]) -> Result<()>) -> Result<()> {
@@ -81,7 +82,12 @@ pub fn each_line(path: &Path, mut each: impl FnMut(u64, &[u8]) -> Result<()>) ->
 fn call(each: &mut impl FnMut(u64, &[u8]) -> Result<()>, number: u64, line: &[u8]) -> Result<()> {
     let line = line.strip_suffix(b"\r").unwrap_or(line);
     let line = if number == 1 { line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line) } else { line };
-    if line.iter().all(u8::is_ascii_whitespace) { Ok(()) } else { each(number, line) }
+    if is_content(line) { each(number, line) } else { Ok(()) }
+}
+
+/// Whether a line says anything: neither blank nor a comment.
+pub fn is_content(line: &[u8]) -> bool {
+    line.iter().find(|b| !b.is_ascii_whitespace()).is_some_and(|b| *b != b'#')
 }
 
 fn find_newline(bytes: &[u8]) -> Option<usize> {

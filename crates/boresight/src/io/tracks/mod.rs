@@ -90,7 +90,13 @@ pub fn sniff(path: &Path) -> Result<Format> {
         .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be opened").at(path.display()).because(e))?;
     let mut head = vec![0; 4096];
     let n = file.read(&mut head).unwrap_or(0);
-    let line = head[..n].split(|&b| b == b'\n').find(|l| !l.trim_ascii().is_empty()).unwrap_or(b"").trim_ascii();
+    let head = head[..n].strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&head[..n]);
+    if matches!(head, [0xff, 0xfe, ..] | [0xfe, 0xff, ..]) {
+        return Err(Error::new(ErrorKind::Unsupported, "expected a table in UTF-8, found UTF-16")
+            .at(path.display())
+            .hint("save it as \"CSV UTF-8\", or convert it: iconv -f UTF-16 -t UTF-8"));
+    }
+    let line = head.split(|&b| b == b'\n').find(|l| lines::is_content(l)).unwrap_or(b"").trim_ascii();
     if line.is_empty() {
         // An empty table: a tracker that found nothing.
         return Ok(Format::Mot);

@@ -2,8 +2,10 @@
 //!
 //! The header decides: each column has a meaning by its name (upper or lower case), the rest is kept as text where asked.
 //! TrackMate writes three more header lines and leaves TRACK_ID empty for spots outside of tracks: both are passed over.
-//! Frames count from 0, the centre of the top-left pixel is (0, 0); rows have a centre, and a box if width and height
-//! are there. Limits: comma, semicolon or tab; no quoted separators inside of used columns.
+//! Frames count from 0, the centre of the top-left pixel is (0, 0). Rows have a centre, and a box if width and height are
+//! there; or a box by its left and top with width and height, or with right and bottom. As in tables of detections, `left_px`
+//! is the box's edge, any other left the number of its first pixel. Lines that begin with # are passed over.
+//! Limits: comma, semicolon or tab; no quoted separators inside of used columns.
 
 use super::lines::{BadRows, Fields, ReadOptions, each_line, number, separator};
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
@@ -18,6 +20,8 @@ enum Meaning {
     Y,
     Left,
     Top,
+    Right,
+    Bottom,
     Width,
     Height,
     Score,
@@ -30,13 +34,15 @@ enum Meaning {
 }
 
 /// The names of each meaning, best first: `ID` is a track's number in btrack but a spot's in TrackMate.
-const NAMES: [(Meaning, &[&str]); 14] = [
+const NAMES: [(Meaning, &[&str]); 16] = [
     (Meaning::Frame, &["frame", "t", "frame_index"]),
     (Meaning::Id, &["track_id", "particle", "trackid", "id", "track"]),
     (Meaning::X, &["x_px", "position_x", "x", "cx"]),
     (Meaning::Y, &["y_px", "position_y", "y", "cy"]),
     (Meaning::Left, &["left_px", "bb_left", "left", "xmin", "x_min", "x1"]),
     (Meaning::Top, &["top_px", "bb_top", "top", "ymin", "y_min", "y1"]),
+    (Meaning::Right, &["bb_right", "right", "xmax", "x_max", "x2"]),
+    (Meaning::Bottom, &["bb_bottom", "bottom", "ymax", "y_max", "y2"]),
     (Meaning::Width, &["width_px", "bb_width", "width", "w"]),
     (Meaning::Height, &["height_px", "bb_height", "height", "h"]),
     (Meaning::Score, &["score", "confidence", "conf", "quality"]),
@@ -66,6 +72,8 @@ struct Header {
     meanings: Vec<Meaning>,
     names: Vec<String>,
     trackmate: bool,
+    /// From a left or top of the table to the box's edge, px.
+    edge_shift_px: f64,
 }
 
 fn header(line: &[u8], comma: Option<u8>) -> Result<Header> {
@@ -94,7 +102,8 @@ fn header(line: &[u8], comma: Option<u8>) -> Result<Header> {
         .hint("for instance: frame,track_id,x,y or frame,track_id,left,top,width,height"));
     }
     let trackmate = lower.iter().any(|n| n == "position_x");
-    Ok(Header { meanings, names, trackmate })
+    let edges = meanings.iter().zip(&lower).any(|(m, name)| *m == Meaning::Left && name == "left_px");
+    Ok(Header { meanings, names, trackmate, edge_shift_px: if edges { 0.0 } else { -0.5 } })
 }
 
 /// Whether a first line is a header of this kind.
@@ -118,7 +127,9 @@ pub fn read(path: &Path, options: ReadOptions, tentative: bool) -> Result<(Track
                     (0..h.names.len()).filter(|&k| matches!(h.meanings[k], Meaning::Other | Meaning::Status)).collect();
                 kept.iter().for_each(|&k| table.add_extra(h.names[k].as_str()));
             }
-            boxes = h.meanings.contains(&Meaning::Width) && h.meanings.contains(&Meaning::Height);
+            let has = |m| h.meanings.contains(&m);
+            boxes = has(Meaning::Width) && has(Meaning::Height)
+                || has(Meaning::Left) && has(Meaning::Top) && has(Meaning::Right) && has(Meaning::Bottom);
             head = Some(h);
             return Ok(());
         };
@@ -157,7 +168,7 @@ fn row(
     extra: &mut Vec<String>,
 ) -> Result<Option<TrackRow>> {
     let mut r = TrackRow::default();
-    let (mut x, mut y, mut left, mut top) = (None, None, None, None);
+    let (mut x, mut y, mut left, mut top, mut right, mut bottom) = (None, None, None, None, None, None);
     for (k, &meaning) in head.meanings.iter().enumerate() {
         match meaning {
             Meaning::Frame | Meaning::Id => {
@@ -180,6 +191,8 @@ fn row(
             Meaning::Y => y = Some(fields.number("a position y")?),
             Meaning::Left => left = Some(fields.number("a left edge")?),
             Meaning::Top => top = Some(fields.number("a top edge")?),
+            Meaning::Right => right = Some(fields.number("a right edge")?),
+            Meaning::Bottom => bottom = Some(fields.number("a bottom edge")?),
             Meaning::Width => r.bbox[2] = fields.optional("a width")?.unwrap_or(0.0),
             Meaning::Height => r.bbox[3] = fields.optional("a height")?.unwrap_or(0.0),
             Meaning::Score => r.score = fields.optional("a score")?.unwrap_or(1.0),
@@ -198,9 +211,31 @@ fn row(
             }
         }
     }
-    r.bbox[0] = left.or(x.map(|x| x - r.bbox[2] / 2.0)).unwrap_or(0.0);
-    r.bbox[1] = top.or(y.map(|y| y - r.bbox[3] / 2.0)).unwrap_or(0.0);
+    nothing_behind(fields)?;
+    for (k, first, last, centre, what) in [(0, left, right, x, "right edge"), (1, top, bottom, y, "bottom edge")] {
+        if let (Some(first), Some(last)) = (first, last) {
+            if last < first {
+                let what = format!("expected a {what} of at least {first}, found {last}");
+                return Err(Error::new(ErrorKind::Damaged, what));
+            }
+            r.bbox[k + 2] = last - first;
+        }
+        let edge = first.map(|f| f + head.edge_shift_px);
+        r.bbox[k] = edge.or(centre.map(|c| c - r.bbox[k + 2] / 2.0)).unwrap_or(0.0);
+    }
     Ok(Some(r))
+}
+
+/// Refuses a row that says more than its header names: 1,5 for 1.5 in a table parted by commas shifts all behind it.
+fn nothing_behind(mut fields: Fields<'_>) -> Result<()> {
+    while let Some(field) = fields.field() {
+        if !field.is_empty() {
+            let found: String = String::from_utf8_lossy(field).chars().take(30).collect();
+            return Err(Error::new(ErrorKind::Damaged, format!("found \"{found}\" behind the header's last column"))
+                .hint("are there decimal commas? part the fields by semicolons and write decimal points"));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -234,6 +269,25 @@ Label,Spot ID,Track ID,Quality,X,Y,Frame\n,,,(quality),(pixel),(pixel),\nID1,1,3
         let (t, _) = read_text(text, ReadOptions { keep_extra: true, ..ReadOptions::default() }).unwrap();
         assert_eq!((t.boxes.as_slice(), t.n_frames()), ([[8.0, 17.0, 4.0, 6.0]].as_slice(), 5));
         assert_eq!(t.extra[0], ("time_s".to_string(), vec!["0.1".to_string()]));
+    }
+
+    #[test]
+    fn a_box_is_the_same_by_its_size_its_corners_or_its_centre() {
+        for text in [
+            "frame,id,left,top,width,height\n0,3,10,20,4,6\n",
+            "# corners\nframe,id,x1,y1,x2,y2\n0,3,10,20,14,26\n",
+            "frame,id,left_px,top_px,width_px,height_px\n0,3,9.5,19.5,4,6\n",
+            "frame,id,x,y,w,h\n# centre\n0,3,11.5,22.5,4,6,\n",
+        ] {
+            let (t, _) = read_text(text, ReadOptions::default()).unwrap();
+            assert_eq!((t.boxes.as_slice(), t.is_points), ([[9.5, 19.5, 4.0, 6.0]].as_slice(), false), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_row_that_says_more_than_its_header_is_refused() {
+        let e = read_text("frame,id,x,y\n0,3,1,5,2,5\n", ReadOptions::default()).unwrap_err().to_string();
+        assert!(e.contains("line 2") && e.contains("decimal commas"), "{e}");
     }
 
     #[test]
