@@ -16,6 +16,9 @@ pub const HELP: &str = "Exit codes:
 
 /// Prints an error to standard error and returns its exit code.
 pub fn report(error: &anyhow::Error) -> ExitCode {
+    if reader_left(error) {
+        return ExitCode::SUCCESS;
+    }
     let mut text = format!("{error:#}");
     let kind = error.downcast_ref::<boresight::Error>().map(boresight::Error::kind);
     if kind.is_some() {
@@ -31,4 +34,13 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
         Some(ErrorKind::Interrupted) => 130,
         _ => 1,
     })
+}
+
+/// Whether the reader of an output's pipe went away, as `| head` does once it has its lines: no mistake of anybody.
+fn reader_left(error: &anyhow::Error) -> bool {
+    let broken = |e: &(dyn std::error::Error + 'static)| {
+        e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    };
+    let output = error.downcast_ref::<boresight::Error>().is_none_or(|e| e.kind() == ErrorKind::Output);
+    output && error.chain().any(broken)
 }

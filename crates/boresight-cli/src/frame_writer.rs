@@ -18,12 +18,31 @@ pub enum FrameFormat {
     Y4m,
 }
 
+impl FrameFormat {
+    fn extension(self) -> &'static str {
+        if self == Self::Pgm { "pgm" } else { "png" }
+    }
+}
+
 /// An open output for frames.
 pub enum FrameWriter {
     /// A folder and the format of its files.
     Folder(PathBuf, FrameFormat),
     /// A YUV4MPEG2 stream.
     Stream(Box<dyn Write>),
+}
+
+/// A file of an image in the folder that this run does not overwrite.
+fn left_over(folder: &Path, format: FrameFormat, n_frames: Option<u64>) -> Option<String> {
+    let ours = |name: &str| {
+        let number =
+            name.strip_prefix("frame_")?.strip_suffix(&format!(".{}", format.extension()))?.parse::<u64>().ok()?;
+        n_frames.is_none_or(|n| number < n).then_some(())
+    };
+    let names = std::fs::read_dir(folder).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());
+    let image =
+        |n: &str| [".png", ".pgm", ".tif", ".tiff", ".jpg", ".bmp"].iter().any(|e| n.to_lowercase().ends_with(e));
+    names.filter(|n| image(n) && ours(n).is_none()).min()
 }
 
 fn output_error(path: &Path, e: std::io::Error) -> Error {
@@ -40,6 +59,14 @@ impl FrameWriter {
         }
         let path = dir.join("frames");
         std::fs::create_dir_all(&path).map_err(|e| output_error(&path, e))?;
+        if let Some(other) = left_over(&path, format, info.n_frames) {
+            return Err(Error::new(
+                ErrorKind::Output,
+                format!("holds {other}, which would be read as a frame of this run"),
+            )
+            .at(path.display())
+            .hint("remove that folder, or choose another with --output"));
+        }
         Ok(Self::Folder(path, format))
     }
 
@@ -79,8 +106,7 @@ impl FrameWriter {
                             .at(dir.display()));
                     }
                 };
-                let extension = if *format == FrameFormat::Pgm { "pgm" } else { "png" };
-                let path = dir.join(format!("frame_{:06}.{extension}", frame.index.0));
+                let path = dir.join(format!("frame_{:06}.{}", frame.index.0, format.extension()));
                 let fail = |e| output_error(&path, e);
                 let mut file = BufWriter::new(File::create(&path).map_err(fail)?);
                 if *format == FrameFormat::Pgm {

@@ -128,6 +128,9 @@ fn what_is_wrong_is_said_with_its_place() {
         assert!(!out.status.success(), "{line}");
         String::from_utf8_lossy(&out.stderr).into_owned()
     };
+    run(dir.path(), "boresight simulate ds2 --frames 3 -o again && boresight simulate ds2 --frames 3 -o again");
+    assert!(fail("boresight simulate ds2 --frames 2 -o again").contains("frame_000002.png"));
+    assert!(fail("boresight simulate ds2 --frames 3 --format pgm -o again").contains("frame_000000.png"));
     assert!(fail("boresight simulate ds9 -o x").contains("ds1, ds2"));
     std::fs::write(dir.path().join("bad.toml"), "[[radars]]\nscan-period-s = 0.0\n").unwrap();
     assert!(fail("boresight simulate bad.toml -o x").contains("scan-period-s"));

@@ -41,6 +41,12 @@ pub struct InputConfig {
     pub rate_hz: f64,
     /// Largest accepted frame, pixels, above 0; what claims more is refused before memory is taken.
     pub max_pixels: u64,
+    /// Of a TIFF's pages every how many-th is a frame, 1 or more; absent: as ImageJ's or OME's description says (one channel and
+    /// one plane of a hyperstack), else every page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub page_step: Option<u64>,
+    /// Number of the first such page, from 0: in a stack of two channels 1 takes the second.
+    pub first_page: u64,
     /// Layout of headerless frames; needed for raw input only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawFormat>,
@@ -51,14 +57,29 @@ pub struct InputConfig {
 impl Default for InputConfig {
     fn default() -> Self {
         let o = OpenOptions::default();
-        Self { colour: o.colour, rate_hz: o.rate_hz, max_pixels: o.max_pixels, raw: None, table: Default::default() }
+        Self {
+            colour: o.colour,
+            rate_hz: o.rate_hz,
+            max_pixels: o.max_pixels,
+            page_step: o.page_step,
+            first_page: o.first_page,
+            raw: None,
+            table: Default::default(),
+        }
     }
 }
 
 impl InputConfig {
     /// What [`crate::io::open`] takes.
     pub fn open_options(&self) -> OpenOptions {
-        OpenOptions { colour: self.colour, raw: self.raw, rate_hz: self.rate_hz, max_pixels: self.max_pixels }
+        OpenOptions {
+            colour: self.colour,
+            raw: self.raw,
+            rate_hz: self.rate_hz,
+            max_pixels: self.max_pixels,
+            page_step: self.page_step,
+            first_page: self.first_page,
+        }
     }
 
     fn validate(&self, at: &str) -> Result<()> {

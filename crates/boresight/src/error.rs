@@ -117,7 +117,10 @@ mod tests {
 
     #[test]
     fn a_later_hint_does_not_hide_the_first() {
-        let e = Error::new(ErrorKind::Damaged, "the size changes").at("f").hint("give one sequence").hint("5 frames are kept");
+        let e = Error::new(ErrorKind::Damaged, "the size changes")
+            .at("f")
+            .hint("give one sequence")
+            .hint("5 frames are kept");
         assert_eq!(e.to_string(), "f: the size changes\nhint: give one sequence\nhint: 5 frames are kept");
     }
 }

@@ -23,10 +23,10 @@ pub struct Args {
     /// Where to write: a file, a folder for ctc, or - for standard output.
     output: PathBuf,
     /// Format to write.
-    #[arg(long, value_parser = super::evaluate::format)]
+    #[arg(long, value_parser = super::evaluate::format())]
     to: Format,
     /// Format of the input, if its look deceives.
-    #[arg(long, value_parser = super::evaluate::format)]
+    #[arg(long, value_parser = super::evaluate::format())]
     from: Option<Format>,
     /// Leave out malformed rows and count them.
     #[arg(long)]
@@ -66,6 +66,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 .into());
         }
         eprintln!("note: {what}");
+    }
+    let mot = |f: Format| matches!(f, Format::Mot | Format::MotTruth);
+    if mot(file.format) && args.to == Format::Kitti || file.format == Format::Kitti && mot(args.to) {
+        eprintln!("note: classes keep their numbers: 1 is a car in KITTI and a pedestrian in MOTChallenge");
     }
     if args.output.as_os_str() == "-" {
         super::print(&bytes)?;

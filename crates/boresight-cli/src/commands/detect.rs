@@ -1,6 +1,6 @@
 //! `boresight detect`: frames in, detections out.
 
-use super::run_options::{self, InputArgs};
+use super::run_options::{self, InputArgs, TrackerArgs};
 use crate::progress;
 use boresight::io::DetectionsCsv;
 use boresight::io::tables::Output;
@@ -24,7 +24,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let plan = run_options::plan(&args.input)?;
+    let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
     let path = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "detections.csv"));
     let to_stdout = path.as_os_str() == "-";
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };

@@ -15,6 +15,7 @@ use anyhow::{Context, bail};
 use boresight::io::tracks::Format;
 use boresight::metrics::{KittiClass, MatchOptions, Rules, Similarity};
 use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use measures::Judged;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -26,6 +27,7 @@ TRUTH and RESULT are tables (MOTChallenge, KITTI, CSV with named columns, Cell T
 look. For several sequences give folders (TRUTH/SEQ/gt/gt.txt or TRUTH/SEQ/gt.txt, RESULT/SEQ.txt) or paths with {seq} \
 where the names of the sequences stand: 'data/{seq}/gt.txt' 'data/{seq}/result.txt'. Two images, folders of images or \
 videos are compared pixel by pixel.")]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:
   boresight evaluate gt.txt result.txt                              every measure of one result
   boresight evaluate 'mot17/{seq}/gt.txt' 'mine/{seq}.txt' --mot-only     CLEAR, identity and HOTA of many sequences
@@ -44,10 +46,10 @@ pub struct Args {
     #[arg(long, num_args = 1.., value_name = "RESULT")]
     compare: Vec<String>,
     /// Format of the truth, if its look deceives.
-    #[arg(long, value_parser = format)]
+    #[arg(long, value_parser = format())]
     truth_format: Option<Format>,
     /// Format of the results, if their look deceives.
-    #[arg(long, value_parser = format)]
+    #[arg(long, value_parser = format())]
     result_format: Option<Format>,
     /// What is left out before counting.
     #[arg(long, value_enum, default_value = "auto")]
@@ -90,8 +92,8 @@ pub struct Args {
     #[arg(long)]
     peak: Option<f64>,
     /// Window of OSPA(2) and trajectory GOSPA, frames.
-    #[arg(long, default_value_t = 50)]
-    window: usize,
+    #[arg(long, default_value = "50")]
+    window: std::num::NonZeroUsize,
     /// Assign OSPA by plain distances, as Stone Soup does, instead of by their p-th powers.
     #[arg(long)]
     stonesoup_ospa: bool,
@@ -126,8 +128,8 @@ pub struct Args {
     #[arg(long)]
     html: Option<PathBuf>,
     /// Draws of the bootstrap.
-    #[arg(long, default_value_t = 1000)]
-    draws: usize,
+    #[arg(long, default_value = "1000")]
+    draws: std::num::NonZeroUsize,
     /// Seed of the bootstrap.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -170,10 +172,10 @@ enum Convention {
     Motmetrics,
 }
 
-/// Parses a format's name.
-pub fn format(text: &str) -> Result<Format, String> {
-    let names: Vec<&str> = Format::ALL.iter().map(|f| f.name()).collect();
-    Format::ALL.into_iter().find(|f| f.name() == text).ok_or_else(|| format!("expected one of {}", names.join(", ")))
+/// Takes a format's name; help texts and completions list them.
+pub fn format() -> impl TypedValueParser<Value = Format> {
+    PossibleValuesParser::new(Format::ALL.map(Format::name))
+        .try_map(|name| Format::ALL.into_iter().find(|f| f.name() == name).ok_or("no such format"))
 }
 
 /// Parses WIDTHxHEIGHT.
@@ -200,7 +202,8 @@ fn bound(text: &str) -> Result<[f64; 3], String> {
 
 fn demand(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected MEASURE=VALUE, for instance HOTA=0.4")?;
-    let value = value.parse::<f64>().map_err(|_| format!("expected a number after =, found \"{value}\""))?;
+    let number = value.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let value = number.ok_or_else(|| format!("expected a number after =, found \"{value}\""))?;
     Ok((name.trim().to_string(), value))
 }
 

@@ -23,12 +23,6 @@ pub struct InputArgs {
     /// Change one key of the configuration, chosen or given: `tracker.coast-s=1`. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
-    /// Filter of the tracks; `boresight config --list filters` explains each.
-    #[arg(long, value_name = "NAME")]
-    pub filter: Option<String>,
-    /// How detections are shared out among tracks, or `mht`; `boresight config --list associators` explains each.
-    #[arg(long, value_name = "NAME")]
-    pub associator: Option<String>,
     /// Rate of inputs without times of their own, frames/s.
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
@@ -41,6 +35,17 @@ pub struct InputArgs {
     /// Print nothing but errors.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// How tracks are made; short for keys of the configuration.
+#[derive(Debug, Default, clap::Args)]
+pub struct TrackerArgs {
+    /// Filter of the tracks; `boresight config --list filters` explains each.
+    #[arg(long, value_name = "NAME")]
+    pub filter: Option<String>,
+    /// How detections are shared out among tracks, or `mht`; `boresight config --list associators` explains each.
+    #[arg(long, value_name = "NAME")]
+    pub associator: Option<String>,
 }
 
 /// What is to be run.
@@ -64,7 +69,7 @@ impl Plan {
 }
 
 /// Opens the input and settles the configuration.
-pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
+pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     let given = args.config.as_deref().map(Config::from_file).transpose()?;
     let mut base = given.clone().unwrap_or_default();
     if let Some(rate) = args.rate_hz {
@@ -75,7 +80,7 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
         base = base.with(set)?;
     }
     if boresight::io::is_table(&args.input) {
-        return plan_table(args, given, base);
+        return plan_table(args, tracker, given, base);
     }
     let (source, mut config, reasons): (Box<dyn boresight::FrameSource>, _, _) = match given {
         Some(_) => {
@@ -88,18 +93,18 @@ pub fn plan(args: &InputArgs) -> anyhow::Result<Plan> {
         }
     };
     let info = source.info().clone();
-    config = changed(config, args)?;
+    config = changed(config, args, tracker)?;
     let detector = vision::build(&config.detector, &info)?;
     Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })
 }
 
 /// The configuration with what the command line changes.
-fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
-    if let Some(filter) = &args.filter {
+fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Config> {
+    if let Some(filter) = &tracker.filter {
         config =
             config.with(&format!("tracker.filter.{filter}={{}}")).map_err(|e| e.at(format!("--filter {filter}")))?;
     }
-    match args.associator.as_deref() {
+    match tracker.associator.as_deref() {
         Some("mht") => config = config.with("tracker.mht={}")?,
         Some(name) => {
             config = config.with(&format!("tracker.associator.{name}={{}}"))?;
@@ -114,7 +119,7 @@ fn changed(mut config: Config, args: &InputArgs) -> anyhow::Result<Config> {
     Ok(config)
 }
 
-fn plan_table(args: &InputArgs, given: Option<Config>, base: Config) -> anyhow::Result<Plan> {
+fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, base: Config) -> anyhow::Result<Plan> {
     let mut base = base;
     let options = &mut base.input.table;
     if let Some(columns) = &args.columns {
@@ -136,7 +141,7 @@ fn plan_table(args: &InputArgs, given: Option<Config>, base: Config) -> anyhow::
         Some(_) => reasons.push("Configuration as given.".to_string()),
         None => auto::for_detections(&table.scans, table.rate_hz, &mut config, &mut reasons),
     }
-    config = changed(config, args)?;
+    config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);
     Ok(Plan { input: Input::Scans(table.scans), config, reasons, info: None, n_scans })
 }
@@ -154,6 +159,12 @@ pub fn default_folder(input: &str, ending: &str) -> PathBuf {
 
 /// Makes the results' folder.
 pub fn make_folder(dir: &Path) -> anyhow::Result<()> {
+    if dir.as_os_str() == "-" {
+        return Err(Error::new(ErrorKind::Config, "expected a folder: the results are several files")
+            .at("--output -")
+            .hint("give a folder; `boresight detect INPUT -o -` writes a table to standard output")
+            .into());
+    }
     std::fs::create_dir_all(dir).map_err(|e| {
         Error::new(ErrorKind::Output, "the folder for the results cannot be made")
             .at(dir.display())
@@ -210,21 +221,19 @@ mod tests {
 
     #[test]
     fn an_associator_that_is_asked_for_replaces_multiple_hypotheses() {
-        let mut args = InputArgs {
+        let args = InputArgs {
             input: "-".into(),
             config: None,
             sets: Vec::new(),
-            filter: None,
-            associator: Some("mht".into()),
             rate_hz: None,
             columns: None,
             skip_bad_rows: false,
             quiet: true,
         };
-        let mht = changed(Config::default(), &args).unwrap();
+        let associator = |name: &str| TrackerArgs { filter: None, associator: Some(name.into()) };
+        let mht = changed(Config::default(), &args, &associator("mht")).unwrap();
         assert!(mht.tracker.mht.is_some());
-        args.associator = Some("jpda".into());
-        let jpda = changed(mht, &args).unwrap();
+        let jpda = changed(mht, &args, &associator("jpda")).unwrap();
         assert!(jpda.tracker.mht.is_none() && jpda.to_toml().unwrap().contains("[tracker.associator.jpda]"));
     }
 }

@@ -1,6 +1,6 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
-use super::run_options::{self, InputArgs, Plan};
+use super::run_options::{self, InputArgs, Plan, TrackerArgs};
 use crate::progress;
 use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
 use boresight::io::video::Mp4Options;
@@ -30,6 +30,8 @@ const EXAMPLES: &str = "Examples:
 pub struct Args {
     #[command(flatten)]
     input: InputArgs,
+    #[command(flatten)]
+    tracker: TrackerArgs,
     /// Folder for the results; INPUT's name with `.tracks` if absent.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -49,7 +51,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let plan = run_options::plan(&args.input)?;
+    let plan = run_options::plan(&args.input, &args.tracker)?;
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
     run_options::make_folder(&dir)?;
     let tracking = track::build(&plan.config.tracker)?;
@@ -136,12 +138,21 @@ fn late_notes(notes: &mut Notes, summary: &Summary, broken: Option<&boresight::E
     }
 }
 
+/// A number with its thing, in the plural where it is not one.
+fn counted(n: u64, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
 /// The summary on the terminal.
 fn print_summary(s: &Summary, wall_s: f64, dir: &std::path::Path) {
     let per_frame = |d: std::time::Duration| 1e3 * d.as_secs_f64() / s.frames.max(1) as f64;
     eprintln!(
-        "{} frames ({:.1} s), {} detections, {} confirmed tracks (at most {} at once)",
-        s.frames, s.duration_s, s.detections, s.confirmed_tracks, s.most_at_once
+        "{} ({:.1} s), {}, {} (at most {} at once)",
+        counted(s.frames, "frame"),
+        s.duration_s,
+        counted(s.detections, "detection"),
+        counted(s.confirmed_tracks, "confirmed track"),
+        s.most_at_once
     );
     if let Some((nis, n)) = s.mean_nis {
         eprintln!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");

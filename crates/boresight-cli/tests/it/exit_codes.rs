@@ -27,6 +27,10 @@ fn files(dir: &Path) {
     write("syntax.toml", b"[tracker\n");
     write("bad.csv", b"frame,x,y\n0,1,2\n1,a,3\n");
     write("noframe.csv", b"a,b\n1,2\n");
+    write("wide.csv", b"frame,x,y\n0,1,5,2,5\n");
+    write("zero.txt", b"0,-1,3,3,5,5,1,-1,-1,-1\n");
+    write("one.txt", b"1,1,3,3,5,5,1,-1,-1,-1\n");
+    write("utf16.csv", b"\xff\xfef\0r\0a\0");
     write("huge.pgm", b"P5\n1000000 1000000\n255\n");
     std::fs::create_dir(dir.join("empty")).unwrap();
     std::fs::copy(root().join("crates/boresight/tests/data/video/hevc.mp4"), dir.join("hevc.mp4")).unwrap();
@@ -60,6 +64,11 @@ fn every_failure_has_its_documented_code_and_names_a_mend() {
         case(&["track", "clip.mp4", "--set", "tracker"], 2, &["expected KEY=VALUE", "hint:"]),
         case(&["track", "clip.mp4", "--filter", "udd"], 2, &["--filter udd", "did you mean `ud`?"]),
         case(&["track", "clip.mp4", "--rate-hz=-3"], 2, &["above 0", "hint:"]),
+        case(&["track", "clip.mp4", "-o", "-"], 2, &["expected a folder", "hint:"]),
+        case(&["convert", "one.txt", "x", "--to", "moot"], 2, &["mot-truth", "trackmate"]),
+        case(&["evaluate", "one.txt", "one.txt", "--require", "HOTA=nan"], 2, &["expected a number"]),
+        case(&["evaluate", "one.txt", "one.txt", "--cutoff", "-1"], 2, &["above 0 px"]),
+        case(&["evaluate", "one.txt", "one.txt", "--window", "0"], 2, &["--window"]),
         // 3: input
         case(&["track", "none.mp4"], 3, &["none.mp4", "no such file", "hint:"]),
         case(&["track", "empty.mp4"], 3, &["empty.mp4", "empty"]),
@@ -69,6 +78,10 @@ fn every_failure_has_its_documented_code_and_names_a_mend() {
         case(&["track", "none/*.png"], 3, &["none/*.png"]),
         case(&["track", "huge.pgm"], 3, &["huge.pgm"]),
         case(&["track", "bad.csv"], 3, &["bad.csv", "line 3", "column x", "'a'", "hint:"]),
+        case(&["track", "wide.csv"], 3, &["wide.csv", "line 2", "5 fields, expected 3", "decimal commas"]),
+        case(&["track", "zero.txt"], 3, &["line 1", "first-frame=0", "--skip-bad-rows"]),
+        case(&["track", "utf16.csv"], 3, &["UTF-16", "hint:"]),
+        case(&["evaluate", "one.txt", "utf16.csv"], 3, &["UTF-16", "hint:"]),
         case(&["track", "noframe.csv"], 3, &["noframe.csv", "frame", "hint:"]),
         case(&["track", "clip.mp4", "--config", "none.toml"], 3, &["none.toml", "hint:"]),
         case(&["evaluate", "none.txt", "none.txt"], 3, &["none.txt"]),
@@ -96,6 +109,20 @@ fn a_missing_ffmpeg_is_told_with_what_to_install() {
     let out = boresight().current_dir(dir.path()).env("PATH", "").args(["track", "hevc.mp4"]).output().unwrap();
     assert_eq!(out.status.code(), Some(4), "{}", stderr(&out));
     assert!(stderr(&out).contains("install ffmpeg"), "{}", stderr(&out));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_enough_ends_the_run_without_complaint() {
+    use std::io::Read;
+    use std::process::Stdio;
+    let clip = clip().to_string_lossy().into_owned();
+    for args in [vec!["detect", clip.as_str(), "-q", "-o", "-"], vec!["simulate", "ds2", "-o", "-"]] {
+        let mut child = boresight().args(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        child.stdout.take().unwrap().read_exact(&mut [0; 10]).unwrap();
+        let out = child.wait_with_output().unwrap();
+        assert_eq!((out.status.code(), stderr(&out).as_str()), (Some(0), ""), "{args:?}");
+    }
 }
 
 #[cfg(unix)]

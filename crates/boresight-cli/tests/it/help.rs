@@ -31,3 +31,17 @@ fn completions_name_every_subcommand() {
         }
     }
 }
+
+#[test]
+fn formats_are_listed_where_they_can_be_chosen() {
+    for name in ["convert", "evaluate"] {
+        let text = stdout(&run_ok([name, "--help"]));
+        assert!(text.contains("[possible values: mot, mot-truth, kitti, csv, trackpy"), "{name}: {text}");
+    }
+}
+
+#[test]
+fn detect_offers_nothing_that_only_tracks_have() {
+    let text = stdout(&run_ok(["detect", "--help"]));
+    assert!(!text.contains("--filter") && !text.contains("--associator"), "{text}");
+}

@@ -2,6 +2,7 @@
 
 use super::scene::{Camera, Scene};
 use crate::io::Colour;
+use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig};
 use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
 use crate::vision::config::{CameraConfig, DetectorConfig};
 use crate::vision::threshold::ThresholdConfig;
@@ -58,7 +59,11 @@ pub fn configure(
     config.detector.camera = CameraConfig::Fixed;
     super::moving::tracker(side, info, interval_s, &mut config.tracker);
     let tracker = &mut config.tracker;
-    // A thrown thing: 1 g seen as some ten of its own sides a second squared.
-    tracker.acceleration_std_px_per_s2 = super::round((20.0 * side).max(0.2 / (interval_s * interval_s)));
+    // A thrown thing: 1 g is 245 times the side of a ball of 4 cm a second squared, and a hand jerks as much.
+    tracker.acceleration_std_px_per_s2 = super::round((300.0 * side).max(0.2 / (interval_s * interval_s)));
     tracker.max_speed_px_per_s = super::round(2.0 * info.width.max(info.height) as f64);
+    // It comes into view at any speed up to that, and may be gone after ten frames.
+    let velocity_std_px_per_s = super::round(tracker.max_speed_px_per_s / 3.0);
+    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
+    tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
 }

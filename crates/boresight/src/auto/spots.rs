@@ -82,7 +82,14 @@ pub fn configure(
     let (bright, dark) = (weight(&evidence.bright), weight(&evidence.dark));
     let polarity = if dark > 2.0 * bright { Polarity::Dark } else { Polarity::Bright };
     let seen = if polarity == Polarity::Dark { &evidence.dark } else { &evidence.bright };
-    reasons.push(format!(
+    if seen.per_frame == 0.0 {
+        reasons.push(
+            "Nothing stands clear of its surroundings in these frames: small bright targets are looked for (dark ones: --set \
+             detector.threshold.isolated.polarity=dark)."
+                .to_string(),
+        );
+    }
+    reasons.extend((seen.per_frame > 0.0).then(|| format!(
         "Isolated {} targets: {:.1} bright (mean score {:.0}) and {:.1} dark ones (mean score {:.0}) a frame stand clear of their \
          surroundings; median side {:.0} px.",
         if polarity == Polarity::Dark { "dark" } else { "bright" },
@@ -91,7 +98,7 @@ pub fn configure(
         evidence.dark.per_frame,
         evidence.dark.mean_score,
         seen.side_px[0]
-    ));
+    )));
     config.detector = DetectorConfig {
         threshold: ThresholdConfig::Isolated(IsolatedConfig {
             polarity,

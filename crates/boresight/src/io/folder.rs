@@ -5,6 +5,7 @@
 //! be read is an error that names it; but if nothing readable follows (the last file of an interrupted recording, or a
 //! run of empty files behind a full disk), the sequence ends before it with a warning that counts the loss.
 
+use super::numbered::{self, Numbering};
 use super::sniff::{self, Format, sniff};
 use super::tiff_pages::TiffPages;
 use super::{OpenOptions, still};
@@ -27,6 +28,8 @@ pub struct ImageFiles {
     first: Option<Pixels>,
     first_file: PathBuf,
     n_given: u64,
+    /// Numbers in the files' names, if they have holes.
+    numbering: Option<Numbering>,
     options: OpenOptions,
     bytes: Vec<u8>,
     warnings: Vec<String>,
@@ -60,6 +63,7 @@ impl ImageFiles {
             first: None,
             first_file,
             n_given: 0,
+            numbering: None,
             options: options.clone(),
             bytes: Vec::new(),
             warnings: Vec::new(),
@@ -78,11 +82,29 @@ impl ImageFiles {
         // Pages of several TIFF files are not counted beforehand.
         source.info.n_frames = match (&source.pages, one_tiff) {
             (None, _) => Some(source.files.len() as u64),
-            (Some(_), true) => super::tiff_count::count_pages(&source.first_file),
+            (Some((_, pages)), true) => super::tiff_count::count_pages(&source.first_file).map(|n| pages.n_given_of(n)),
             (Some(_), false) => None,
         };
         source.first = Some(first);
+        if source.pages.is_none() {
+            source.note_holes();
+        }
         Ok(source)
+    }
+
+    /// Where the names' numbers have holes, times follow the numbers.
+    fn note_holes(&mut self) {
+        if let Some(found) = numbered::holes(&self.files) {
+            let (before, behind) = found.first_hole;
+            self.warnings.push(format!(
+                "{}: {} numbers are missing in the names, the first between {} and {}: times follow the numbers.",
+                self.info.label,
+                found.n_missing,
+                self.files[before].display(),
+                self.files[behind].display()
+            ));
+            self.numbering = Some(found);
+        }
     }
 
     /// Reads the next image, with the number of its file; an error comes with the number of the file that failed.
@@ -90,11 +112,9 @@ impl ImageFiles {
         loop {
             if let Some((at, pages)) = &mut self.pages {
                 let at = *at;
-                let n_before = pages.n_read();
-                let page = pages.next_page().map_err(|e| {
-                    let e = e.at(format!("{}, page {}", self.files[at].display(), n_before + 1));
-                    (at, e)
-                })?;
+                let page = pages.next_page();
+                let number = pages.at();
+                let page = page.map_err(|e| (at, e.at(format!("{}, page {number}", self.files[at].display()))))?;
                 for note in pages.notes() {
                     let note = format!("{}: {note}.", self.info.label);
                     if !self.warnings.contains(&note) {
@@ -136,7 +156,8 @@ fn open_image(path: &Path, options: &OpenOptions, bytes: &mut Vec<u8>) -> Result
         Format::Empty => return Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)")),
         Format::Tiff => {
             std::io::Seek::rewind(&mut file).map_err(cannot)?;
-            let pages = TiffPages::new(BufReader::new(file), options.colour, options.max_pixels)?;
+            let pages = TiffPages::new(BufReader::new(file), options.colour, options.max_pixels)?
+                .every(options.page_step, options.first_page);
             return Ok(Opened::Pages(Box::new(pages)));
         }
         Format::Apng => Format::Png,
@@ -214,7 +235,8 @@ impl FrameSource for ImageFiles {
             },
         };
         self.n_given += 1;
-        let time = Timestamp::from_secs_f64(index.0 as f64 / self.options.rate_hz);
+        let place = self.numbering.as_ref().map_or(index.0, |n| n.place(index.0));
+        let time = Timestamp::from_secs_f64(place as f64 / self.options.rate_hz);
         Ok(Some(Frame { index, time, pixels }))
     }
 

@@ -3,6 +3,7 @@
 mod folder;
 mod gif_frames;
 mod natural;
+mod numbered;
 mod open;
 mod pixels;
 mod raw;
@@ -13,6 +14,7 @@ mod tiff_count;
 mod tiff_lzw;
 mod tiff_packed;
 mod tiff_pages;
+mod tiff_stack;
 pub mod tracks;
 pub mod video;
 mod y4m;
@@ -85,11 +87,15 @@ pub struct OpenOptions {
     pub rate_hz: f64,
     /// Largest accepted frame, pixels; a header that claims more is refused before memory is taken.
     pub max_pixels: u64,
+    /// Of a TIFF's pages every how many-th is a frame, 1 or more; `None`: as ImageJ's or OME's description says, else every one.
+    pub page_step: Option<u64>,
+    /// Number of the first such page, from 0.
+    pub first_page: u64,
 }
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28 }
+        Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28, page_step: None, first_page: 0 }
     }
 }
 
@@ -104,6 +110,9 @@ impl OpenOptions {
         }
         if self.max_pixels == 0 {
             return Err(Error::new(ErrorKind::Config, "expected at least 1 pixel").at("max-pixels = 0"));
+        }
+        if self.page_step == Some(0) {
+            return Err(Error::new(ErrorKind::Config, "expected a whole number of at least 1").at("page-step = 0"));
         }
         if let Some(raw) = self.raw {
             pixels::check_size(raw.width as u64, raw.height as u64, self.max_pixels)

@@ -64,9 +64,11 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
     let whole = BufReader::new(Cursor::new(head.clone()).chain(file));
     match sniff(&head) {
         Format::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
-        Format::Text | Format::Utf16 => Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
-            .at(input)
-            .hint("a table of detections goes to 'boresight track' as it is, and needs no frames")),
+        Format::Text | Format::Utf16 => {
+            Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
+                .at(input)
+                .hint("a table of detections goes to 'boresight track' as it is, and needs no frames"))
+        }
         Format::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
         Format::Gif => Ok(Box::new(GifFrames::open(input, whole, options)?)),
         format if format.is_image() && format != Format::Apng => {
@@ -148,7 +150,14 @@ fn expand(input: &str) -> Result<Option<Vec<PathBuf>>> {
         }
     }
     if files.is_empty() {
-        return Err(Error::new(ErrorKind::NotFound, "no file has such a name").at(input));
+        let error = Error::new(ErrorKind::NotFound, "no file has such a name").at(input);
+        return Err(if input.contains('[') {
+            error.hint(
+                "[ ] stand for one of the letters between them; write [[] for a bracket itself, or give the folder",
+            )
+        } else {
+            error
+        });
     }
     files.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok(Some(files))

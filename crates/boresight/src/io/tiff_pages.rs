@@ -3,12 +3,12 @@
 //! 8 and 16 bit grey and 32-bit float stay what they are. Signed and 32-bit integers, half and double floats become
 //! 32-bit float (exact for 16 bits and half; a warning says so for the others). Separate colour planes are joined.
 //! Reduced-size pages (previews, NewSubfileType bit 0) are passed over. Where zero stands for white, samples are turned
-//! round so that bright is large. Palettes and 10, 12 and 14 bit samples: see `tiff_packed`. Not read: zstd, WebP.
+//! round so that bright is large. Of a hyperstack one channel and plane is read: see `tiff_stack`. Palettes and 10, 12 and 14 bit samples: see `tiff_packed`. Not read: zstd, WebP.
 
 use super::Colour;
 use super::pixels::{Samples, check_size};
 use super::still::{damaged, guarded};
-use super::{tiff_lzw, tiff_packed};
+use super::{tiff_lzw, tiff_packed, tiff_stack};
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -21,7 +21,15 @@ pub(crate) struct TiffPages<R: Read + Seek> {
     max_pixels: u64,
     colour: Colour,
     started: bool,
-    n_read: u64,
+    /// Full-size pages met so far, those passed over included.
+    n_met: u64,
+    /// Number of the page being read, from 1.
+    at: u64,
+    /// Every how many-th of them is given, and the first; `None` until the first page's description is read.
+    step: Option<u64>,
+    first: u64,
+    /// Pages that ImageJ's description claims.
+    n_claimed: Option<u64>,
     notes: Vec<String>,
 }
 
@@ -44,12 +52,34 @@ impl<R: Read + Seek> TiffPages<R> {
         limits.intermediate_buffer_size = limits.decoding_buffer_size;
         limits.ifd_value_size = 16 << 20; // offsets of a million strips
         let decoder = guarded(|| Decoder::new(reader).map_err(failed))?.with_limits(limits);
-        Ok(Self { decoder, max_pixels, colour, started: false, n_read: 0, notes: Vec::new() })
+        Ok(Self {
+            decoder,
+            max_pixels,
+            colour,
+            started: false,
+            n_met: 0,
+            at: 1,
+            step: None,
+            first: 0,
+            n_claimed: None,
+            notes: Vec::new(),
+        })
     }
 
-    /// Number of pages read so far.
-    pub fn n_read(&self) -> u64 {
-        self.n_read
+    /// Gives every `step`-th page from number `first` on; `None` takes the step from ImageJ's or OME's description.
+    pub fn every(mut self, step: Option<u64>, first: u64) -> Self {
+        (self.step, self.first) = (step, first);
+        self
+    }
+
+    /// How many of `n` pages are given.
+    pub fn n_given_of(&self, n: u64) -> u64 {
+        n.saturating_sub(self.first).div_ceil(self.step.unwrap_or(1).max(1))
+    }
+
+    /// Number of the page being read, from 1.
+    pub fn at(&self) -> u64 {
+        self.at
     }
 
     /// What was changed on the way from the file to the pixels, said once.
@@ -60,20 +90,54 @@ impl<R: Read + Seek> TiffPages<R> {
     /// Returns the next full-size page, or `None` behind the last.
     pub fn next_page(&mut self) -> Result<Option<Pixels>> {
         loop {
+            self.at = self.n_met + 1;
             if self.started {
                 if !self.decoder.more_images() {
+                    self.note_missing();
                     return Ok(None);
                 }
                 guarded(|| self.decoder.next_image().map_err(failed))?;
             }
             self.started = true;
             let subfile: Option<u32> = self.decoder.find_tag_unsigned(Tag::NewSubfileType).map_err(failed)?;
-            if self.n_read > 0 && subfile.is_some_and(|t| t & 1 == 1) {
+            if self.n_met > 0 && subfile.is_some_and(|t| t & 1 == 1) {
+                continue;
+            }
+            let step = self.settled_step();
+            let at = self.n_met;
+            self.n_met += 1;
+            if at < self.first || !(at - self.first).is_multiple_of(step) {
                 continue;
             }
             let page = guarded(|| self.read_page())?;
-            self.n_read += 1;
             return Ok(Some(page));
+        }
+    }
+
+    /// Pages from one frame to the next; looks into the first page's description once.
+    fn settled_step(&mut self) -> u64 {
+        if self.n_met == 0 {
+            let text = self.decoder.find_tag(Tag::ImageDescription).ok().flatten().and_then(|t| t.into_string().ok());
+            let stack = text.as_deref().and_then(tiff_stack::of_description);
+            self.n_claimed = stack.and_then(|s| s.n_pages);
+            if let (None, Some(stack)) = (self.step, stack.filter(|s| s.step() > 1)) {
+                self.step = Some(stack.step());
+                self.note(&format!(
+                    "its pages are {} channels x {} slices x {} times, one in {} is taken, from number {} on (others: --set input.first-page=N; every page: --set input.page-step=1)",
+                    stack.channels, stack.slices, stack.frames, stack.step(), self.first
+                ));
+            }
+        }
+        self.step.unwrap_or(1).max(1)
+    }
+
+    /// ImageJ writes stacks of more than 4 GiB with one directory; the other pages have none.
+    fn note_missing(&mut self) {
+        if let Some(claimed) = self.n_claimed.filter(|n| *n > self.n_met) {
+            let met = self.n_met;
+            self.note(&format!(
+                "ImageJ's description claims {claimed} pages, {met} are in the file's directories and were read; save it as BigTIFF or OME-TIFF"
+            ));
         }
     }
 

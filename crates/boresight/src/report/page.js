@@ -13,9 +13,12 @@
   const show = (v, digits = 4) => !ok(v) ? "none" : v === 0 ? "0" : String(Number(v.toPrecision(digits)));
 
   // Steps of 1, 2 or 5 times a power of ten, about `n` of them.
-  const ticks = (lo, hi, n) => {
-    const raw = (hi - lo) / n, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].map(m => m * power).find(s => s >= raw);
-    const out = [];
+  const ticks = (lo, hi, n, least = 1) => {
+    const raw = (hi - lo) / n, power = 10 ** Math.floor(Math.log10(raw)), steps = [1, 2, 5, 10].map(m => m * power);
+    let i = steps.findIndex(s => s >= raw);
+    // One tick gives no scale: a finer step then.
+    while (i > 0 && Math.floor(hi / steps[i]) - Math.ceil(lo / steps[i]) + 1 < least) i--;
+    const step = steps[i], out = [];
     for (let k = Math.ceil(lo / step - 1e-9); k * step <= hi + step * 1e-9; k++) out.push(Number((k * step).toPrecision(12)));
     return out;
   };
@@ -99,7 +102,7 @@
       if (!(hi >= lo)) { node("text", { x: W / 2, y: H / 2, "text-anchor": "middle" }, svg, "no values"); return; }
       if (hi === lo) { const d = Math.abs(hi) * 0.05 || 0.5; lo -= d; hi += d; }
       const pad = (hi - lo) * 0.05; if (!(spec.zero && lo === 0)) lo -= pad; hi += pad;
-      const yTicks = ticks(lo, hi, 4), labels = yTicks.map(v => show(v, 6));
+      const yTicks = ticks(lo, hi, 4, 3), labels = yTicks.map(v => show(v, 6));
       this.left = Math.max(34, 10 + 6.4 * Math.max(...labels.map(s => s.length)));
       this.w = W - this.left - 10; this.top = 8; this.h = H - 36;
       const X = v => this.left + (v - t0) / (t1 - t0) * this.w, Y = v => this.top + (hi - v) / (hi - lo) * this.h;

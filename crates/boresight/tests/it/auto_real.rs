@@ -1,7 +1,8 @@
 //! The automatic choice on real clips: each kind of input gets its detector, and says why; infrared keeps what it had.
 
 use boresight::vision::threshold::{Polarity, ThresholdConfig};
-use boresight::{Config, auto};
+use boresight::{Config, Scan, TrackStatus, auto};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The detector chosen and all reasons as one text; `None` (said so) where the data are missing.
@@ -39,6 +40,32 @@ fn a_green_ball_is_told_by_its_colour() {
     let [r, g, b] = c.reference;
     assert!(g > r && g > b, "{:?}", c.reference);
     assert!(why.contains("one moving piece of a colour of its own"), "{why}");
+}
+
+#[test]
+fn a_thrown_ball_is_followed_on_its_whole_way() {
+    let Some((threshold, _)) = chosen("ball_green_trflorian/ball.mp4") else { return };
+    assert!(matches!(threshold, ThresholdConfig::Colour(_)), "{threshold:?}");
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    let path = folder.join("ball_green_trflorian/ball.mp4").display().to_string();
+    let mut run = auto::open(&path, &Config::default()).unwrap();
+    let (mut scan, mut n_seen) = (Scan::default(), 0);
+    // Frames in which each track took a detection, and those of them in which it was confirmed.
+    let mut taken: BTreeMap<u64, [usize; 2]> = BTreeMap::new();
+    while let Some(frame) = run.frames.next_frame().unwrap() {
+        run.detector.detect(&frame, &mut scan).unwrap();
+        n_seen += scan.detections.len();
+        for t in run.tracker.step(&scan).unwrap().iter().filter(|t| t.detection.is_some()) {
+            let counts = taken.entry(t.id.0).or_default();
+            counts[0] += 1;
+            counts[1] += usize::from(t.status == TrackStatus::Confirmed);
+        }
+    }
+    // The ball is in view for a third of a second, up and down: by eye, ten frames of 60.
+    assert!((9..=11).contains(&n_seen), "{n_seen}");
+    let best = taken.values().copied().max().unwrap_or_default();
+    assert!(best[0] >= n_seen - 1 && best[1] >= n_seen - 3, "{taken:?}");
 }
 
 #[test]

@@ -291,3 +291,62 @@ fn headers_that_claim_a_billion_pixels_are_refused() {
         );
     }
 }
+
+/// Writes a stack of 8-bit pages with a description on the first; page p is filled with p.
+fn write_stack(path: &Path, n: u8, description: &str) {
+    let mut out = tiff::encoder::TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+    for page in 0..n {
+        let mut image = out.new_image::<tiff::encoder::colortype::Gray8>(4, 3).unwrap();
+        if page == 0 {
+            image.encoder().write_tag(tiff::tags::Tag::ImageDescription, description).unwrap();
+        }
+        image.write_data(&[page; 12]).unwrap();
+    }
+}
+
+/// First pixel of every frame, and the number of frames announced.
+fn pages(path: &Path, options: &OpenOptions) -> (Vec<u8>, Option<u64>, Vec<String>) {
+    let mut source = open(&path.to_string_lossy(), options).unwrap();
+    let announced = source.info().n_frames;
+    let mut values = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        let Pixels::Gray8(image) = &frame.pixels else { panic!("8-bit grey expected") };
+        values.push(image.as_slice()[0]);
+    }
+    (values, announced, source.warnings().to_vec())
+}
+
+#[test]
+fn one_channel_of_a_hyperstack_is_read_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("two channels.tif");
+    write_stack(&path, 6, "ImageJ=1.53t\nimages=6\nchannels=2\nframes=3\nhyperstack=true\n");
+    let plain = OpenOptions::default();
+    let (values, announced, warnings) = pages(&path, &plain);
+    assert_eq!((values, announced), (vec![0, 2, 4], Some(3)));
+    assert!(warnings[0].contains("2 channels x 1 slices x 3 times"), "{warnings:?}");
+    assert_eq!(pages(&path, &OpenOptions { first_page: 1, ..plain.clone() }).0, [1, 3, 5]);
+    let every = pages(&path, &OpenOptions { page_step: Some(1), ..plain.clone() });
+    assert_eq!((every.0, every.1, every.2), (vec![0, 1, 2, 3, 4, 5], Some(6), vec![]));
+    assert_eq!(pages(&path, &OpenOptions { page_step: Some(4), first_page: 1, ..plain.clone() }).0, [1, 5]);
+    write_stack(&path, 4, "ImageJ=1.53t\nimages=9\nslices=9\n");
+    let (values, _, warnings) = pages(&path, &plain);
+    assert_eq!(values, [0, 1, 2, 3]);
+    assert!(warnings[0].contains("claims 9 pages, 4 are"), "{warnings:?}");
+}
+
+#[test]
+fn times_follow_the_numbers_where_files_are_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    for k in [3, 4, 5, 9, 10] {
+        std::fs::write(dir.path().join(format!("f_{k}.pgm")), b"P5 1 1 255\n7").unwrap();
+    }
+    let mut source =
+        open(&dir.path().to_string_lossy(), &OpenOptions { rate_hz: 10.0, ..OpenOptions::default() }).unwrap();
+    let mut times = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        times.push((frame.index.0, frame.time.ns / 1_000_000));
+    }
+    assert_eq!(times, [(0, 0), (1, 100), (2, 200), (3, 600), (4, 700)]);
+    assert!(source.warnings()[0].contains("3 numbers are missing"), "{:?}", source.warnings());
+}

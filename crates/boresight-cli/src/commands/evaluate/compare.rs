@@ -66,7 +66,7 @@ pub fn compare(args: &Args, results: &[Judged]) -> Result<Vec<Row>> {
         .into_iter()
         .map(|measure| {
             let pick = |s: &Scores| mot_values(s, None).iter().find(|v| v.0 == measure).map_or(0.0, |v| v.1);
-            Ok(Row { measure, results: bootstrap(&units, &whole, pick, LEVEL, args.draws, args.seed)? })
+            Ok(Row { measure, results: bootstrap(&units, &whole, pick, LEVEL, args.draws.get(), args.seed)? })
         })
         .collect()
 }

@@ -181,7 +181,7 @@ fn more(
 ) -> Result<()> {
     let assignment = if args.stonesoup_ospa { OspaAssignment::FirstPower } else { OspaAssignment::OrderP };
     let set = SetOptions { cutoff_px: args.cutoff, order: args.order, assignment };
-    set.validate("--")?;
+    set.validate("evaluate")?;
     let (mut distance, mut a, mut b) = (SetDistance::default(), Vec::new(), Vec::new());
     let n = t.n_frames().max(r.n_frames());
     for frame in 0..n {
@@ -193,16 +193,18 @@ fn more(
         row.ospa.push(distance.ospa(&a, &b, &set));
     }
     // Windows side by side; the last may be shorter.
-    let window = args.window.max(1);
-    let windows: Vec<f64> =
-        (0..n).step_by(window).map(|f| ospa2(t, r, f, f + window, &set, args.order)).collect::<Result<_>>()?;
+    let window = args.window.get();
+    let windows: Vec<f64> = (0..n)
+        .step_by(window)
+        .map(|f| ospa2(t, r, f, f.saturating_add(window), &set, args.order))
+        .collect::<Result<_>>()?;
     row.ospa2 = windows.iter().sum::<f64>() / windows.len().max(1) as f64;
     let trajectory = TrajectoryOptions {
         set,
         switch_px: args.switch_cost.unwrap_or(args.cutoff / 2.0),
         max_unknowns: args.max_unknowns,
     };
-    row.trajectory_gospa = match trajectory_gospa_by_windows(t, r, args.window.max(1), &trajectory) {
+    row.trajectory_gospa = match trajectory_gospa_by_windows(t, r, window, &trajectory) {
         Ok(g) => Some(g),
         Err(e) if e.kind() == ErrorKind::Unsupported => {
             let e = e.to_string();

@@ -70,7 +70,9 @@ impl<'t> RowReader<'t> {
             let found = row.word(Field::Frame).unwrap_or_default();
             let error = row.wrong(Field::Frame, found, &format!("a whole number from {first}"));
             return Err(if self.table.kind == Kind::Mot && frame == 0.0 {
-                error.hint("MOTChallenge counts frames from 1; if this table counts from 0: --set input.table.first-frame=0")
+                error.hint(
+                    "MOTChallenge counts frames from 1; if this table counts from 0: --set input.table.first-frame=0",
+                )
             } else {
                 error
             });

@@ -163,7 +163,9 @@ mod tests {
     #[test]
     fn a_table_in_micrometres_is_said_to_be_one() {
         let of = |unit: &str| {
-            format!("LABEL,TRACK_ID,POSITION_X,POSITION_Y,FRAME\nLabel,Track ID,X,Y,Frame\nLabel,Track ID,X,Y,Frame\n,,({unit}),({unit}),\nID1,0,1.5,2,0\n")
+            format!(
+                "LABEL,TRACK_ID,POSITION_X,POSITION_Y,FRAME\nLabel,Track ID,X,Y,Frame\nLabel,Track ID,X,Y,Frame\n,,({unit}),({unit}),\nID1,0,1.5,2,0\n"
+            )
         };
         assert!(plain(&of("micron")).warnings.iter().any(|w| w.contains("in micron")));
         assert!(!plain(&of("pixel")).warnings.iter().any(|w| w.contains("positions are")));

@@ -17,6 +17,9 @@ pub const CLASSES: [(&str, i32); 8] =
 const EXTRA: [&str; 8] =
     ["alpha_rad", "height_m", "width_m", "length_m", "location_x_m", "location_y_m", "location_z_m", "rotation_y_rad"];
 
+/// What the labels say where these are not known.
+const UNKNOWN: [&str; 8] = ["-10", "-1", "-1", "-1", "-1000", "-1000", "-1000", "-10"];
+
 fn class_number(name: &[u8]) -> Option<i32> {
     let name = std::str::from_utf8(name).ok()?;
     // The kit writes the sitting person as Person_sitting or Person.
@@ -49,7 +52,13 @@ pub fn read(path: &Path, options: ReadOptions) -> Result<(TrackTable, BadRows)> 
         });
         pushed.or_else(|e| bad.note(options, e.at(format!("{} line {number}", path.display()))))
     })?;
-    Ok((table.finish(0)?, bad))
+    let mut table = table.finish(0)?;
+    // Columns that say "unknown" throughout are no loss to another format; the writer puts them back.
+    table.extra.retain(|(name, values)| {
+        let unknown = EXTRA.iter().position(|n| n == name).map(|k| UNKNOWN[k]);
+        values.iter().any(|v| !v.is_empty() && Some(v.as_str()) != unknown)
+    });
+    Ok((table, bad))
 }
 
 enum Row {
@@ -113,7 +122,6 @@ pub fn write(table: &TrackTable, out: &mut impl Write) -> Result<Vec<String>> {
         table.to_mut().set_origin(PixelOrigin::Pixel0);
     }
     let places: Vec<Option<usize>> = EXTRA.iter().map(|n| table.extra.iter().position(|e| e.0 == *n)).collect();
-    let missing = ["-10", "-1", "-1", "-1", "-1000", "-1000", "-1000", "-10"];
     let mut ignore = table.ignore.clone();
     ignore.sort_by_key(|i| i.0);
     let mut ignored = ignore.iter().peekable();
@@ -137,7 +145,7 @@ pub fn write(table: &TrackTable, out: &mut impl Write) -> Result<Vec<String>> {
                 places[k]
                     .and_then(|p| table.extra[p].1.get(r))
                     .filter(|v| !v.is_empty())
-                    .map_or(missing[k], String::as_str)
+                    .map_or(UNKNOWN[k], String::as_str)
             };
             write!(
                 out,

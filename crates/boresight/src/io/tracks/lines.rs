@@ -113,9 +113,9 @@ pub struct Fields<'a> {
     ended: bool,
 }
 
-/// The separator of a line: the first of comma, semicolon, tab in it, else blanks (`None`).
+/// The separator of a line: semicolon or tab if it has one (commas are decimal points then), else comma, else blanks (`None`).
 pub fn separator(line: &[u8]) -> Option<u8> {
-    [b',', b';', b'\t'].into_iter().find(|s| line.contains(s))
+    [b';', b'\t', b','].into_iter().find(|s| line.contains(s))
 }
 
 impl<'a> Fields<'a> {
@@ -164,7 +164,17 @@ impl<'a> Fields<'a> {
             return Err(Error::new(ErrorKind::Damaged, format!("expected {what}, found the end of the line"))
                 .at(format!("column {}", self.column + 1)));
         };
-        number(field).ok_or_else(|| self.expected(what, field))
+        self.value(field).ok_or_else(|| self.expected(what, field))
+    }
+
+    /// A finite number; a comma serves as decimal point where it does not part the fields.
+    fn value(&self, field: &[u8]) -> Option<f64> {
+        number(field).or_else(|| {
+            let at = field.iter().position(|b| *b == b',').filter(|_| self.separator != Some(b','))?;
+            let mut point = field.to_vec();
+            point[at] = b'.';
+            number(&point)
+        })
     }
 
     /// The next field as a whole number ("7" or "7.0").
@@ -185,7 +195,7 @@ impl<'a> Fields<'a> {
     pub fn optional(&mut self, what: &str) -> Result<Option<f64>> {
         match self.field() {
             None | Some(b"") => Ok(None),
-            Some(field) => number(field).map(Some).ok_or_else(|| self.expected(what, field)),
+            Some(field) => self.value(field).map(Some).ok_or_else(|| self.expected(what, field)),
         }
     }
 
@@ -258,6 +268,9 @@ mod tests {
         assert_eq!(f.optional("a score").unwrap(), None);
         assert_eq!(f.number("a height").unwrap_err().to_string(), "column 4: expected a height, found \"x\"");
         assert_eq!(f.number("more").unwrap_err().to_string(), "column 5: expected more, found the end of the line");
+        let mut f = Fields::new(b"1,5; 2;3,4,5", separator(b"1,5; 2;3,4,5"));
+        assert_eq!((f.number("x").unwrap(), f.number("y").unwrap()), (1.5, 2.0));
+        assert!(f.number("z").is_err(), "two commas");
         let mut f = Fields::new(b"0  -1   Car", separator(b"0  -1   Car"));
         assert_eq!(
             (f.field(), f.field(), f.field(), f.field()),

@@ -104,6 +104,13 @@ pub fn sniff(path: &Path) -> Result<Format> {
     if named::is_header(line) {
         return Ok(Format::Named(Dialect::Plain));
     }
+    let separator = lines::separator(line);
+    let first = lines::Fields::new(line, separator).field().unwrap_or(b"");
+    if first.first().is_some_and(|b| b.is_ascii_alphabetic() || *b == b'"') && line.contains(&separator.unwrap_or(b' '))
+    {
+        // Names of columns, but not those that are needed: the reader says which.
+        return Ok(Format::Named(Dialect::Plain));
+    }
     let mut fields = lines::Fields::new(line, None);
     let third = (fields.field(), fields.field(), fields.field()).2;
     if third.is_some_and(|t| t.first().is_some_and(u8::is_ascii_alphabetic)) {
@@ -203,6 +210,10 @@ mod tests {
         assert_eq!(look("0 1 Car 0 0 0 1 2 3 4\n").unwrap(), Format::Kitti);
         assert_eq!(look("frame,particle,x,y\n").unwrap(), Format::Named(Dialect::Plain));
         assert_eq!(look("").unwrap(), Format::Mot);
+        assert_eq!(look("\u{feff}# by hand\nframe;particle;x;y\n").unwrap(), Format::Named(Dialect::Plain));
+        assert_eq!(look("frame\tx\ty\n").unwrap(), Format::Named(Dialect::Plain), "no KITTI label");
+        std::fs::write(f.path(), b"\xff\xfef\0").unwrap();
+        assert!(sniff(f.path()).unwrap_err().to_string().contains("UTF-16"));
         assert!(look("<html>hello</html>").unwrap_err().to_string().contains("no table of tracks known here"));
     }
 }

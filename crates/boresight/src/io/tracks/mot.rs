@@ -62,6 +62,10 @@ fn row(mut f: Fields<'_>, from_zero: bool) -> Result<(TrackRow, [f64; 3])> {
     for (v, what) in bbox.iter_mut().zip(["a left edge", "a top edge", "a width", "a height"]) {
         *v = f.number(what)?;
     }
+    if bbox[2] < 0.0 || bbox[3] < 0.0 {
+        let what = format!("expected a size of at least 0 px, found {} x {}", bbox[2], bbox[3]);
+        return Err(Error::new(ErrorKind::Damaged, what).at("columns 5 and 6").hint("are these right and bottom?"));
+    }
     let score = f.optional("a confidence")?.unwrap_or(1.0);
     let eighth = f.optional("a class or a place x")?;
     let ninth = f.optional("a visible share or a place y")?;

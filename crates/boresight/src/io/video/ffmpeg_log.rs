@@ -88,7 +88,10 @@ impl Log {
         } else if any(&["Decoder", "decoder", "not supported"]) {
             (ErrorKind::Unsupported, "an ffmpeg with more decoders may read it")
         } else {
-            (ErrorKind::Damaged, "try to play it with `ffplay`, or copy it again")
+            (
+                ErrorKind::Damaged,
+                "try to play it with `ffplay`, or copy it again; of frames without a header say the layout: --set 'input.raw={width=640, height=512, pixel=\"u16-le\"}'",
+            )
         };
         let what = if text.is_empty() {
             format!("ffmpeg cannot read it: {why}")

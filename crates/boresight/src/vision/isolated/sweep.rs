@@ -38,11 +38,11 @@ impl Blob {
     }
 }
 
-/// The pixel values that belong to a level's set.
+/// The pixel values that belong to a level's set; infinite ones are no measurement, as NaN is none.
 pub fn band<T: Pixel>(side: Side, level: f64) -> Option<(T, T)> {
     match side {
-        Side::Bright => T::band(level, f64::INFINITY),
-        Side::Dark => T::band(f64::NEG_INFINITY, level),
+        Side::Bright => T::band(level, f64::MAX),
+        Side::Dark => T::band(f64::MIN, level),
     }
 }
 

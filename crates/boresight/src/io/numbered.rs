@@ -1,0 +1,85 @@
+//! Numbers in the names of a sequence's files: where frames are missing, the times behind the hole are later.
+//!
+//! Source: our own. Names that differ in one number only, which rises by the same step nearly everywhere, are numbered frames;
+//! a rise by several steps is a hole. Names of any other form, or with more holes than frames, say nothing.
+
+use std::path::PathBuf;
+
+/// What the numbers in the names say.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Numbering {
+    /// Each file's place in the full sequence, from 0.
+    pub places: Vec<u64>,
+    /// Number of missing files.
+    pub n_missing: u64,
+    /// The files before and behind the first hole.
+    pub first_hole: (usize, usize),
+}
+
+impl Numbering {
+    /// A frame's place in the full sequence; frames beyond the files (pages of one) follow on.
+    pub fn place(&self, frame: u64) -> u64 {
+        let known = usize::try_from(frame).ok().and_then(|i| self.places.get(i));
+        known.copied().unwrap_or_else(|| frame.saturating_add(self.n_missing))
+    }
+}
+
+/// Finds holes in the numbering of files in natural order; `None` if there are none, or no numbering.
+pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
+    let name = |f: &PathBuf| f.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let names: Vec<String> = files.iter().map(name).collect::<Option<_>>()?;
+    let (head, tail) = split(names.first()?).map(|(head, _, tail)| (head.to_string(), tail.to_string()))?;
+    let numbers: Vec<u64> = names
+        .iter()
+        .map(|n| split(n).filter(|(h, _, t)| *h == head && *t == tail).and_then(|(_, digits, _)| digits.parse().ok()))
+        .collect::<Option<_>>()?;
+    let rises: Vec<u64> = numbers.windows(2).map(|w| w[1].checked_sub(w[0])).collect::<Option<_>>()?;
+    let step = *rises.iter().min()?;
+    if step == 0
+        || rises.iter().any(|r| r % step != 0)
+        || rises.iter().filter(|r| **r == step).count() * 2 < rises.len()
+    {
+        return None;
+    }
+    let places: Vec<u64> = numbers.iter().map(|n| (n - numbers[0]) / step).collect();
+    let n_missing = places.last()? + 1 - places.len() as u64;
+    let at = rises.iter().position(|r| *r > step)?;
+    (n_missing <= places.len() as u64).then_some(Numbering { places, n_missing, first_hole: (at, at + 1) })
+}
+
+/// Splits a name at its last number.
+fn split(name: &str) -> Option<(&str, &str, &str)> {
+    let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = name[..end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |i| i + name[i..].chars().next().map_or(1, char::len_utf8));
+    Some((&name[..start], &name[start..end], &name[end..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(names: &[&str]) -> Option<Numbering> {
+        holes(&names.iter().map(PathBuf::from).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_hole_delays_what_stands_behind_it() {
+        let found = of(&["é1_t003.png", "é1_t004.png", "é1_t005.png", "é1_t009.png", "é1_t010.png"]).unwrap();
+        assert_eq!(found, Numbering { places: vec![0, 1, 2, 6, 7], n_missing: 3, first_hole: (2, 3) });
+        assert_eq!(of(&["a/10.png", "a/20.png", "a/40.png"]).unwrap().places, [0, 1, 3]);
+    }
+
+    #[test]
+    fn names_that_are_no_numbering_say_nothing() {
+        assert_eq!(of(&["f1.png", "f2.png", "f3.png"]), None);
+        assert_eq!(of(&["f1.png", "g2.png", "f5.png"]), None, "two sequences");
+        assert_eq!(of(&["f1.png", "f2.png", "f900.png"]), None, "more holes than frames");
+        assert_eq!(of(&["f1.png", "f2.tif", "f2.png", "f4.png"]), None, "a number twice");
+        assert_eq!(of(&["f1.png", "f4.png", "f6.png", "f11.png"]), None, "times in the names");
+        assert_eq!(of(&["a.png", "b.png"]), None);
+        assert_eq!(of(&["99999999999999999999999.png", "3.png"]), None);
+        assert_eq!(of(&[]), None);
+    }
+}
