@@ -62,14 +62,18 @@ impl JpdaConfig {
 /// One group in local numbers: rows with their weights, columns renumbered.
 #[derive(Clone, Debug, Default)]
 pub struct Problem {
-    /// Weight of a miss of each row, scaled.
+    /// Weight of a miss of each row, scaled as its pairs.
     pub miss: Vec<f64>,
+    /// Its logarithm, where the weight itself may be too small for f64.
+    pub ln_miss: Vec<f64>,
     /// Start of each row's pairs, one more than rows.
     pub starts: Vec<usize>,
     /// Local column of each pair.
     pub column: Vec<u32>,
-    /// Weight of each pair, scaled by row so that the largest of a row is 1.
+    /// Weight of each pair, scaled by row so that the largest of a row, the miss among them, is 1.
     pub weight: Vec<f64>,
+    /// Its logarithm.
+    pub ln_weight: Vec<f64>,
     /// Number of local columns.
     pub n_columns: usize,
     /// The answer: probability of each pair.
@@ -88,11 +92,11 @@ impl Problem {
     }
 
     fn load(&mut self, gates: &Gates, group: &[u32], local: &mut [u32]) {
-        self.miss.clear();
+        self.ln_miss.clear();
         self.starts.clear();
         self.starts.push(0);
         self.column.clear();
-        self.weight.clear();
+        self.ln_weight.clear();
         self.n_columns = 0;
         for row in group {
             for p in gates.row(*row as usize) {
@@ -102,7 +106,7 @@ impl Problem {
         for row in group {
             let row = *row as usize;
             let miss = gates.log_miss(row);
-            let from = self.weight.len();
+            let from = self.ln_weight.len();
             let mut top = miss;
             for p in gates.row(row) {
                 let w = gates.log_weight(row, p);
@@ -113,14 +117,20 @@ impl Problem {
                     self.n_columns += 1;
                 }
                 self.column.push(*c);
-                self.weight.push(w);
+                self.ln_weight.push(w);
             }
-            for w in &mut self.weight[from..] {
-                *w = (*w - top).exp();
+            // A row that can neither be missed nor seen would leave no joint event at all: it counts as missed.
+            let (miss, top) = if top.is_finite() { (miss, top) } else { (0.0, 0.0) };
+            for w in &mut self.ln_weight[from..] {
+                *w -= top;
             }
-            self.miss.push((miss - top).exp());
-            self.starts.push(self.weight.len());
+            self.ln_miss.push(miss - top);
+            self.starts.push(self.ln_weight.len());
         }
+        self.weight.clear();
+        self.weight.extend(self.ln_weight.iter().map(|w| w.exp()));
+        self.miss.clear();
+        self.miss.extend(self.ln_miss.iter().map(|w| w.exp()));
         self.probability.clear();
         self.probability.resize(self.weight.len(), 0.0);
     }
@@ -205,40 +215,74 @@ impl Associator for Jpda {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::associate::{Pair, Prior};
     use proptest::prelude::*;
 
-    /// Pair probabilities by listing every joint event.
-    pub(crate) fn brute_force(p: &Problem) -> Vec<f64> {
-        fn visit(p: &Problem, row: usize, used: u64, weight: f64, chosen: &mut Vec<usize>, sum: &mut Vec<f64>) -> f64 {
+    /// Every joint event: ln of its weight and the pairs taken.
+    fn events(p: &Problem) -> Vec<(f64, Vec<usize>)> {
+        fn visit(
+            p: &Problem,
+            row: usize,
+            used: u64,
+            ln: f64,
+            taken: &mut Vec<usize>,
+            out: &mut Vec<(f64, Vec<usize>)>,
+        ) {
             if row == p.n_rows() {
-                for c in chosen.iter() {
-                    sum[*c] += weight;
-                }
-                return weight;
+                out.push((ln, taken.clone()));
+                return;
             }
-            let mut total = visit(p, row + 1, used, weight * p.miss[row], chosen, sum);
+            visit(p, row + 1, used, ln + p.ln_miss[row], taken, out);
             for k in p.row(row) {
                 let bit = 1 << p.column[k];
                 if used & bit == 0 {
-                    chosen.push(k);
-                    total += visit(p, row + 1, used | bit, weight * p.weight[k], chosen, sum);
-                    chosen.pop();
+                    taken.push(k);
+                    visit(p, row + 1, used | bit, ln + p.ln_weight[k], taken, out);
+                    taken.pop();
                 }
             }
-            total
         }
-        let mut sum = vec![0.0; p.weight.len()];
-        let total = visit(p, 0, 0, 1.0, &mut Vec::new(), &mut sum);
-        sum.iter().map(|s| s / total).collect()
+        let mut out = Vec::new();
+        visit(p, 0, 0, 0.0, &mut Vec::new(), &mut out);
+        out
+    }
+
+    fn shares(p: &Problem, events: &[(f64, Vec<usize>)]) -> Vec<f64> {
+        let top = events.iter().map(|e| e.0).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = events.iter().map(|e| (e.0 - top).exp()).sum();
+        let of = |k: usize| events.iter().filter(|e| e.1.contains(&k)).map(|e| (e.0 - top).exp()).sum::<f64>() / total;
+        (0..p.weight.len()).map(of).collect()
+    }
+
+    /// Pair probabilities by listing every joint event.
+    pub(crate) fn brute_force(p: &Problem) -> Vec<f64> {
+        shares(p, &events(p))
+    }
+
+    /// The same of the likeliest permutation of each set of tracks and each set of detections (JPDA*).
+    fn brute_force_star(p: &Problem) -> Vec<f64> {
+        let rows_of = |taken: &[usize]| taken.iter().map(|k| p.starts.partition_point(|s| s <= k)).collect::<Vec<_>>();
+        let mut best: std::collections::BTreeMap<(Vec<usize>, std::collections::BTreeSet<u32>), (f64, Vec<usize>)> =
+            std::collections::BTreeMap::new();
+        for e in events(p) {
+            let key = (rows_of(&e.1), e.1.iter().map(|k| p.column[*k]).collect());
+            let kept = best.entry(key).or_insert_with(|| e.clone());
+            if e.0 > kept.0 {
+                *kept = e;
+            }
+        }
+        shares(p, &best.into_values().collect::<Vec<_>>())
     }
 
     pub(crate) fn problem(rows: &[(f64, Vec<(u32, f64)>)]) -> Problem {
         let mut p = Problem { starts: vec![0], ..Problem::default() };
         for (miss, pairs) in rows {
             p.miss.push(*miss);
+            p.ln_miss.push(miss.ln());
             for (c, w) in pairs {
                 p.column.push(*c);
                 p.weight.push(*w);
+                p.ln_weight.push(w.ln());
                 p.n_columns = p.n_columns.max(*c as usize + 1);
             }
             p.starts.push(p.weight.len());
@@ -255,7 +299,47 @@ pub(crate) mod tests {
         })
     }
 
+    /// A table of gates with clutter of this density; rows of log-likelihoods by detection.
+    fn gates(density: f64, p_detection: f64, rows: &[std::collections::BTreeMap<u32, f64>]) -> Gates {
+        let mut gates = Gates::new();
+        gates.reset(6, density);
+        for row in rows {
+            for (detection, log_likelihood) in row {
+                gates.push(Pair { detection: *detection, cost: 1.0, log_likelihood: *log_likelihood });
+            }
+            gates.end_row(Prior { p_detection, p_gate: 0.99, existence: 1.0, miss_cost: 9.21 });
+        }
+        gates
+    }
+
     proptest! {
+        #[test]
+        fn weights_are_those_of_the_listed_events_however_thin_the_clutter(
+            rows in prop::collection::vec(prop::collection::btree_map(0u32..6, -20.0..20.0f64, 1..5), 1..6),
+            exponent in 0..5usize,
+            sure in proptest::bool::ANY,
+        ) {
+            // Density 0 is taken as 1e-200: two misses that a joint event forces already weigh less than the least f64.
+            let table = gates([1.0, 1e-5, 1e-50, 1e-150, 0.0][exponent], if sure { 1.0 } else { 0.7 }, &rows);
+            let all: Vec<u32> = (0..rows.len() as u32).collect();
+            let mut p = Problem::default();
+            p.load(&table, &all, &mut [u32::MAX; 6]);
+            let (plain, star) = (brute_force(&p), brute_force_star(&p));
+            prop_assert!(exact::Exact::default().solve(&mut p, 100_000));
+            for (a, b) in p.probability.iter().zip(&plain) {
+                prop_assert!((a - b).abs() < 1e-9, "{} instead of {}", a, b);
+            }
+            prop_assert!(star::Star::default().solve(&mut p, 100_000));
+            for (a, b) in p.probability.iter().zip(&star) {
+                prop_assert!((a - b).abs() < 1e-9, "JPDA*: {} instead of {}", a, b);
+            }
+            loopy::Loopy::default().solve(&mut p);
+            for r in 0..p.n_rows() {
+                let sum: f64 = p.row(r).map(|k| p.probability[k]).sum();
+                prop_assert!((0.0..=1.0 + 1e-9).contains(&sum), "belief propagation: {}", sum);
+            }
+        }
+
         #[test]
         fn the_exact_sum_equals_the_list_of_all_joint_events(p in any_problem()) {
             let mut p = p;

@@ -11,7 +11,8 @@ use super::Problem;
 struct Event {
     tracks: u64,
     detections: u128,
-    weight: f64,
+    /// ln of the joint weight: the weight itself of many misses in thin clutter is too small for f64.
+    ln_weight: f64,
     /// Place of its choices.
     at: u32,
 }
@@ -37,50 +38,60 @@ impl Star {
         self.events.clear();
         self.choices.clear();
         self.path.clear();
-        if !self.list(p, 0, 0, 0, 1.0, max_events) {
+        if !self.list(p, 0, 0, 0, 0.0, max_events) {
             return false;
         }
         // Best first within each pair of sets; the order of listing breaks ties.
         self.events.sort_by(|a, b| {
             (a.tracks, a.detections)
                 .cmp(&(b.tracks, b.detections))
-                .then(b.weight.total_cmp(&a.weight))
+                .then(b.ln_weight.total_cmp(&a.ln_weight))
                 .then(a.at.cmp(&b.at))
         });
         self.events.dedup_by_key(|e| (e.tracks, e.detections));
-        let total: f64 = self.events.iter().map(|e| e.weight).sum();
-        if total <= 0.0 {
+        let top = self.events.iter().map(|e| e.ln_weight).fold(f64::NEG_INFINITY, f64::max);
+        if !top.is_finite() {
             return false;
         }
+        let total: f64 = self.events.iter().map(|e| (e.ln_weight - top).exp()).sum();
         p.probability.fill(0.0);
         for e in &self.events {
+            let share = (e.ln_weight - top).exp() / total;
             for k in &self.choices[e.at as usize..e.at as usize + n] {
                 if *k != MISSED {
-                    p.probability[*k as usize] += e.weight / total;
+                    p.probability[*k as usize] += share;
                 }
             }
         }
         true
     }
 
-    fn list(&mut self, p: &Problem, row: usize, tracks: u64, detections: u128, weight: f64, max_events: usize) -> bool {
+    fn list(
+        &mut self,
+        p: &Problem,
+        row: usize,
+        tracks: u64,
+        detections: u128,
+        ln_weight: f64,
+        max_events: usize,
+    ) -> bool {
         if row == p.n_rows() {
             if self.events.len() == max_events {
                 return false;
             }
-            self.events.push(Event { tracks, detections, weight, at: self.choices.len() as u32 });
+            self.events.push(Event { tracks, detections, ln_weight, at: self.choices.len() as u32 });
             self.choices.extend_from_slice(&self.path);
             return true;
         }
         self.path.push(MISSED);
-        let mut fits = self.list(p, row + 1, tracks, detections, weight * p.miss[row], max_events);
+        let mut fits = self.list(p, row + 1, tracks, detections, ln_weight + p.ln_miss[row], max_events);
         self.path.pop();
         for k in p.row(row) {
             let bit = 1 << p.column[k];
             if fits && detections & bit == 0 {
                 self.path.push(k as u32);
                 let (t, d) = (tracks | 1 << row, detections | bit);
-                fits = self.list(p, row + 1, t, d, weight * p.weight[k], max_events);
+                fits = self.list(p, row + 1, t, d, ln_weight + p.ln_weight[k], max_events);
                 self.path.pop();
             }
         }
