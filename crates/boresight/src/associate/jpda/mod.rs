@@ -203,10 +203,13 @@ impl Associator for Jpda {
         out.reset();
         let mut at = 0;
         for i in 0..gates.n_tracks() {
-            for pair in gates.row(i) {
-                out.push(pair.detection, self.found[at].clamp(0.0, 1.0));
-                at += 1;
+            let row = &self.found[at..at + gates.row(i).len()];
+            // More than 1 by the rounding of long sums is 1: filters refuse it.
+            let scale = 1.0 / row.iter().sum::<f64>().max(1.0);
+            for (pair, probability) in gates.row(i).iter().zip(row) {
+                out.push(pair.detection, probability * scale);
             }
+            at += row.len();
             out.end_row();
         }
     }
