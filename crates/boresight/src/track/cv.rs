@@ -7,6 +7,7 @@
 //! Symbols: state `[x, vx, y, vy]` (px, px/s); q acceleration variance, px²/s⁴; r measurement variance, px².
 //! Limits: linear, constant velocity with piecewise-constant acceleration over each dt.
 
+use boresight_filters::mixture::mixture_update;
 use boresight_filters::{Filter, FilterError, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
@@ -97,7 +98,8 @@ impl ConstantVelocity {
             for a in 0..2 {
                 axes[a].correct(z.position[a], r[(a, a)]);
             }
-            let fine = axes.iter().all(|a| (a.x + a.v).is_finite() && a.xx > 0.0 && a.vv > 0.0);
+            // 0 is a variance too: a measurement without noise leaves nothing unknown.
+            let fine = axes.iter().all(|a| (a.x + a.v).is_finite() && a.xx >= 0.0 && a.vv >= 0.0);
             if !fine {
                 return Err(FilterError::NotPositiveDefinite("innovation covariance"));
             }
@@ -169,24 +171,16 @@ impl Filter for ConstantVelocity {
             [] => Ok(()),
             [one] if one.weight >= 1.0 => self.correct_one(&one.measurement),
             _ => {
-                let before = self.kinematics();
-                let missed = (1.0 - hypotheses.iter().map(|h| h.weight).sum::<f64>()).max(0.0);
-                let mut second = before.cov * missed;
-                let mut parts = 0.0;
-                // Deviations are taken from the prediction: small numbers keep their digits far from the origin.
-                let mut shift = Vector4::zeros();
-                for h in hypotheses {
-                    let (m, p) = corrected(&before, &h.measurement)?;
-                    let d = m - before.mean;
-                    shift += d * h.weight;
-                    second += (p + d * d.transpose()) * h.weight;
-                    parts += h.weight;
-                }
-                if parts > 1.0 + 1e-9 {
+                let sum: f64 = hypotheses.iter().map(|h| h.weight).sum();
+                if sum > 1.0 + 1e-9 {
                     return Err(FilterError::OutOfRange("weights that sum to at most 1"));
                 }
-                let cov = second - shift * shift.transpose();
-                let mean = before.mean + shift;
+                // More than 1 by rounding is 1.
+                let scale = 1.0 / sum.max(1.0);
+                let capped = hypotheses.iter().map(|h| Weighted { weight: h.weight * scale, ..*h });
+                // The spread of the components is summed about their own mean: it cannot cancel.
+                let next = mixture_update(&self.kinematics(), [0, 2], capped)?;
+                let (mean, cov) = (next.mean, next.cov);
                 if !mean.iter().chain(cov.iter()).all(|v| v.is_finite()) {
                     return Err(FilterError::NotPositiveDefinite("updated covariance"));
                 }
@@ -207,5 +201,46 @@ impl Filter for ConstantVelocity {
             xw,   vw,   b.xv, b.vv,
         );
         Gaussian { mean: Vector4::new(a.x, a.v, b.x, b.v), cov }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filter() -> ConstantVelocity {
+        let cov = Matrix4::from_diagonal(&Vector4::new(1.0, 4.0, 2.0, 4.0));
+        let mut f = ConstantVelocity::new(&Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov }, 2.0);
+        f.predict(0.5).unwrap();
+        f
+    }
+
+    fn sure(x: f64, y: f64, cov: Matrix2<f64>) -> Weighted {
+        Weighted { measurement: Measurement { position: Vector2::new(x, y), cov }, weight: 1.0 }
+    }
+
+    #[test]
+    fn a_measurement_without_noise_is_taken_as_it_is() {
+        let mut f = filter();
+        f.update(&[sure(7.0, 5.0, Matrix2::zeros())]).unwrap();
+        let k = f.kinematics();
+        assert_eq!((k.mean[0], k.mean[2]), (7.0, 5.0));
+        assert!(k.cov[(0, 0)] == 0.0 && k.cov[(1, 1)] > 0.0);
+        // The next one, too, after any time; at once it has nothing to tell.
+        assert!(f.update(&[sure(7.0, 5.0, Matrix2::zeros())]).is_err());
+        f.predict(0.5).unwrap();
+        f.update(&[sure(7.5, 4.5, Matrix2::zeros())]).unwrap();
+        assert_eq!(f.position(), [7.5, 4.5]);
+    }
+
+    #[test]
+    fn two_halves_of_one_far_measurement_are_that_measurement() {
+        let r = Matrix2::new(0.5, 0.1, 0.1, 0.3);
+        let (mut whole, mut halves) = (filter(), filter());
+        let z = sure(1e9, -2e9, r);
+        whole.update(&[z]).unwrap();
+        halves.update(&[Weighted { weight: 0.5, ..z }, Weighted { weight: 0.5, ..z }]).unwrap();
+        let (a, b) = (whole.kinematics(), halves.kinematics());
+        assert!((a.cov - b.cov).amax() < 1e-9, "{} instead of {}", b.cov, a.cov);
     }
 }
