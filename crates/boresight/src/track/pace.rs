@@ -16,8 +16,11 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Takes the newest interval, s.
+    /// Takes the newest interval, s; scans of one time (of several sensors) are one look.
     pub fn note(&mut self, dt_s: f64) {
+        if dt_s <= 0.0 {
+            return;
+        }
         self.recent[self.next] = dt_s;
         self.next = (self.next + 1) % KEPT;
         self.n = (self.n + 1).min(KEPT);
@@ -36,6 +39,17 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scans_of_several_sensors_at_one_time_are_one_look() {
+        let mut pace = Pace::default();
+        for _ in 0..20 {
+            for dt in [5.0, 0.0, 0.0] {
+                pace.note(dt);
+                assert_eq!(pace.interval_s(), 5.0);
+            }
+        }
+    }
 
     #[test]
     fn an_hours_pause_does_not_change_the_pace() {
