@@ -80,7 +80,7 @@ impl Consistency {
 
 /// Averages values of `dimension` degrees of freedom; the bounds hold a consistent filter with `probability`.
 /// # Errors
-/// No values; a probability outside (0, 1).
+/// No values, or one that is not a number; a probability outside (0, 1).
 pub fn average(values: &[f64], dimension: usize, probability: f64) -> Result<Consistency> {
     if !(probability > 0.0 && probability < 1.0) {
         return Err(Error::new(ErrorKind::Config, "expected a probability in (0, 1)")
@@ -88,6 +88,10 @@ pub fn average(values: &[f64], dimension: usize, probability: f64) -> Result<Con
     }
     if values.is_empty() || dimension == 0 {
         return Err(Error::new(ErrorKind::Config, "expected at least one value of at least one dimension"));
+    }
+    if values.iter().any(|v| v.is_nan()) {
+        // Neither above nor below any bound, it would pass for consistent.
+        return Err(Error::new(ErrorKind::Numeric, "a normalised square is not a number"));
     }
     let n = values.len() as f64;
     let chi = ChiSquared::new(n * dimension as f64).map_err(|e| Error::new(ErrorKind::Numeric, e.to_string()))?;
@@ -126,6 +130,15 @@ mod tests {
         assert!((c.lower - 74.222 / 50.0).abs() < 1e-4 && (c.upper - 129.561 / 50.0).abs() < 1e-4, "{c:?}");
         assert!(c.is_credible());
         assert_eq!(average(&[4.0; 50], 2, 0.95).unwrap().verdict(), "optimistic: the covariance is too small");
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_never_called_consistent() {
+        assert!(average(&[2.0, f64::NAN], 2, 0.95).unwrap_err().to_string().contains("not a number"));
+        assert_eq!(
+            average(&[2.0, f64::INFINITY], 2, 0.95).unwrap().verdict(),
+            "optimistic: the covariance is too small"
+        );
     }
 
     #[test]
