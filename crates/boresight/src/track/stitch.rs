@@ -88,8 +88,11 @@ pub fn stitch(fragments: &[Fragment], config: &StitchConfig) -> Result<Vec<Track
     let mut gates = Gates::new();
     gates.reset(fragments.len(), 1.0);
     // Joins cost what their density says; the worst join that passes the gate costs least than this.
-    let far = config.max_speed_px_per_s * config.max_gap_s;
+    let std = |g: &Gaussian<4>| finite(g.cov[(0, 0)].max(g.cov[(2, 2)])).max(0.0).sqrt();
+    let vaguest_start = fragments.iter().map(|f| std(&f.first)).fold(0.0, f64::max);
+    let longest_s = config.max_gap_s.max(config.max_overlap_s);
     for f in fragments {
+        let far = config.max_speed_px_per_s * longest_s + 3.0 * std(&f.last).hypot(vaguest_start);
         let mut row = Vec::new();
         let (x, y) = (finite(f.last.mean[0]), finite(f.last.mean[2]));
         let mut looked_at = 0;
@@ -98,8 +101,7 @@ pub fn stitch(fragments: &[Fragment], config: &StitchConfig) -> Result<Vec<Track
             let next = &fragments[p.index as usize];
             let gap_s = next.begin.seconds_since(f.end);
             let in_time = gap_s > -config.max_overlap_s && gap_s <= config.max_gap_s && next.begin > f.begin;
-            let reach = config.max_speed_px_per_s * gap_s.abs()
-                + 3.0 * (f.last.cov[(0, 0)] + next.first.cov[(0, 0)]).abs().sqrt();
+            let reach = config.max_speed_px_per_s * gap_s.abs() + 3.0 * std(&f.last).hypot(std(&next.first));
             if in_time
                 && next.id != f.id
                 && (p.x - x).hypot(p.y - y) <= reach
@@ -190,6 +192,22 @@ mod tests {
         ];
         let ids: Vec<u64> = stitch(&fragments, &StitchConfig::default()).unwrap().iter().map(|i| i.0).collect();
         assert_eq!(ids, [1, 2, 2, 1, 5]);
+    }
+
+    #[test]
+    fn vague_ends_are_joined_as_far_as_their_uncertainty_reaches() {
+        // Slow things, known to 5 px: their ends may lie farther apart than they can go in the gap.
+        let vague = |id, begin_s, end_s, x: f64| {
+            let mut f = fragment(id, begin_s, end_s, |_| [x, 0.0, 10.0, 0.0]);
+            (f.first.cov, f.last.cov) = (f.first.cov * 50.0, f.last.cov * 50.0);
+            f
+        };
+        let mut fragments = vec![vague(1, 0.0, 1.0, 50.0), vague(2, 1.5, 2.0, 58.0)];
+        // Others fill the grid, so that only what is near is looked at.
+        fragments.extend((0..400).map(|k| vague(100 + k, 5.0, 6.0, 0.5 * k as f64)));
+        let config = StitchConfig { max_speed_px_per_s: 1.0, ..StitchConfig::default() };
+        let ids = stitch(&fragments, &config).unwrap();
+        assert_eq!((ids[0].0, ids[1].0), (1, 1));
     }
 
     #[test]
