@@ -3,7 +3,8 @@
 //! Source: S. J. Julier, J. K. Uhlmann, "Unscented filtering and nonlinear estimation", Proc. IEEE 92(3), 2004; scaled
 //! weights as in E. A. Wan, R. van der Merwe, 2000 with α = 1, β = 0, κ chosen by the caller (default 3 - N, at least 0).
 //! Symbols: χ_i = x ± column i of sqrt((N + κ) P), L Lᵀ = P by Cholesky; w_0 = κ/(N + κ), w_i = 1/(2(N + κ)).
-//! Differs from it: κ is kept at 0 or above, so no weight is negative and covariances stay positive semi-definite.
+//! Differs from it: κ is kept at 0 or above, so no weight is negative, and P - K S Kᵀ is summed as the spread of the points
+//! χ - K h(χ) with K R Kᵀ: covariances stay positive semi-definite.
 //! Linear models and position measurements give the Kalman answer. Cost: 2N + 1 motions, N³ for each root and product.
 //! Limits: a posterior bent within one standard deviation (range known far better than azimuth) is still no Gaussian.
 
@@ -61,15 +62,17 @@ impl<M: Model<N, T>, const N: usize, T: Real> Ukf<M, N, T> {
         let h0 = sensor.measure(&x);
         // Differences to the centre's measurement: angles are averaged on the near side of it.
         let side = |i: usize, sign: T| sensor.residual(&sensor.measure(&(x + l.column(i) * sign)), &h0);
+        let signs = [T::one(), -T::one()];
+        let sides: [[SVector<T, K>; 2]; N] = core::array::from_fn(|i| signs.map(|sign| side(i, sign)));
         let mut mean = SVector::<T, K>::zeros();
-        for i in 0..N {
-            mean += (side(i, T::one()) + side(i, -T::one())) * w;
+        for [plus, minus] in &sides {
+            mean += (plus + minus) * w;
         }
         let mut s = *r + mean * mean.transpose() * w0;
         let mut cross = SMatrix::<T, N, K>::zeros();
-        for i in 0..N {
-            for sign in [T::one(), -T::one()] {
-                let d = side(i, sign) - mean;
+        for (i, both) in sides.iter().enumerate() {
+            for (d, sign) in both.iter().zip(signs) {
+                let d = d - mean;
                 s += d * d.transpose() * w;
                 cross += l.column(i) * d.transpose() * (w * sign);
             }
@@ -78,7 +81,15 @@ impl<M: Model<N, T>, const N: usize, T: Real> Ukf<M, N, T> {
         let chol = Cholesky::new(&s, "the innovation covariance")?;
         let gain = chol.solve(&cross.transpose()).transpose();
         let innovation = sensor.residual(z, &(h0 + mean));
-        let mut cov = self.belief.cov - gain * s * gain.transpose();
+        // P - K S Kᵀ as the spread of χ - K h(χ) with K R Kᵀ: a sum of squares keeps its sign where P far exceeds R.
+        let off = gain * mean;
+        let mut cov = gain * r * gain.transpose() + off * off.transpose() * w0;
+        for (i, both) in sides.iter().enumerate() {
+            for (d, sign) in both.iter().zip(signs) {
+                let kept = l.column(i) * sign - gain * (d - mean);
+                cov += kept * kept.transpose() * w;
+            }
+        }
         symmetrize(&mut cov);
         let belief = Gaussian { mean: x + gain * innovation, cov };
         let white = chol.whiten(&innovation);
@@ -168,5 +179,37 @@ impl<M: Model<N, T>, const N: usize, T: Real> GaussianFilter<N> for Ukf<M, N, T>
 
     fn kinematics(&self) -> Gaussian<4, T> {
         self.model.kinematics(&self.belief)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ud;
+    use crate::model::ConstantVelocity;
+
+    #[test]
+    fn a_sharp_measurement_of_a_target_known_in_one_direction_only_is_taken() {
+        // The place is known, the velocity is not, and nothing disturbs it: after a step P has rank one an axis.
+        let cv = ConstantVelocity::continuous(0.0).unwrap();
+        for (velocity_var, variance, dt) in [(100.0, 1.0, 10.0), (1e4, 1e-2, 3.0), (1.0, 1e-6, 700.0), (0.3, 1e-3, 1e4)]
+        {
+            let cov =
+                SMatrix::<f64, 4, 4>::from_diagonal(&SVector::<f64, 4>::new(0.0, velocity_var, 0.0, velocity_var));
+            let prior = Gaussian { mean: SVector::zeros(), cov };
+            let (mut ukf, mut ud) = (Ukf::start(cv, prior).unwrap(), Ud::start(cv, prior).unwrap());
+            for k in 1..=3 {
+                let position = nalgebra::Vector2::new(dt * f64::from(k), -dt * f64::from(k));
+                let z = Measurement { position, cov: Matrix2::identity() * variance };
+                ukf.predict(dt).unwrap();
+                ud.predict(dt).unwrap();
+                ukf.correct(&z).unwrap();
+                ud.correct(&z).unwrap();
+            }
+            let (a, b) = (ukf.belief().cov, ud.belief().cov);
+            for i in 0..4 {
+                assert!((a[(i, i)] / b[(i, i)] - 1.0).abs() < 1e-6, "{dt}: {a} instead of {b}");
+            }
+        }
     }
 }
