@@ -220,17 +220,14 @@ pub(crate) mod tests {
     use super::*;
     use crate::associate::{Pair, Prior};
     use proptest::prelude::*;
+    use std::collections::{BTreeMap, BTreeSet};
 
-    /// Every joint event: ln of its weight and the pairs taken.
-    fn events(p: &Problem) -> Vec<(f64, Vec<usize>)> {
-        fn visit(
-            p: &Problem,
-            row: usize,
-            used: u64,
-            ln: f64,
-            taken: &mut Vec<usize>,
-            out: &mut Vec<(f64, Vec<usize>)>,
-        ) {
+    /// A joint event: ln of its weight and the pairs taken.
+    type Event = (f64, Vec<usize>);
+
+    /// Every joint event.
+    fn events(p: &Problem) -> Vec<Event> {
+        fn visit(p: &Problem, row: usize, used: u64, ln: f64, taken: &mut Vec<usize>, out: &mut Vec<Event>) {
             if row == p.n_rows() {
                 out.push((ln, taken.clone()));
                 return;
@@ -250,7 +247,7 @@ pub(crate) mod tests {
         out
     }
 
-    fn shares(p: &Problem, events: &[(f64, Vec<usize>)]) -> Vec<f64> {
+    fn shares(p: &Problem, events: &[Event]) -> Vec<f64> {
         let top = events.iter().map(|e| e.0).fold(f64::NEG_INFINITY, f64::max);
         let total: f64 = events.iter().map(|e| (e.0 - top).exp()).sum();
         let of = |k: usize| events.iter().filter(|e| e.1.contains(&k)).map(|e| (e.0 - top).exp()).sum::<f64>() / total;
@@ -265,8 +262,7 @@ pub(crate) mod tests {
     /// The same of the likeliest permutation of each set of tracks and each set of detections (JPDA*).
     fn brute_force_star(p: &Problem) -> Vec<f64> {
         let rows_of = |taken: &[usize]| taken.iter().map(|k| p.starts.partition_point(|s| s <= k)).collect::<Vec<_>>();
-        let mut best: std::collections::BTreeMap<(Vec<usize>, std::collections::BTreeSet<u32>), (f64, Vec<usize>)> =
-            std::collections::BTreeMap::new();
+        let mut best = BTreeMap::<(Vec<usize>, BTreeSet<u32>), Event>::new();
         for e in events(p) {
             let key = (rows_of(&e.1), e.1.iter().map(|k| p.column[*k]).collect());
             let kept = best.entry(key).or_insert_with(|| e.clone());
@@ -303,7 +299,7 @@ pub(crate) mod tests {
     }
 
     /// A table of gates with clutter of this density; rows of log-likelihoods by detection.
-    fn gates(density: f64, p_detection: f64, rows: &[std::collections::BTreeMap<u32, f64>]) -> Gates {
+    fn gates(density: f64, p_detection: f64, rows: &[BTreeMap<u32, f64>]) -> Gates {
         let mut gates = Gates::new();
         gates.reset(6, density);
         for row in rows {
