@@ -20,7 +20,7 @@ pub struct DetectionTable {
     pub rate_hz: f64,
     /// What kind of table it was, for the summary: `boresight detections`, `MOTChallenge`, `CSV (frame, x, y)`.
     pub format: String,
-    /// Names of the classes, by [`ClassId`], if the table has names instead of numbers.
+    /// Names of the classes, by [`crate::ClassId`], if the table has names instead of numbers.
     pub class_names: Vec<String>,
     /// Number of rows read.
     pub n_rows: u64,
