@@ -1,7 +1,7 @@
 //! Things that move before a fixed camera: people, cars, animals; detector and tracker from the size of what moves.
 
 use super::scene::{Camera, Scene};
-use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, TrackerConfig};
+use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, SharingConfig, TrackerConfig};
 use crate::vision::background::{BackgroundConfig, ShadowConfig};
 use crate::vision::config::{CameraConfig, DetectorConfig};
 use crate::vision::threshold::ThresholdConfig;
@@ -80,6 +80,9 @@ pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker:
     tracker.max_speed_px_per_s = super::round(0.5 * info.width.max(info.height) as f64);
     tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: super::round(2.0 * side_px) });
     tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });
-    tracker.coast_s = 1.0;
+    // Arms and legs swing the edges of a box more than its middle.
+    tracker.sharing =
+        Some(SharingConfig { edge_std_px: super::round((0.1 * side_px).max(0.7)), ..SharingConfig::default() });
+    tracker.coast_s = 0.7;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
 }

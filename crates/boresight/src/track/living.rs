@@ -68,7 +68,8 @@ impl Track {
     #[inline]
     pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
         let kinematics = self.belief.kinematics();
-        let proven = self.proof.holds(&config.proof, [kinematics.mean[0], kinematics.mean[2]], camera, outcome.hit);
+        let at = [kinematics.mean[0], kinematics.mean[2]];
+        let proven = self.proof.holds(&config.proof, at, self.look.size, camera, outcome.hit);
         state_of(self.id, kinematics, &self.look, &self.life, proven, outcome, config)
     }
 }

@@ -212,7 +212,7 @@ impl Mht {
             }
             let kinematics = leaf.belief.kinematics();
             let at = [kinematics.mean[0], kinematics.mean[2]];
-            let proven = leaf.proof.holds(&self.config.proof, at, self.table.camera, leaf.outcome.hit);
+            let proven = leaf.proof.holds(&self.config.proof, at, leaf.look.size, self.table.camera, leaf.outcome.hit);
             let state = state_of(tree.id, kinematics, &leaf.look, &leaf.life, proven, &leaf.outcome, &self.config);
             self.states.push(state);
         }
