@@ -139,4 +139,9 @@ fn what_is_wrong_is_said_with_its_place() {
     assert!(fail("boresight fuse t.csv t.csv --map-b 1,2,3 -o f.csv").contains("6 or 9 numbers"));
     assert!(fail("boresight fuse t.csv t.csv --map-b affine -o f.csv").contains("--common"));
     assert!(fail("boresight reproduce no-such").contains("items"));
+    // A bad row in a table of tracks is an error, and no reason to take its estimates for detections.
+    std::fs::write(dir.path().join("bad.csv"), "frame,track_id,x,y\n0,1,5,5\n1,1,6,abc\n").unwrap();
+    assert!(fail("boresight fuse bad.csv t.csv -o f.csv").contains("line 3"));
+    std::fs::write(dir.path().join("d.csv"), "frame,x,y\n0,5,5\n1,6,abc\n").unwrap();
+    assert!(fail("boresight fuse t.csv d.csv -o f.csv").contains("line 3"));
 }

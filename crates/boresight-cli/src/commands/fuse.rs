@@ -44,6 +44,7 @@ enum Level {
 
 /// Fuse two tables of tracks or detections: bring them into one frame, register, pair, fuse, say where the sensors disagree.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:
   boresight fuse imaging/tracks.csv radar/tracks.csv -o fused.csv
   boresight fuse a.csv b.csv --register offset,rotation,time --rule independent

@@ -20,6 +20,7 @@ enum Method {
 
 /// Smooth a table of tracks: each row given all rows of its track (Rauch-Tung-Striebel).
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:
   boresight smooth flight.tracks/tracks.csv
       writes smoothed.csv; the acceleration is that of flight.tracks/config.toml

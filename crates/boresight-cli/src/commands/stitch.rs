@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 /// Join fragments of one target after gaps; with --smooth fill the gaps and smooth all tracks.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:
   boresight stitch flight.tracks/tracks.csv -o stitched.csv
       fragments at most 2 s apart that fit each other get one id; rows stay as they are

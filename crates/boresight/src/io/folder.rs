@@ -164,7 +164,13 @@ fn open_image(path: &Path, options: &OpenOptions, bytes: &mut Vec<u8>) -> Result
         format if format.is_image() => format,
         format => {
             let what = format!("expected an image (PNG, JPEG, TIFF, PNM or BMP), found {}", format.name());
-            return Err(Error::new(ErrorKind::Damaged, what));
+            let error = Error::new(ErrorKind::Damaged, what);
+            let video = matches!(format, Format::Mp4 | Format::Y4m | Format::Gif);
+            return Err(if video {
+                error.hint("a glob or a folder takes images; give videos one at a time")
+            } else {
+                error
+            });
         }
     };
     // No sound image needs more than this; a longer file is cut, and then fails as broken off.

@@ -50,10 +50,13 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
         let first = table.frames.first().map_or((0, 0.0), |f| (f.index.0, f.time.as_secs_f64()));
         return Ok(Sensor { tracks, scans: None, rate_hz: table.rate_hz, first });
     }
-    let table = match (read_detections(path, &options), tracks) {
-        (Ok(table), _) => table,
-        // Neither: what stood in the way of tracks is the better answer.
-        (Err(_), Err(e)) | (Err(e), Ok(_)) => return Err(e.into()),
+    let table = match (tracks, read_detections(path, &options)) {
+        // A bad row in a table of tracks does not make detections of them.
+        (Err(e), _) if e.kind() != ErrorKind::Unsupported => return Err(e.into()),
+        (_, Ok(table)) => table,
+        // No column names tracks, and none says where: the first is the better answer; a bad row tells of itself.
+        (Err(e), Err(bad)) if bad.kind() == ErrorKind::Unsupported => return Err(e.into()),
+        (_, Err(e)) => return Err(e.into()),
     };
     warn(&table.warnings);
     // Noise and speeds are those of the common frame.

@@ -7,8 +7,12 @@ use crate::{Pixels, Result, io::Colour};
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use std::io::Cursor;
 
+/// What the decoder may take beside the pixels, bytes: a palette and a row of the interlaced.
+const PALETTE: u64 = 1 << 16;
+
 pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pixels> {
-    let limits = Limits { bytes: usize::try_from(max_pixels.saturating_mul(8)).unwrap_or(usize::MAX) };
+    let limits =
+        Limits { bytes: usize::try_from(max_pixels.saturating_mul(8).saturating_add(PALETTE)).unwrap_or(usize::MAX) };
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);

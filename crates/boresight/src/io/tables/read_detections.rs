@@ -54,10 +54,10 @@ pub(crate) fn identified_of(
 ) -> Result<(DetectionTable, Vec<u64>)> {
     let layout = &table.layout;
     if !layout.has(&[Field::Frame]) {
-        return Err(table.lacks("which frame a row belongs to", "frame"));
+        return Err(table.lacks("which frame a row belongs to", "name it: --columns frame=NAME"));
     }
     if !layout.has_position() {
-        return Err(table.lacks("where a detection is (x and y, or a box)", "x=NAME,y"));
+        return Err(table.lacks("where a detection is (x and y, or a box)", "name them: --columns x=NAME,y=NAME"));
     }
     let reader = RowReader::new(table, options);
     let mut out = DetectionTable {

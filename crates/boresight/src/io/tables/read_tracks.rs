@@ -114,7 +114,7 @@ fn own_row(table: &Table, row: &Row<'_>) -> Result<(FrameIndex, Timestamp, Track
 /// Any other table: its rows are read as detections and get their identities.
 fn foreign_tracks(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<StateTable> {
     if !table.layout.has(&[Field::Id]) {
-        return Err(table.lacks("which track a row belongs to", "id"));
+        return Err(table.lacks("which track a row belongs to", "rename the one that does to track_id"));
     }
     let (read, ids) = identified_of(table, options, rate_beside, true)?;
     let mut out =

@@ -178,11 +178,11 @@ impl Table {
         })
     }
 
-    /// An error about the columns as a whole; `key` is a meaning that `--columns` could give a column.
-    pub fn lacks(&self, what: &str, key: &str) -> Error {
+    /// An error about the columns as a whole.
+    pub fn lacks(&self, what: &str, mend: &str) -> Error {
         Error::new(ErrorKind::Unsupported, format!("no column says {what}"))
             .at(&self.label)
-            .hint(format!("the columns are {}; name one, for example --columns {key}=NAME", list(&self.header)))
+            .hint(format!("the columns are {}; {mend}", list(&self.header)))
     }
 }
 
