@@ -30,6 +30,12 @@ impl Pace {
         self.median_s = sorted[(self.n - 1) / 2];
     }
 
+    /// How long `n` usual intervals last, s. Time stamps are whole nanoseconds, so an interval may be one too long: of several
+    /// that must not make a scan more.
+    pub fn span_s(&self, n: u32) -> f64 {
+        f64::from(n) * (self.median_s - 1e-9).max(0.0)
+    }
+
     /// The usual interval, s; 0 before two scans were seen.
     pub fn interval_s(&self) -> f64 {
         self.median_s
@@ -39,6 +45,25 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn five_scans_of_a_rate_that_nanoseconds_cannot_tell_last_no_longer_than_five_scans() {
+        for rate in [3.0, 6.0, 7.0, 60.0, 1024.0] {
+            let time = |k: u32| crate::Timestamp::from_secs_f64(f64::from(k) / rate);
+            let mut pace = Pace::default();
+            for k in 1..40 {
+                pace.note(time(k).seconds_since(time(k - 1)));
+                if k > 5 {
+                    let five = time(k).seconds_since(time(k - 5));
+                    assert!(
+                        pace.span_s(5) <= five && five - pace.span_s(5) < 1e-7,
+                        "{rate}: {} {five}",
+                        pace.span_s(5)
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn scans_of_several_sensors_at_one_time_are_one_look() {

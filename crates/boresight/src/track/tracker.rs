@@ -119,7 +119,7 @@ impl Tracker {
 
     /// How long a confirmed track may go without a detection, s.
     fn coast_budget_s(&self) -> f64 {
-        self.config.coast_s.max(f64::from(self.config.coast_scans) * self.pace.interval_s())
+        self.config.coast_s.max(self.pace.span_s(self.config.coast_scans))
     }
 
     /// Predicts every track, and gates the confirmed ones while they are at hand.

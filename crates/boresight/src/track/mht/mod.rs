@@ -158,7 +158,7 @@ impl Mht {
     }
 
     fn coast_budget_s(&self) -> f64 {
-        self.config.coast_s.max(f64::from(self.config.coast_scans) * self.pace.interval_s())
+        self.config.coast_s.max(self.pace.span_s(self.config.coast_scans))
     }
 
     /// Cuts histories whose coasting budget ended during a gap before `now`.

@@ -4,6 +4,7 @@ mod associators;
 mod extremes;
 mod merged;
 mod random_scans;
+mod units;
 
 use boresight::associate::{AssociatorConfig, jpda::Coalescence, jpda::JpdaConfig};
 use boresight::track::{
