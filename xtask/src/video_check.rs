@@ -1,9 +1,9 @@
-//! Compares decoded video with ffmpeg's frames, live: count, presentation times, luma bytes.
+//! Compares decoded video with ffmpeg's frames, live: count, presentation times, luma bytes (all three colours where a video holds no luma).
 //!
 //! `ffmpeg -f framecrc` prints time and Adler-32 (started at 0) of every raw luma plane.
 
 use anyhow::{Context, Result, bail};
-use boresight::io::OpenOptions;
+use boresight::io::{Colour, OpenOptions};
 use boresight::{FrameSource, Pixels, Timestamp};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -26,13 +26,13 @@ pub struct Args {
 /// Time (ns) and Adler-32 of the luma bytes of one frame.
 type Row = (i64, u32);
 
-/// What ffmpeg says of a video.
-pub fn ffmpeg_rows(file: &Path, threads: u32) -> Result<Vec<Row>> {
+/// What ffmpeg says of a video after a filter: `extractplanes=y` for the luma, `format=rgb24` where there is none.
+pub fn ffmpeg_rows(file: &Path, filter: &str) -> Result<Vec<Row>> {
     let output = Command::new("ffmpeg")
-        .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-threads", &threads.to_string()])
+        .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-threads", "1"])
         .args(["-copyts", "-noautorotate", "-i"])
         .arg(file)
-        .args(["-map", "0:v:0", "-vf", "extractplanes=y", "-fps_mode", "passthrough", "-enc_time_base", "-1"])
+        .args(["-map", "0:v:0", "-vf", filter, "-fps_mode", "passthrough", "-enc_time_base", "-1"])
         .args(["-f", "framecrc", "-"])
         .output()
         .context("ffmpeg is needed for the comparison")?;
@@ -77,6 +77,7 @@ pub fn our_rows(source: &mut dyn FrameSource) -> Result<Vec<Row>> {
         let crc = match &frame.pixels {
             Pixels::Gray8(i) => adler32(i.as_slice().iter().copied()),
             Pixels::Gray16(i) => adler32(i.as_slice().iter().flat_map(|v| v.to_le_bytes())),
+            Pixels::Rgb8(i) => adler32(i.as_slice().iter().flatten().copied()),
             other => bail!("{:?} frames", other.kind()),
         };
         rows.push((frame.time.ns, crc));
@@ -96,7 +97,12 @@ pub fn run(args: &Args) -> Result<()> {
     let mut wrong = 0;
     for file in &args.files {
         let start = Instant::now();
-        let theirs = ffmpeg_rows(file, 1)?;
+        let mut options = OpenOptions::default();
+        let mut theirs = ffmpeg_rows(file, "extractplanes=y")?;
+        if theirs.is_empty() {
+            options.colour = Colour::Rgb;
+            theirs = ffmpeg_rows(file, "format=rgb24")?;
+        }
         let their_s = start.elapsed().as_secs_f64();
         if args.reference {
             let head = fnv(&theirs[..theirs.len().min(40)]);
@@ -105,7 +111,6 @@ pub fn run(args: &Args) -> Result<()> {
             continue;
         }
         let start = Instant::now();
-        let options = OpenOptions::default();
         let opened = if args.pipe {
             boresight::io::video::open_ffmpeg(&file.to_string_lossy(), &options)
         } else {
@@ -119,7 +124,7 @@ pub fn run(args: &Args) -> Result<()> {
         let our_s = start.elapsed().as_secs_f64();
         let verdict = match &ours {
             Err(e) => format!("ERROR {e:#}"),
-            Ok((ours, ..)) if *ours == theirs => "same".to_string(),
+            Ok((ours, ..)) if *ours == theirs && !theirs.is_empty() => "same".to_string(),
             Ok((ours, ..)) => {
                 let at = ours.iter().zip(&theirs).position(|(a, b)| a != b);
                 let n = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
