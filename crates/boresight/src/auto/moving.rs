@@ -64,6 +64,10 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
     config.detector.cluster.distance_px = super::round((0.2 * w.min(h)).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
     tracker(w.max(h), info, interval_s, &mut config.tracker);
+    if let Some(sharing) = &mut config.tracker.sharing {
+        // People walk side by side for seconds.
+        sharing.longest_s = 8.0;
+    }
     reasons.push(format!(
         "Regions of {least} px or more count, parts nearer than {} px are one. What stands for a minute becomes background \
          (detector.threshold.moving.standing-time-s).",

@@ -1,6 +1,6 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
-use crate::track::TrackerConfig;
+use crate::track::{SharingConfig, TrackerConfig};
 use crate::vision::config::{CameraConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
@@ -119,6 +119,8 @@ pub fn configure(
     tracker.extra_noise_px += super::round(0.03 * large_px);
     tracker.acceleration_std_px_per_s2 = super::round((0.1 + 0.03 * large_px) / (interval_s * interval_s));
     tracker.coast_s = 0.7;
+    // An aircraft that falls in pieces for some frames is one track soon after.
+    tracker.sharing = Some(SharingConfig { longest_s: tracker.coast_s, ..SharingConfig::default() });
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.proof.start_score = 6.0;
     if seen.per_frame > MANY {

@@ -53,6 +53,7 @@ impl Scratch {
         Outcome {
             hit: true,
             shared: false,
+            guest: false,
             detection: Some(share.detection),
             ratio: prior.p_detection * density / clutter,
             innovation: Some(Innovation { residual, cov, nis }),
@@ -114,6 +115,7 @@ impl Scratch {
         Outcome {
             hit,
             shared: false,
+            guest: false,
             detection: hit.then_some(best.detection),
             ratio,
             // Of clutter alone it would say nothing of the filter.
@@ -136,7 +138,8 @@ pub(super) fn shared(track: &mut Track, predicted: &Predicted, part: &Part) -> O
     let nis = normalised_square(&residual, &cov);
     Outcome {
         hit: true,
-        shared: !part.main,
+        shared: true,
+        guest: !part.main,
         detection: Some(part.detection),
         ratio: 1.0,
         innovation: Some(Innovation { residual, cov, nis }),

@@ -16,9 +16,9 @@ pub struct Life {
     /// Score (ln Λ summed), or odds that the target exists, by the method.
     value: f64,
     best: f64,
-    /// Time of the last detection, ns.
+    /// Time of the last detection of its own, ns.
     pub last_hit_ns: i64,
-    /// Time of the last detection that was shared with another track and mainly the other's, ns.
+    /// Time of the last detection that was shared with another track, ns.
     pub last_shared_ns: i64,
     /// Time of the start, ns.
     pub born_ns: i64,

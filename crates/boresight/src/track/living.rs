@@ -29,8 +29,10 @@ pub(super) struct Track {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Outcome {
     pub hit: bool,
-    /// The detection is shared, and mainly another track's.
+    /// The detection is shared with other tracks.
     pub shared: bool,
+    /// And another of them fits it better.
+    pub guest: bool,
     /// The detection of the largest weight.
     pub detection: Option<u32>,
     /// Λ of the scan.

@@ -3,8 +3,8 @@
 //! Method (ours): a confirmed track without a detection whose predicted centre lies inside a detection's box shares that
 //! detection with whoever took it. Along each axis the outer members are placed by the box's edges and their own size from
 //! before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place relative
-//! to the centre. Sizes do not follow while shared. Only the member that fits best counts as detected; the others live on a
-//! budget of their own in seconds, so a target that ended inside another does not live for ever.
+//! to the centre. Sizes do not follow while shared. The member that fits best stays; the others are guests and live on a
+//! budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
 use super::config::not_negative;
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct SharingConfig {
-    /// Longest time a track lives on shared detections alone, s, 0 or more.
+    /// Longest time a track lives on detections that fit another track better, s since it had one of its own, 0 or more.
     pub longest_s: f64,
     /// Standard deviation of a box edge, px, 0 or more: noise of the places found from edges.
     pub edge_std_px: f64,
@@ -47,7 +47,7 @@ pub(super) struct Part {
     pub detection: u32,
     pub position: [f64; 2],
     pub noise: Noise,
-    /// Whether this member counts as detected.
+    /// Whether this member fits best.
     pub main: bool,
 }
 

@@ -276,9 +276,10 @@ impl Tracker {
             }
             let evidence = Evidence { hit: outcome.hit, shared: outcome.shared, ratio: outcome.ratio };
             let mut verdict = self.config.life.advance(&mut t.life, evidence, now.ns);
-            if t.life.misses > 0 || outcome.shared {
-                // On shared detections a track lives so long; without any it coasts from the last, shared or not.
-                let (since_ns, longest_s) = if outcome.shared {
+            if t.life.misses > 0 || outcome.guest {
+                // As a guest a track lives so long since it was last alone: two on one target would take turns for ever.
+                // Without any detection it coasts from the last, shared or not.
+                let (since_ns, longest_s) = if outcome.guest {
                     (t.life.last_hit_ns, budget_s.max(share_s))
                 } else {
                     (t.life.last_seen_ns(), budget_s)

@@ -118,6 +118,7 @@ impl Mht {
         child.outcome = Outcome {
             hit: true,
             shared: false,
+            guest: false,
             detection: Some(pair.detection),
             ratio,
             innovation: Some(Innovation { residual, cov, nis }),

@@ -62,3 +62,24 @@ fn a_target_that_ends_inside_another_is_given_up_after_the_longest_time() {
     }
     assert_eq!((alive[10], alive[59]), (2, 1), "{alive:?}");
 }
+
+#[test]
+fn two_tracks_that_take_turns_on_one_target_become_one() {
+    let config = TrackerConfig {
+        sharing: Some(SharingConfig { longest_s: 0.8, ..SharingConfig::default() }),
+        ..TrackerConfig::default()
+    };
+    let mut tracker = track::build(&config).unwrap();
+    let mut alive = Vec::new();
+    for k in 0..90u64 {
+        // One aircraft that falls in two pieces for its first scans; later its middle swings from end to end.
+        let middle = 30.0 + 3.0 * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let points = if k < 14 { vec![(26.0, 30.0), (34.0, 30.0)] } else { vec![(middle, 30.0)] };
+        let mut now = scan(k, &points);
+        if k >= 14 {
+            now.detections[0].extent = Extent { left_px: 22.0, top_px: 26.0, width_px: 16.0, height_px: 8.0 };
+        }
+        alive.push(tracker.step(&now).unwrap().len());
+    }
+    assert_eq!((alive[13], alive[89]), (2, 1), "{alive:?}");
+}
