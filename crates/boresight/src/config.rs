@@ -5,6 +5,7 @@
 
 mod explain;
 mod reference;
+mod renamed;
 mod typo;
 
 use explain::is_choice;
@@ -110,6 +111,7 @@ impl Config {
     /// # Errors
     /// A key that is unknown, of the wrong type or out of its range, with its line.
     pub fn from_toml(text: &str, name: &str) -> Result<Self> {
+        renamed::refuse_in_file(text, name)?;
         let config: Self = toml::from_str(text).map_err(|e| typo::explain(&e, true).at(name))?;
         config.validate().map_err(|e| e.at(name))?;
         Ok(config)
@@ -156,10 +158,11 @@ impl Config {
             .or_else(|_| toml::from_str(&format!("v = {:?}", value.trim())))
             .map_err(|_| bad("the value is not TOML"))?;
         let value = parsed.get("v").cloned().ok_or_else(|| bad("the value is empty"))?;
+        let name = format!("--set {assignment}");
+        renamed::refuse_in_assignment(key.trim(), &value).map_err(|e| e.at(&name))?;
         let mut tree = toml::Value::try_from(self).map_err(|e| bad(&e.to_string()))?;
         set(&mut tree, key.trim(), value).ok_or_else(|| bad("no such table"))?;
         let text = toml::to_string(&tree).map_err(|e| bad(&e.to_string()))?;
-        let name = format!("--set {assignment}");
         // The text is ours: its lines would say nothing to a user.
         let config: Self = toml::from_str(&text).map_err(|e| typo::explain(&e, false).at(&name))?;
         config.validate().map_err(|e| e.at(name))?;

@@ -84,6 +84,7 @@ pub mod sim;
 pub mod time;
 pub mod track;
 pub mod tracks;
+mod validate;
 pub mod view;
 pub mod vision;
 

@@ -29,6 +29,10 @@ pub fn explain(key: &str) -> Result<Explanation> {
     for (i, part) in key.split('.').enumerate() {
         let children = children(&schema, &at);
         let Some((_, child)) = children.iter().find(|(name, _)| name == part) else {
+            if let Some(new) = super::renamed::new_name(key) {
+                let e = Error::new(ErrorKind::Config, format!("this key has a new name: `{new}`")).at(key);
+                return Err(e.hint(format!("`boresight config --explain {new}`")));
+            }
             let known: Vec<_> = children.iter().map(|(name, _)| name.as_str()).collect();
             let near = super::typo::nearest(part, &known).map_or(String::new(), |n| format!("; did you mean `{n}`?"));
             return Err(Error::new(ErrorKind::Config, format!("there is no such key{near}")).at(key).hint(format!(

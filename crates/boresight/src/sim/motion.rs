@@ -7,7 +7,8 @@
 //! Limits: times must not run back; a time equal to the last one gives the same state.
 
 use super::random::{Purpose, Seed};
-use crate::{Error, ErrorKind, Result};
+use crate::Result;
+use crate::validate::check_shown;
 use nalgebra::Vector4;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -103,9 +104,7 @@ impl MotionConfig {
     /// # Errors
     /// [`ErrorKind::Config`] that names the parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
-        let bad = |key: &str, value: &dyn std::fmt::Debug, want: &str| {
-            Err(Error::new(ErrorKind::Config, format!("expected {want}")).at(format!("{at}.{key} = {value:?}")))
-        };
+        let bad = |key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(false, at, key, value, want);
         match self {
             Self::ConstantVelocity(c)
                 if !(c.acceleration_std_px_per_s2 >= 0.0 && c.acceleration_std_px_per_s2.is_finite()) =>

@@ -3,7 +3,8 @@
 //! Source: the usual plot model (Y. Bar-Shalom, P. K. Willett, X. Tian, *Tracking and Data Fusion*, 2011, ch. 1).
 //! Units: px (or m, whatever the truth has), s, degrees; azimuth from +x towards +y.
 
-use crate::{Error, ErrorKind, Result};
+use crate::Result;
+use crate::validate::check_shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -113,12 +114,8 @@ impl RadarConfig {
     /// # Errors
     /// [`ErrorKind::Config`] that names the first wrong parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
-        let check = |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| {
-            if ok {
-                return Ok(());
-            }
-            Err(Error::new(ErrorKind::Config, format!("expected {want}")).at(format!("{at}.{key} = {value:?}")))
-        };
+        let check =
+            |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(ok, at, key, value, want);
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let not_negative = |v: f64| v >= 0.0 && v.is_finite();
         let positive = |v: f64| v > 0.0 && v.is_finite();

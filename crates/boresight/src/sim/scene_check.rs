@@ -3,20 +3,16 @@
 //! Limits: sizes and counts are bounded so that no scene can ask for unbounded memory.
 
 use super::scene::{Background, SceneConfig, Shape};
-use crate::{Error, ErrorKind, Result};
+use crate::Result;
+use crate::validate::check_shown;
 
 impl SceneConfig {
     /// Checks every parameter; `at` names the place in messages.
     /// # Errors
     /// [`ErrorKind::Config`] that names the first wrong parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
-        let check = |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| {
-            if ok {
-                Ok(())
-            } else {
-                Err(Error::new(ErrorKind::Config, format!("expected {want}")).at(format!("{at}.{key} = {value:?}")))
-            }
-        };
+        let check =
+            |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(ok, at, key, value, want);
         let spread = |v: f64| v >= 0.0 && v.is_finite();
         let share = |v: f64| (0.0..=1.0).contains(&v);
         check((1..=16384).contains(&self.width_px), "width-px", &self.width_px, "1..=16384")?;

@@ -5,8 +5,8 @@
 //! its variance that of a uniform density.
 //! Symbols: T time between the points, s; R measurement covariance, px².
 
-use super::config::{check, positive};
 use crate::Result;
+use crate::validate::{check, positive};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use schemars::JsonSchema;

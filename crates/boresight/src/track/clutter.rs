@@ -6,7 +6,7 @@
 //! Symbols: λ false detections per px² and scan.
 //! Limits: the area is the given one or the box of all detections so far; at most [`MOST_CELLS`] cells of a map are kept.
 
-use super::config::{not_negative, positive};
+use crate::validate::{not_negative, positive};
 use crate::{Result, Scan};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -10,8 +10,9 @@ use super::mht::MhtConfig;
 use super::proof::ProofConfig;
 use super::sharing::SharingConfig;
 use super::terms::TermsConfig;
+use crate::Result;
 use crate::associate::AssociatorConfig;
-use crate::{Error, ErrorKind, Result};
+use crate::validate::{at_least_one, check, not_negative, positive, probability};
 use boresight_filters::{FilterError, Gaussian};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -153,14 +154,8 @@ impl TrackerConfig {
             "0.03 px per frame², squared rates apart: 28 at 30 frames/s",
         )?;
         not_negative(at, "extra-noise-px", self.extra_noise_px, "0.3 covers the heavy tails of thresholded centroids")?;
-        check(
-            self.gate_probability > 0.0 && self.gate_probability < 1.0,
-            at,
-            "gate-probability",
-            self.gate_probability,
-            "a probability in (0, 1)",
-            "0.99 keeps 99 % of true detections inside the gate",
-        )?;
+        let mend = "0.99 keeps 99 % of true detections inside the gate";
+        probability(at, "gate-probability", self.gate_probability, mend)?;
         positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "5 px per frame at 30 frames/s is 150")?;
         check(
             self.detection_probability > 0.0 && self.detection_probability <= 1.0,
@@ -215,38 +210,8 @@ impl TrackerConfig {
         for side in self.field_px.iter().flatten() {
             positive(at, "field-px", *side, "the image's width and height: [640, 512]")?;
         }
-        let whole = |ok: bool, key: &str, value: u32| {
-            check(ok, at, key, value, "a whole number of 1 or more", "leave it out for the default")
-        };
-        whole(self.coast_scans >= 1, "coast-scans", self.coast_scans)?;
-        whole(self.max_tracks >= 1, "max-tracks", self.max_tracks)?;
-        whole(self.max_gated >= 1, "max-gated", self.max_gated)
+        at_least_one(at, "coast-scans", self.coast_scans)?;
+        at_least_one(at, "max-tracks", self.max_tracks)?;
+        at_least_one(at, "max-gated", self.max_gated)
     }
-}
-
-/// Refuses a value that is out of range, with place, value, expectation and mend.
-pub(crate) fn check(
-    ok: bool,
-    at: &str,
-    key: &str,
-    value: impl std::fmt::Display,
-    expected: &str,
-    mend: &str,
-) -> Result<()> {
-    if ok {
-        return Ok(());
-    }
-    Err(Error::new(ErrorKind::Config, format!("expected {expected}")).at(format!("{at}.{key} = {value}")).hint(mend))
-}
-
-pub(crate) fn positive(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
-    check(value > 0.0 && value.is_finite(), at, key, value, "a number above 0", mend)
-}
-
-pub(crate) fn not_negative(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
-    check(value >= 0.0 && value.is_finite(), at, key, value, "a number of 0 or more", mend)
-}
-
-pub(crate) fn probability(at: &str, key: &str, value: f64, mend: &str) -> Result<()> {
-    check(value > 0.0 && value < 1.0, at, key, value, "a probability in (0, 1)", mend)
 }

@@ -6,11 +6,12 @@
 //! Symbols: state `[x, vx, y, vy]` px, px/s. Limits: the plain tracker only, not multiple hypotheses; errors of a cue are taken as
 //! independent between axes, position and velocity.
 
-use super::config::{TrackerConfig, not_negative, positive};
+use super::config::TrackerConfig;
 use super::living::Track;
 use super::proof::Proof;
 use super::terms::Look;
 use super::tracker::Tracker;
+use crate::validate::{not_negative, positive};
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::{Filter, Gaussian};
 use nalgebra::{Matrix4, Vector4};

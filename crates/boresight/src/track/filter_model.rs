@@ -2,8 +2,8 @@
 //!
 //! The process noise of every model follows from the tracker's `acceleration-std-px-per-s2` (σ), unless said otherwise.
 
-use super::config::{check, not_negative, positive};
 use crate::Result;
+use crate::validate::{check, not_negative, positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

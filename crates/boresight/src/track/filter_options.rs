@@ -1,8 +1,8 @@
 //! What a filter of a track can be given beside its name: innovation, learning of the noise, and its motion model.
 
-use super::config::{check, positive};
 use super::filter_model::{ModelConfig, NearlyConstantTurnConfig};
 use crate::Result;
+use crate::validate::{check, positive};
 use boresight_filters::fuzzy::{Correlator, SETS, Triangle};
 use boresight_filters::{AdaptiveConfig, Innovation, Memory};
 use schemars::JsonSchema;

@@ -1,9 +1,9 @@
 //! Filters that bring a model of their own, by name: IMM, LMS weights, AR(1), displacement.
 
 use super::belief::Belief;
-use super::config::{check, not_negative, positive};
 use super::filter_config::TrackFilter;
 use crate::Result;
+use crate::validate::{check, not_negative, positive};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{
     Ar1, Displacement, FilterError, Gaussian, Imm, Information, Kf, Lms, LmsRule, Measurement, SquareRoot, Srif, Start,

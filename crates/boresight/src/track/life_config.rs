@@ -1,7 +1,7 @@
 //! When a track is believed and when it is given up: the choices and their numbers; what they do is in `life.rs`.
 
-use super::config::{check, positive, probability};
 use crate::Result;
+use crate::validate::{check, positive, probability};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

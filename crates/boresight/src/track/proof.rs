@@ -9,8 +9,8 @@
 //! Limits: travel is measured in the tracker's coordinates: steadied ones (`stabilised.rs`) where the camera's motion is known, else the
 //! image's, where clutter travels with a panning camera.
 
-use super::config::not_negative;
 use crate::Result;
+use crate::validate::not_negative;
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -7,9 +7,9 @@
 //! budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
-use super::config::not_negative;
 use super::gating::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
 use super::terms::Look;
+use crate::validate::not_negative;
 use crate::{Result, Scan};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

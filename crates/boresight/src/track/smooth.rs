@@ -7,7 +7,7 @@
 //! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
 
-use super::config::{check, positive};
+use crate::validate::{check, positive};
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};

@@ -7,8 +7,8 @@
 //! Limits: constant velocity over the gap. Nothing is filled in between: rows stay as they are, only ids change; the
 //! smoother fills gaps.
 
-use super::config::{not_negative, positive, probability};
 use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, UniformGrid};
+use crate::validate::{not_negative, positive, probability};
 use crate::{Result, Timestamp, TrackId};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix4, Vector4};

@@ -6,7 +6,7 @@
 //! appearances? Make it easier by buffering the matching space", WACV 2023); GIoU as H. Rezatofighi et al., CVPR 2019.
 //! Limits: a detector that gives no boxes or sums must leave those terms out.
 
-use super::config::{not_negative, positive};
+use crate::validate::{check, not_negative, positive};
 use crate::{ClassId, Detection, Extent, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -77,14 +77,7 @@ impl TermsConfig {
             not_negative(&at, "weight", o.weight, "10 weighs as much as a gate")?;
             not_negative(&at, "buffer", o.buffer, "0.3 for small fast boxes")?;
             let low = if o.kind == OverlapKind::Iou { 0.0 } else { -1.0 };
-            super::config::check(
-                o.least >= low && o.least < 1.0,
-                &at,
-                "least",
-                o.least,
-                "an overlap below 1",
-                "0.1 is usual",
-            )?;
+            check(o.least >= low && o.least < 1.0, &at, "least", o.least, "an overlap below 1", "0.1 is usual")?;
         }
         Ok(())
     }

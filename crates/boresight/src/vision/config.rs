@@ -6,7 +6,8 @@
 use super::spatial::SpatialConfig;
 use super::threshold::ThresholdConfig;
 use super::window::FollowConfig;
-use crate::{Error, ErrorKind, Result};
+use crate::Result;
+use crate::validate::wrong;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -149,11 +150,6 @@ impl Default for GivenNoise {
     fn default() -> Self {
         Self { read_counts: 1.0, gain: 0.0 }
     }
-}
-
-/// Builds the error of a parameter: `place.key = value: expected what`.
-pub(crate) fn wrong(at: &str, key: &str, value: impl std::fmt::Display, expected: &str, hint: &str) -> Error {
-    Error::new(ErrorKind::Config, format!("expected {expected}")).at(format!("{at}.{key} = {value}")).hint(hint)
 }
 
 impl DetectorConfig {

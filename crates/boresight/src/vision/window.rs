@@ -3,9 +3,9 @@
 //! Source: SPEC I.2, I.3, I.6 (0-based pixels). One stray dark pixel ruins a box that is taken over a whole frame, so the
 //! box is taken inside a window around the predicted centre. Δ = d(t-1) - d(t-2), the last displacement per axis.
 
-use super::config::wrong;
 use super::pixel::Pixel;
 use super::probability::PixelRect;
+use crate::validate::wrong;
 use crate::{Detection, Image, Result};
 use nalgebra::Vector2;
 use schemars::JsonSchema;

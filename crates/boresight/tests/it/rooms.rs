@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Leaf types, open to all.
-const LEAVES: [&str; 8] = ["image", "frame", "detection", "record", "tracks", "view", "error", "time"];
+const LEAVES: [&str; 9] = ["image", "frame", "detection", "record", "tracks", "view", "error", "time", "validate"];
 
 /// room -> rooms it may use besides the leaves and itself.
 const ARROWS: [(&str, &[&str]); 10] = [

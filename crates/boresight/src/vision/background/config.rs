@@ -2,7 +2,7 @@
 
 use super::morphology::CleanUp;
 use super::shadow::ShadowConfig;
-use crate::{Error, ErrorKind, Result};
+use crate::Result;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -59,9 +59,7 @@ impl BackgroundConfig {
     /// The first parameter out of its range.
     pub fn validate(&self, at: &str) -> Result<()> {
         let wrong = |key: &str, value: f64, expected: &str, hint: &str| {
-            Err(Error::new(ErrorKind::Config, format!("expected {expected}"))
-                .at(format!("{at}.{key} = {value}"))
-                .hint(hint))
+            Err(crate::validate::wrong(at, key, value, expected, hint))
         };
         if !(1.0..=50.0).contains(&self.threshold_sd) {
             let hint = "8 leaves few noisy pixels";

@@ -40,9 +40,7 @@ impl DifferenceConfig {
     /// The first parameter out of its range.
     pub fn validate(&self, at: &str) -> Result<()> {
         let wrong = |key: &str, value: f64, expected: &str, hint: &str| {
-            Err(Error::new(ErrorKind::Config, format!("expected {expected}"))
-                .at(format!("{at}.{key} = {value}"))
-                .hint(hint))
+            Err(crate::validate::wrong(at, key, value, expected, hint))
         };
         if !(2..=3).contains(&self.frames) {
             return wrong("frames", self.frames.into(), "2 or 3", "3 marks a target only where it is now");

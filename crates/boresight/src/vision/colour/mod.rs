@@ -12,8 +12,8 @@ pub use hsi::{Hsi, distance, grey, grey_image, hsi};
 pub(super) use mask::ColourMask;
 pub use reference::{Reference, choose_reference};
 
+use crate::Result;
 use crate::vision::background::{CleanUp, pack};
-use crate::{Error, ErrorKind, Result};
 use fearless_simd::{Level, dispatch};
 use multiversion::multiversion;
 use schemars::JsonSchema;
@@ -45,9 +45,7 @@ impl ColourMatchConfig {
     /// The first parameter out of its range.
     pub fn validate(&self, at: &str) -> Result<()> {
         let wrong = |key: &str, value: f64, expected: &str, hint: &str| {
-            Err(Error::new(ErrorKind::Config, format!("expected {expected}"))
-                .at(format!("{at}.{key} = {value}"))
-                .hint(hint))
+            Err(crate::validate::wrong(at, key, value, expected, hint))
         };
         if !(self.max_distance > 0.0 && self.max_distance <= 0.5) {
             let hint = "0.15 allows a hue 27 degrees off";

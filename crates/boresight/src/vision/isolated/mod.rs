@@ -19,13 +19,14 @@ mod ring;
 mod sweep;
 
 use super::centroid::{Surroundings, centroid};
-use super::config::{DetectorConfig, NoiseConfig, wrong};
+use super::config::{DetectorConfig, NoiseConfig};
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
 use super::region::Region;
 use super::strongest::Strongest;
 use super::threshold::band::words;
 use super::threshold::{Polarity, Side};
+use crate::validate::wrong;
 use crate::{Detection, Extent, Image, Result, Scan};
 use ring::Ring;
 use schemars::JsonSchema;

@@ -10,9 +10,9 @@ pub mod spot;
 
 use super::background::{BackgroundConfig, DifferenceConfig};
 use super::colour::ColourMatchConfig;
-use super::config::wrong;
 use super::isolated::IsolatedConfig;
 use crate::Result;
+use crate::validate::wrong;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,103 @@
+//! Keys of the configuration that have a new name: an old one is refused with the new one named.
+//!
+//! Applied to the tree of a file and of `--set`, before the keys are read. A row also covers the keys below it: with
+//! `tracker.birth` -> `tracker.initiation` the error of `tracker.birth.two-point` names `tracker.initiation.two-point`.
+
+use crate::{Error, ErrorKind, Result};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Old dotted key, new dotted key. Where one old key begins like another the longer one counts.
+pub(super) const RENAMED: &[(&str, &str)] = &[];
+
+/// The new name of a key, if a part of it has one.
+pub(super) fn new_name(key: &str) -> Option<String> {
+    RENAMED
+        .iter()
+        .filter_map(|(old, new)| {
+            let rest = key.strip_prefix(old).filter(|rest| rest.is_empty() || rest.starts_with('.'))?;
+            Some((old.len(), format!("{new}{rest}")))
+        })
+        .max_by_key(|(length, _)| *length)
+        .map(|(_, new)| new)
+}
+
+/// Refuses a file that holds an old key; a text that is not TOML passes, its reader says so better.
+/// # Errors
+/// The first old key of the file, with its line.
+pub(super) fn refuse_in_file(text: &str, name: &str) -> Result<()> {
+    let Ok(tree) = DeTable::parse(text) else { return Ok(()) };
+    match first_old(tree.get_ref(), "") {
+        None => Ok(()),
+        Some((at, old, new)) => {
+            let before = text.get(..at).unwrap_or("");
+            let line = before.matches('\n').count() + 1;
+            let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+            Err(error(&old, &new, &format!("line {line}, column {column}: ")).at(name))
+        }
+    }
+}
+
+/// Refuses an assignment `key = value` whose key, or a key inside of whose value, is an old one.
+/// # Errors
+/// The old key.
+pub(super) fn refuse_in_assignment(key: &str, value: &toml::Value) -> Result<()> {
+    if let Some(new) = new_name(key) {
+        return Err(error(key, &new, ""));
+    }
+    match value {
+        toml::Value::Table(table) => table.iter().try_for_each(|(k, v)| refuse_in_assignment(&format!("{key}.{k}"), v)),
+        toml::Value::Array(list) => list.iter().try_for_each(|v| refuse_in_assignment(key, v)),
+        _ => Ok(()),
+    }
+}
+
+fn error(old: &str, new: &str, place: &str) -> Error {
+    Error::new(ErrorKind::Config, format!("{place}`{old}` has a new name: `{new}`"))
+        .hint(format!("write `{new}`; `boresight config --explain {new}` says what it does"))
+}
+
+/// Byte, old and new name of the first old key of a table.
+fn first_old(table: &DeTable<'_>, path: &str) -> Option<(usize, String, String)> {
+    table
+        .iter()
+        .filter_map(|(key, value)| {
+            let dotted = format!("{path}{}", key.get_ref());
+            if let Some(new) = new_name(&dotted) {
+                let inner = first_inner(value, &dotted);
+                return inner.or(Some((key.span().start, dotted, new)));
+            }
+            first_inner(value, &dotted)
+        })
+        .min_by_key(|(at, _, _)| *at)
+}
+
+fn first_inner(value: &Spanned<DeValue<'_>>, dotted: &str) -> Option<(usize, String, String)> {
+    match value.get_ref() {
+        DeValue::Table(table) => first_old(table, &format!("{dotted}.")),
+        DeValue::Array(list) => list.iter().filter_map(|v| first_inner(v, dotted)).min_by_key(|(at, _, _)| *at),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+    use crate::config::explain;
+
+    #[test]
+    fn every_old_key_is_refused_and_its_error_names_a_key_that_there_is() {
+        for (old, new) in RENAMED {
+            explain(new).unwrap_or_else(|e| panic!("{new}: {e}"));
+            assert!(explain(old).is_err(), "{old} still exists");
+            let (table, key) = old.rsplit_once('.').unwrap();
+            let e = Config::from_toml(&format!("[{table}]\n{key} = 1\n"), "my.toml").unwrap_err().to_string();
+            assert!(e.starts_with("my.toml: line 2, column 1: ") && e.contains(&format!("`{new}`")), "{e}");
+            for value in ["1", "{}"] {
+                let e = Config::default().with(&format!("{old}={value}")).unwrap_err().to_string();
+                assert!(e.starts_with("--set") && e.contains(&format!("`{old}` has a new name: `{new}`")), "{e}");
+            }
+        }
+    }
+}
