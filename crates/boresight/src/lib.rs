@@ -95,7 +95,7 @@ pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackState, TrackStatus};
 pub use time::{FrameIndex, Timestamp};
-pub use tracks::{PixelOrigin, TrackRow, TrackTable, TrackTableBuilder};
+pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 
 /// The filters, and with them the matrices (`boresight_filters::nalgebra`), in the version that this crate is built with.

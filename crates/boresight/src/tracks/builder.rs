@@ -1,6 +1,6 @@
 //! Builds a [`TrackTable`] from rows in any order: by frame, identities ascending.
 
-use super::{Column, PixelOrigin, TrackRow, TrackTable};
+use super::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable};
 use crate::{Error, ErrorKind, Result};
 use std::collections::HashMap;
 
@@ -12,6 +12,7 @@ pub struct TrackTableBuilder {
     of_id: HashMap<i64, u32>,
     last: (i64, u32),
     sorted: bool,
+    has_states: bool,
 }
 
 impl TrackTableBuilder {
@@ -26,14 +27,16 @@ impl TrackTableBuilder {
             ids: Vec::new(),
             score: Column::Constant(1.0),
             class: Column::Constant(1),
+            class_names: Vec::new(),
             visibility: Column::Constant(1.0),
             truncation: Column::Constant(0.0),
             occlusion: Column::Constant(0),
             ignore: Vec::new(),
+            states: StateColumns::default(),
             extra: Vec::new(),
             starts: vec![0],
         };
-        Self { table, frames: Vec::new(), of_id: HashMap::new(), last: (i64::MIN, u32::MAX), sorted: true }
+        Self { table, frames: Vec::new(), of_id: HashMap::new(), last: (i64::MIN, u32::MAX), sorted: true, has_states: false }
     }
 
     /// Makes room for rows to come.
@@ -70,10 +73,31 @@ impl TrackTableBuilder {
         self.frames.len()
     }
 
-    /// Adds a row.
+    /// The number, from 1, of a class that goes by a name; `None` for the thousand-and-first name: that is no class.
+    pub fn class_number(&mut self, name: &str) -> Option<i32> {
+        const MAX_CLASSES: usize = 1000;
+        let names = &mut self.table.class_names;
+        if let Some(at) = names.iter().position(|n| n == name) {
+            return Some(at as i32 + 1);
+        }
+        if names.len() >= MAX_CLASSES {
+            return None;
+        }
+        names.push(name.to_string());
+        Some(names.len() as i32)
+    }
+
+    /// Adds a row that says nothing of its track's state.
+    /// # Errors
+    /// As [`TrackTableBuilder::push_with_state`].
+    pub fn push(&mut self, row: &TrackRow) -> Result<()> {
+        self.push_with_state(row, &RowState::default())
+    }
+
+    /// Adds a row with what it says of its track's state.
     /// # Errors
     /// A box or score that is not finite; more rows than 2³² − 1.
-    pub fn push(&mut self, row: &TrackRow) -> Result<()> {
+    pub fn push_with_state(&mut self, row: &TrackRow, state: &RowState) -> Result<()> {
         if !row.bbox.iter().all(|v| v.is_finite()) {
             return Err(Error::new(ErrorKind::Damaged, "expected finite coordinates"));
         }
@@ -98,6 +122,11 @@ impl TrackTableBuilder {
         self.table.visibility.push(row.visibility, n);
         self.table.truncation.push(row.truncation, n);
         self.table.occlusion.push(row.occlusion, n);
+        // Most tables have boxes only: they pay nothing for states.
+        if self.has_states || *state != RowState::default() {
+            self.has_states = true;
+            self.table.states.push(state, n);
+        }
         Ok(())
     }
 
@@ -139,6 +168,7 @@ impl TrackTableBuilder {
             t.visibility.reorder(&order);
             t.truncation.reorder(&order);
             t.occlusion.reorder(&order);
+            t.states.reorder(&order);
             for (_, v) in &mut t.extra {
                 *v = order.iter().map(|&i| std::mem::take(&mut v[i as usize])).collect();
             }

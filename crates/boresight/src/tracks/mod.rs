@@ -6,9 +6,11 @@
 
 mod builder;
 mod column;
+mod state;
 
 pub use builder::TrackTableBuilder;
 pub use column::Column;
+pub use state::{RowState, StateColumns};
 
 use crate::{Extent, Result};
 use std::ops::Range;
@@ -90,6 +92,8 @@ pub struct TrackTable {
     pub score: Column<f64>,
     /// Class number.
     pub class: Column<i32>,
+    /// Names of the classes 1, 2 .. where the table names them; empty where it has numbers.
+    pub class_names: Vec<String>,
     /// Visible share.
     pub visibility: Column<f64>,
     /// Truncation.
@@ -98,6 +102,8 @@ pub struct TrackTable {
     pub occlusion: Column<i32>,
     /// Regions in which unmatched results do not count (KITTI's DontCare): frame and box.
     pub ignore: Vec<(u32, [f64; 4])>,
+    /// Times, status, velocities and covariances, where the table has them.
+    pub states: StateColumns,
     /// Further columns by name, as text, one value a row; read only where asked for.
     pub extra: Vec<(String, Vec<String>)>,
     starts: Vec<u32>,
@@ -221,10 +227,12 @@ impl TrackTable {
             ids,
             score: self.score.clone(),
             class: self.class.clone(),
+            class_names: self.class_names.clone(),
             visibility: self.visibility.clone(),
             truncation: self.truncation.clone(),
             occlusion: self.occlusion.clone(),
             ignore: self.ignore.clone(),
+            states: self.states.clone(),
             extra: self
                 .extra
                 .iter()
@@ -237,6 +245,7 @@ impl TrackTable {
         out.visibility.keep(&rows);
         out.truncation.keep(&rows);
         out.occlusion.keep(&rows);
+        out.states.reorder(&rows);
         out
     }
 

@@ -17,6 +17,7 @@ mod tracks_csv;
 
 pub use atomic::{AtomicFile, Output};
 pub use columns::Columns;
+pub(crate) use number::parse_seconds;
 pub use detections_csv::{DETECTIONS_HEADER, DetectionsCsv};
 pub use json_lines::JsonLines;
 pub use mot::{MotWriter, extent_of_mot_box, mot_box_of_extent};

@@ -8,7 +8,8 @@
 //! Limits: comma, semicolon or tab; no quoted separators inside of used columns.
 
 use super::lines::{BadRows, Fields, ReadOptions, each_line, number, separator};
-use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackTable, TrackTableBuilder};
+use crate::tracks::RowState;
+use crate::{Error, ErrorKind, PixelOrigin, Result, TrackRow, TrackStatus, TrackTable, TrackTableBuilder};
 use std::path::Path;
 
 /// What a column means.
@@ -66,6 +67,63 @@ pub enum Dialect {
     Btrack,
     /// ultrack: track_id, t, y, x.
     Ultrack,
+}
+
+/// The cells of a row's state as they come.
+#[derive(Default)]
+struct State {
+    row: RowState,
+    velocity: [Option<f64>; 2],
+    cov: [Option<f64>; 10],
+}
+
+const VELOCITY: [&str; 2] = ["vx_px_per_s", "vy_px_per_s"];
+const COV: [&str; 10] = [
+    "var_x_px2",
+    "cov_x_vx_px2_per_s",
+    "cov_x_y_px2",
+    "cov_x_vy_px2_per_s",
+    "var_vx_px2_per_s2",
+    "cov_vx_y_px2_per_s",
+    "cov_vx_vy_px2_per_s2",
+    "var_y_px2",
+    "cov_y_vy_px2_per_s",
+    "var_vy_px2_per_s2",
+];
+
+impl State {
+    fn take(&mut self, name: &str, text: &[u8]) {
+        let word = || std::str::from_utf8(text).ok();
+        match name {
+            "time_s" => self.row.time = word().and_then(crate::io::tables::parse_seconds),
+            "status" => {
+                self.row.status = match text {
+                    b"tentative" => Some(TrackStatus::Tentative),
+                    b"confirmed" => Some(TrackStatus::Confirmed),
+                    b"coasting" => Some(TrackStatus::Coasting),
+                    _ => None,
+                }
+            }
+            "detection" => self.row.detection = word().and_then(|t| t.parse().ok()),
+            _ => {
+                if let Some(k) = VELOCITY.iter().position(|n| *n == name) {
+                    self.velocity[k] = number(text);
+                } else if let Some(k) = COV.iter().position(|n| *n == name) {
+                    self.cov[k] = number(text);
+                }
+            }
+        }
+    }
+
+    fn row(self) -> RowState {
+        let Self { mut row, velocity: [vx, vy], cov: c } = self;
+        row.velocity = vx.zip(vy).map(|(x, y)| [x, y]);
+        row.cov = c.iter().all(Option::is_some).then(|| c.map(Option::unwrap_or_default));
+        if let ([Some(xx), _, Some(xy), _, _, _, _, Some(yy), ..], None) = (c, row.cov) {
+            row.position_cov = Some([xx, xy, yy]);
+        }
+        row
+    }
 }
 
 struct Header {
@@ -133,10 +191,11 @@ pub fn read(path: &Path, options: ReadOptions, tentative: bool) -> Result<(Track
             head = Some(h);
             return Ok(());
         };
-        let mut extra = Vec::new();
-        match row(head, Fields::new(line, comma), line_number, tentative, &kept, &mut extra) {
+        let (mut extra, mut state) = (Vec::new(), State::default());
+        let fields = Fields::new(line, comma);
+        match row(head, fields, line_number, tentative, &kept, (&mut extra, &mut state, &mut table)) {
             Ok(None) => Ok(()),
-            Ok(Some(r)) => match table.push(&r) {
+            Ok(Some(r)) => match table.push_with_state(&r, &state.row()) {
                 Ok(()) => {
                     extra.iter().enumerate().for_each(|(k, v)| table.push_extra(k, v));
                     Ok(())
@@ -165,7 +224,7 @@ fn row(
     line: u64,
     tentative: bool,
     kept: &[usize],
-    extra: &mut Vec<String>,
+    (extra, state, table): (&mut Vec<String>, &mut State, &mut TrackTableBuilder),
 ) -> Result<Option<TrackRow>> {
     let mut r = TrackRow::default();
     let (mut x, mut y, mut left, mut top, mut right, mut bottom) = (None, None, None, None, None, None);
@@ -196,7 +255,18 @@ fn row(
             Meaning::Width => r.bbox[2] = fields.optional("a width")?.unwrap_or(0.0),
             Meaning::Height => r.bbox[3] = fields.optional("a height")?.unwrap_or(0.0),
             Meaning::Score => r.score = fields.optional("a score")?.unwrap_or(1.0),
-            Meaning::Class => r.class = fields.optional("a class number")?.unwrap_or(1.0) as i32,
+            Meaning::Class => match fields.field().unwrap_or(b"") {
+                b"" => {}
+                text => match number(text) {
+                    Some(class) => r.class = class as i32,
+                    None => {
+                        let name = String::from_utf8_lossy(text);
+                        r.class = table.class_number(name.trim_matches('"')).ok_or_else(|| {
+                            Error::new(ErrorKind::Damaged, "more than 1000 names of classes").at(&head.names[k])
+                        })?;
+                    }
+                },
+            },
             Meaning::Visibility => r.visibility = fields.optional("a visible share")?.unwrap_or(1.0),
             Meaning::Truncation => r.truncation = fields.optional("a truncation")?.unwrap_or(0.0),
             Meaning::Occlusion => r.occlusion = fields.optional("an occlusion")?.unwrap_or(0.0) as i32,
@@ -205,6 +275,7 @@ fn row(
                 if meaning == Meaning::Status && !tentative && text == b"tentative" {
                     return Ok(None);
                 }
+                state.take(&head.names[k], text);
                 if kept.contains(&k) {
                     extra.push(String::from_utf8_lossy(text).into_owned());
                 }
