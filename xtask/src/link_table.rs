@@ -5,7 +5,7 @@
 //! neither result is certain.
 
 use anyhow::{Context, Result};
-use boresight::track::filter_model::RandomWalkConfig;
+use boresight::track::filter::model::RandomWalkConfig;
 use boresight::track::{
     self, BirthConfig, FilterConfig, FormConfig, LifeConfig, MOfNConfig, ModelConfig, OnePointConfig, TrackerConfig,
 };

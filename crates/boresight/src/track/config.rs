@@ -1,10 +1,10 @@
 //! The tracker's configuration: every choice is an enum, every number has a unit and a range.
 
-use super::belief::Belief;
 use super::birth::BirthConfig;
 use super::clutter::ClutterConfig;
 use super::cue::CueConfig;
-use super::filter_config::FilterConfig;
+use super::filter::Belief;
+use super::filter::FilterConfig;
 use super::life_config::LifeConfig;
 use super::mht::MhtConfig;
 use super::proof::ProofConfig;

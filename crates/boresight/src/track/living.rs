@@ -1,7 +1,7 @@
 //! One living track: what it carries from scan to scan, and what is said of it after each.
 
-use super::belief::Belief;
 use super::config::TrackerConfig;
+use super::filter::Belief;
 use super::gating::Noise;
 use super::life::Life;
 use super::proof::{CameraWay, Proof};

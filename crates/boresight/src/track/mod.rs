@@ -2,18 +2,12 @@
 //!
 //! [`build`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the living tracks come out.
 
-mod belief;
 pub mod birth;
 pub mod clutter;
 pub mod config;
 mod correct;
 pub mod cue;
-pub mod cv;
-pub mod filter_config;
-mod filter_forms;
-pub mod filter_model;
-pub mod filter_options;
-pub mod filter_whole;
+pub mod filter;
 pub mod gating;
 pub mod join;
 pub mod life;
@@ -35,9 +29,7 @@ pub use birth::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfi
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};
 pub use cue::CueConfig;
-pub use filter_config::{FilterConfig, TrackFilter};
-pub use filter_model::ModelConfig;
-pub use filter_options::{FormConfig, InnovationConfig};
+pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, TrackFilter};
 pub use join::{Joined, join};
 pub use life_config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
 pub use mht::{Mht, MhtConfig};

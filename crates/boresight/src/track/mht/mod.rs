@@ -15,9 +15,9 @@ mod grow;
 mod select;
 
 use super::Tracking;
-use super::belief::Belief;
 use super::clutter::Clutter;
 use super::config::TrackerConfig;
+use super::filter::Belief;
 use super::gating::{Predicted, ScanTable};
 use super::life::Life;
 use super::living::{Outcome, state_of};

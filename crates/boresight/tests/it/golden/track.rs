@@ -2,7 +2,9 @@
 
 use super::{load, number, numbers, rows};
 use boresight::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior};
-use boresight::track::{self, LifeConfig, MOfNConfig, TrackerConfig, cv::ConstantVelocity, gating};
+use boresight::track::{
+    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocity, gating,
+};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};

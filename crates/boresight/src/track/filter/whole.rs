@@ -1,7 +1,7 @@
 //! Filters that bring a model of their own, by name: IMM, LMS weights, AR(1), displacement.
 
 use super::belief::Belief;
-use super::filter_config::TrackFilter;
+use super::config::TrackFilter;
 use crate::Result;
 use crate::validate::{check, not_negative, positive};
 use boresight_filters::model::ConstantVelocity;
@@ -130,13 +130,13 @@ impl Default for DisplacementConfig {
 }
 
 impl ImmConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "manoeuvre-factor", self.manoeuvre_factor, "10 is usual")?;
         positive(at, "quiet-s", self.quiet_s, "5 s is usual")?;
         positive(at, "manoeuvre-s", self.manoeuvre_s, "1 s is usual")
     }
 
-    pub(super) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
         let quiet = ConstantVelocity::discrete(acceleration_std)?;
         let fast = ConstantVelocity::discrete(acceleration_std * self.manoeuvre_factor)?;
         let stays = [self.quiet_s, self.manoeuvre_s];
@@ -158,7 +158,7 @@ impl ImmConfig {
 }
 
 impl LmsConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         check((2..=5).contains(&self.window), at, "window", self.window, "2..=5", "2 is the paper's")?;
         match &self.rule {
             LmsRuleConfig::Guarded {} => Ok(()),
@@ -168,7 +168,7 @@ impl LmsConfig {
         }
     }
 
-    pub(super) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
         let rule = match &self.rule {
             LmsRuleConfig::Guarded {} => LmsRule::Guarded,
             LmsRuleConfig::AsPrinted(c) => LmsRule::AsPrinted { alpha: c.step_factor },
@@ -184,11 +184,11 @@ impl LmsConfig {
 }
 
 impl Ar1Config {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "frame-s", self.frame_s, "the frame time, 0.04 s at 25 Hz")
     }
 
-    pub(super) fn start(&self, start: &Gaussian<4>) -> std::result::Result<Belief, FilterError> {
+    pub(in crate::track) fn start(&self, start: &Gaussian<4>) -> std::result::Result<Belief, FilterError> {
         let p = &start.cov;
         let cov = Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]);
         let position = Vector2::new(start.mean[0], start.mean[2]);
@@ -197,12 +197,16 @@ impl Ar1Config {
 }
 
 impl DisplacementConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "frame-s", self.frame_s, "the frame time, 0.04 s at 25 Hz")?;
         self.noise_px.map_or(Ok(()), |v| not_negative(at, "noise-px", v, "0.3 is usual"))
     }
 
-    pub(super) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> std::result::Result<Belief, FilterError> {
+    pub(in crate::track) fn start(
+        &self,
+        start: &Gaussian<4>,
+        acceleration_std: f64,
+    ) -> std::result::Result<Belief, FilterError> {
         let noise = self.noise_px.unwrap_or(acceleration_std * self.frame_s * self.frame_s);
         Ok(boxed(Tracked(Displacement::from_kinematics(start, noise * noise, self.frame_s)?)))
     }

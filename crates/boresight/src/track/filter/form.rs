@@ -3,9 +3,9 @@
 //! The options need only the predicted position, so they are one wrapper around the boxed form, not a type for each
 //! combination. A plain form is boxed as it is.
 
-use super::filter_config::TrackFilter;
-use super::filter_model::ModelConfig;
-use super::filter_options::{FormConfig, InnovationConfig};
+use super::config::TrackFilter;
+use super::innovation::{FormConfig, InnovationConfig};
+use super::model::ModelConfig;
 use boresight_filters::model::{
     ConstantAcceleration, ConstantTurn, ConstantVelocity, NearlyConstantTurn, OrnsteinUhlenbeck, RandomWalk, Scaled,
     Singer,
@@ -47,7 +47,7 @@ where
 }
 
 /// Builds a form with its options from a first belief; `acceleration_std` is σ (px/s²).
-pub(super) fn build(
+pub(in crate::track) fn build(
     form: Form,
     config: &FormConfig,
     start: &Gaussian<4>,

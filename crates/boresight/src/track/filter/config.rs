@@ -5,13 +5,11 @@
 //! `boresight config --list filters` prints: what it is, when to take it, its source.
 
 use super::belief::Belief;
-use super::cv;
-use super::filter_forms::{self, Form};
-use super::filter_model::{ModelConfig, SingerConfig, WhiteNoiseConfig};
-use super::filter_options::{
-    CorrelatorConfig, FormConfig, HuberConfig, InnovationConfig, StudentTConfig, TurningConfig,
-};
-use super::filter_whole::{Ar1Config, DisplacementConfig, ImmConfig, LmsConfig};
+use super::constant_velocity;
+use super::form::{self, Form};
+use super::innovation::{CorrelatorConfig, FormConfig, HuberConfig, InnovationConfig, StudentTConfig, TurningConfig};
+use super::model::{ModelConfig, SingerConfig, WhiteNoiseConfig};
+use super::whole::{Ar1Config, DisplacementConfig, ImmConfig, LmsConfig};
 use crate::Result;
 use boresight_filters::{Filter, FilterError, Gaussian};
 use schemars::JsonSchema;
@@ -169,12 +167,13 @@ impl FilterConfig {
     }
 
     /// Builds the filter of a new track.
-    pub(super) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
-        let form =
-            |form, config: &FormConfig| filter_forms::build(form, config, start, acceleration_std).map(Belief::Boxed);
+    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+        let form = |form, config: &FormConfig| form::build(form, config, start, acceleration_std).map(Belief::Boxed);
         let with = |model, innovation| form(Form::Kf, &FormConfig { model, innovation, adaptive: None });
         match self {
-            Self::Kf(c) if c.is_plain() => Ok(Belief::Cv(cv::ConstantVelocity::new(start, acceleration_std))),
+            Self::Kf(c) if c.is_plain() => {
+                Ok(Belief::Cv(constant_velocity::ConstantVelocity::new(start, acceleration_std)))
+            }
             Self::Kf(c) => form(Form::Kf, c),
             Self::KfShort(c) => form(Form::KfShort, c),
             Self::Ud(c) => form(Form::Ud, c),

@@ -1,6 +1,6 @@
 //! What a filter of a track can be given beside its name: innovation, learning of the noise, and its motion model.
 
-use super::filter_model::{ModelConfig, NearlyConstantTurnConfig};
+use super::model::{ModelConfig, NearlyConstantTurnConfig};
 use crate::Result;
 use crate::validate::{check, positive};
 use boresight_filters::fuzzy::{Correlator, SETS, Triangle};
@@ -22,14 +22,14 @@ pub struct FormConfig {
 }
 
 impl FormConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         self.model.validate(&format!("{at}.model"))?;
         self.innovation.validate(&format!("{at}.innovation"))?;
         self.adaptive.as_ref().map_or(Ok(()), |c| c.validate(&format!("{at}.adaptive")))
     }
 
     /// Whether nothing is asked for that the plain constant-velocity filter has not.
-    pub(super) fn is_plain(&self) -> bool {
+    pub(in crate::track) fn is_plain(&self) -> bool {
         *self == Self::default()
     }
 }
@@ -55,7 +55,7 @@ impl Default for TurningConfig {
 }
 
 impl TurningConfig {
-    pub(super) fn form(&self) -> FormConfig {
+    pub(in crate::track) fn form(&self) -> FormConfig {
         FormConfig { model: self.model.clone(), innovation: self.innovation.clone(), adaptive: self.adaptive.clone() }
     }
 }
@@ -144,7 +144,7 @@ impl Default for CorrelatorConfig {
 }
 
 impl CorrelatorConfig {
-    pub(super) fn correlator(&self) -> Correlator {
+    pub(in crate::track) fn correlator(&self) -> Correlator {
         let sets = |of: &[[f64; 3]; SETS]| of.map(|[left, peak, right]| Triangle { left, peak, right });
         Correlator {
             innovation_sets: sets(&self.innovation_sets),
@@ -156,7 +156,7 @@ impl CorrelatorConfig {
         }
     }
 
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "innovation-scale", self.innovation_scale, "3 is the papers'")?;
         positive(at, "difference-scale", self.difference_scale, "12 is the papers'")?;
         positive(at, "output-scale", self.output_scale, "3 is the papers'")?;
@@ -187,19 +187,19 @@ impl InnovationConfig {
 }
 
 impl HuberConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "threshold", self.threshold, "2 is usual")
     }
-    pub(super) fn innovation(&self) -> Innovation {
+    pub(in crate::track) fn innovation(&self) -> Innovation {
         Innovation::Huber { threshold: self.threshold }
     }
 }
 
 impl StudentTConfig {
-    pub(super) fn validate(&self, at: &str) -> Result<()> {
+    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "degrees-of-freedom", self.degrees_of_freedom, "4 is usual")
     }
-    pub(super) fn innovation(&self) -> Innovation {
+    pub(in crate::track) fn innovation(&self) -> Innovation {
         Innovation::StudentT { degrees_of_freedom: self.degrees_of_freedom }
     }
 }
@@ -234,7 +234,7 @@ impl LearningConfig {
         check((0.0..=1.0).contains(&self.floor), at, "floor", self.floor, "a fraction in 0..=1", "0.1 is usual")
     }
 
-    pub(super) fn config(&self) -> AdaptiveConfig {
+    pub(in crate::track) fn config(&self) -> AdaptiveConfig {
         let memory = if self.windowed { Memory::Windowed } else { Memory::Recursive(self.memory_updates) };
         AdaptiveConfig {
             measurement_noise: self.measurement_noise,

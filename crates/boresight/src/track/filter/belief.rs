@@ -1,7 +1,7 @@
 //! The filter of one track as the tracker stores it: in place for the constant-velocity Kalman filter, boxed for the rest.
 
-use super::cv::ConstantVelocity;
-use super::filter_config::TrackFilter;
+use super::config::TrackFilter;
+use super::constant_velocity::ConstantVelocity;
 use boresight_filters::{Filter, FilterError, Gaussian, Weighted};
 
 /// A filter in place, or behind its trait.
