@@ -7,8 +7,6 @@
 
 use super::motion::MotionConfig;
 use super::radar_config::RadarConfig;
-use super::random::Seed;
-use super::source::SceneSource;
 use crate::{Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -321,20 +319,6 @@ impl SceneConfig {
         let scene: Self = toml::from_str(text).map_err(|e| Error::new(ErrorKind::Config, e.to_string()).at("scene"))?;
         scene.validate("scene")?;
         Ok(scene)
-    }
-
-    /// Starts the scene; a `file` background must be given by [`SceneConfig::build_over`] instead.
-    /// # Errors
-    /// [`ErrorKind::Config`] that names the wrong parameter.
-    pub fn build(&self, seed: Seed) -> Result<SceneSource> {
-        SceneSource::new(self, seed, None)
-    }
-
-    /// Starts the scene over the frames of another source (a picture, a video).
-    /// # Errors
-    /// As [`SceneConfig::build`]; or the source cannot be read.
-    pub fn build_over(&self, seed: Seed, background: Box<dyn crate::FrameSource>) -> Result<SceneSource> {
-        SceneSource::new(self, seed, Some(background))
     }
 }
 

@@ -51,8 +51,24 @@ impl std::fmt::Debug for SceneSource {
     }
 }
 
+impl SceneConfig {
+    /// Starts the scene; a `file` background must be given by [`SceneConfig::build_over`] instead.
+    /// # Errors
+    /// [`ErrorKind::Config`] that names the wrong parameter.
+    pub fn build(&self, seed: Seed) -> Result<SceneSource> {
+        SceneSource::new(self, seed, None)
+    }
+
+    /// Starts the scene over the frames of another source (a picture, a video).
+    /// # Errors
+    /// As [`SceneConfig::build`]; or the source cannot be read.
+    pub fn build_over(&self, seed: Seed, background: Box<dyn FrameSource>) -> Result<SceneSource> {
+        SceneSource::new(self, seed, Some(background))
+    }
+}
+
 impl SceneSource {
-    pub(super) fn new(config: &SceneConfig, seed: Seed, background: Option<Box<dyn FrameSource>>) -> Result<Self> {
+    fn new(config: &SceneConfig, seed: Seed, background: Option<Box<dyn FrameSource>>) -> Result<Self> {
         config.validate("scene")?;
         let mut config = config.clone();
         if let Some(b) = &background {

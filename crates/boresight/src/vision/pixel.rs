@@ -1,8 +1,20 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
 use super::background::BackgroundPixel;
-use super::region::RunSums;
 use super::threshold::band;
+
+/// Sums over the pixels of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct RunSums {
+    /// Σ I.
+    pub sum: f64,
+    /// Σ I i, i counted from the first pixel of the run.
+    pub sum_i: f64,
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value.
+    pub max: f32,
+}
 
 /// A grey pixel.
 pub trait Pixel: BackgroundPixel + PartialOrd {

@@ -1,6 +1,6 @@
 //! A region: what is kept of a cluster of pixels while rows go by, enough for its centroid and that centroid's covariance.
 
-use super::pixel::Pixel;
+use super::pixel::{Pixel, RunSums};
 
 /// Moments of a cluster of pixels. Coordinates are whole pixels; sums of whole-number pixels are exact.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,19 +37,6 @@ pub struct Region {
     pub xy: f64,
     /// See `xx`.
     pub yy: f64,
-}
-
-/// Sums over the pixels of a run.
-#[derive(Clone, Copy, Debug)]
-pub struct RunSums {
-    /// Σ I.
-    pub sum: f64,
-    /// Σ I i, i counted from the first pixel of the run.
-    pub sum_i: f64,
-    /// Smallest value.
-    pub min: f32,
-    /// Largest value.
-    pub max: f32,
 }
 
 /// Σ x and Σ x² of the columns start..=end, exact.

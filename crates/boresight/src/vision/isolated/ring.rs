@@ -3,7 +3,6 @@
 //! The ring begins one pixel outside the box (blurred edges) and is as wide as half the blob, at least 3 px. Large rings are
 //! sampled evenly with at most about 600 pixels. The plane takes a gradient of the sky or of the optics out.
 
-use super::Candidate;
 use super::sweep::{Blob, band};
 use crate::Image;
 use crate::vision::pixel::Pixel;
@@ -13,6 +12,18 @@ use nalgebra::{Matrix3, Vector3};
 /// Pixels of a ring looked at, at most and at least; a plane has three parameters.
 const MAX_SAMPLES: f64 = 600.0;
 const MIN_SAMPLES: usize = 8;
+
+/// A blob that passed, with what its ring says.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    pub blob: Blob,
+    pub level: f64,
+    pub background: f64,
+    pub peak: f64,
+    pub score: f64,
+    /// Place in the order of the levels and, within one, of the rows.
+    pub number: usize,
+}
 
 /// Scratch of the ring's samples.
 #[derive(Debug, Default)]
