@@ -15,6 +15,7 @@ pub mod llr;
 pub mod noise;
 pub mod noise_level;
 pub mod pixel;
+mod polarity;
 pub mod probability;
 pub mod region;
 mod runs;

@@ -11,6 +11,7 @@ pub mod spot;
 use super::background::{BackgroundConfig, DifferenceConfig};
 use super::colour::ColourMatchConfig;
 use super::isolated::IsolatedConfig;
+pub use super::polarity::{Polarity, Side};
 use crate::Result;
 use crate::validate::wrong;
 use schemars::JsonSchema;
@@ -43,37 +44,6 @@ pub enum ThresholdConfig {
 impl Default for ThresholdConfig {
     fn default() -> Self {
         Self::Local(LocalConfig::default())
-    }
-}
-
-/// Whether targets are brighter or darker than their surroundings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Side {
-    /// Targets are brighter.
-    #[default]
-    Bright,
-    /// Targets are darker.
-    Dark,
-}
-
-/// Which contrast is looked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Polarity {
-    /// Targets brighter than the background.
-    #[default]
-    Bright,
-    /// Targets darker than the background.
-    Dark,
-    /// Either; a cluster is wholly bright or wholly dark.
-    Both,
-}
-
-impl Polarity {
-    /// Whether `side` is looked for.
-    pub fn has(self, side: Side) -> bool {
-        matches!((self, side), (Self::Both, _) | (Self::Bright, Side::Bright) | (Self::Dark, Side::Dark))
     }
 }
 
