@@ -69,6 +69,7 @@ pub mod associate;
 pub mod auto;
 pub mod config;
 pub mod detection;
+#[cfg(feature = "draw")]
 pub mod draw;
 pub mod error;
 pub mod frame;
@@ -78,6 +79,7 @@ pub mod io;
 pub mod metrics;
 pub mod pipeline;
 pub mod record;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod reproduce;
 pub mod sim;

@@ -1,15 +1,19 @@
 //! Drawing on frames: boxes, labels, trails, ellipses; and annotated video.
 
 mod annotate;
+#[cfg(feature = "encode")]
+mod annotated_video;
 mod canvas;
 mod palette;
-mod sinks;
+mod png_folder;
 mod text;
 mod tone;
 
 pub use annotate::{Annotator, DrawOptions};
+#[cfg(feature = "encode")]
+pub use annotated_video::AnnotatedVideo;
 pub use canvas::{Canvas, Pen, Rgb};
 pub use palette::track_colour;
-pub use sinks::{AnnotatedVideo, PngFolder, write_png};
+pub use png_folder::{PngFolder, write_png};
 pub use text::Lettering;
 pub use tone::{Tone, legible_scale};

@@ -1,25 +1,41 @@
 //! Frames and tables in and out: images, video, CSV, MOTChallenge.
 
+#[cfg(feature = "images")]
 mod folder;
+#[cfg(feature = "images")]
 mod gif_frames;
 mod natural;
+#[cfg(feature = "images")]
 mod numbered;
 mod open;
+#[cfg(feature = "images")]
+mod pattern;
 mod pixels;
 mod raw;
+#[cfg(feature = "images")]
+mod samples;
 mod sniff;
+#[cfg(feature = "images")]
 mod still;
 pub mod tables;
+#[cfg(feature = "images")]
 mod tiff_count;
+#[cfg(feature = "images")]
 mod tiff_lzw;
+#[cfg(feature = "images")]
 mod tiff_packed;
+#[cfg(feature = "images")]
 mod tiff_pages;
+#[cfg(feature = "images")]
 mod tiff_stack;
 pub mod tracks;
+#[cfg(any(feature = "video", feature = "encode"))]
 pub mod video;
 mod y4m;
 
+#[cfg(feature = "images")]
 pub use folder::ImageFiles;
+#[cfg(feature = "images")]
 pub use gif_frames::GifFrames;
 pub use natural::natural_order;
 pub use open::{is_table, open};

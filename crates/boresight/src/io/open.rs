@@ -1,12 +1,10 @@
 //! Opens any input by what it is: a folder, a glob, a numbered pattern, a file (told by content), standard input.
 
-use super::folder::ImageFiles;
-use super::gif_frames::GifFrames;
+use super::OpenOptions;
 use super::natural::natural_order;
 use super::raw::RawFrames;
 use super::sniff::{self, Format, sniff};
 use super::y4m::Y4m;
-use super::{OpenOptions, video};
 use crate::{Error, ErrorKind, FrameSource, Result};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -26,20 +24,21 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
         return open_stdin(options);
     }
     if input.contains("://") || input.starts_with("/dev/video") {
-        return video::open_ffmpeg(input, options);
+        return open_other_video(input, options);
     }
     let path = Path::new(input);
     if path.is_dir() {
         if let Some(format) = options.raw {
             return Ok(Box::new(RawFrames::files(input, list_folder(path, |_| true)?, format, options)?));
         }
-        return Ok(Box::new(ImageFiles::open(input, list_folder(path, has_image_name)?, options)?));
+        return open_images(input, list_folder(path, has_image_name)?, options);
     }
     if path.exists() {
         return open_file(input, path, options);
     }
-    if let Some(files) = expand(input)? {
-        return Ok(Box::new(ImageFiles::open(input, files, options)?));
+    #[cfg(feature = "images")]
+    if let Some(files) = super::pattern::expand(input)? {
+        return open_images(input, files, options);
     }
     Err(Error::new(ErrorKind::NotFound, "no such file or folder")
         .at(input)
@@ -70,12 +69,10 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
                 .hint("a table of detections goes to 'boresight track' as it is, and needs no frames"))
         }
         Format::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
-        Format::Gif => Ok(Box::new(GifFrames::open(input, whole, options)?)),
-        format if format.is_image() && format != Format::Apng => {
-            Ok(Box::new(ImageFiles::open(input, vec![path.to_path_buf()], options)?))
-        }
-        Format::Mp4 => video::open_mp4(path, options),
-        _ => video::open_ffmpeg(input, options),
+        Format::Gif => open_gif(input, whole, options),
+        format if format.is_image() && format != Format::Apng => open_images(input, vec![path.to_path_buf()], options),
+        Format::Mp4 => open_mp4(path, options),
+        _ => open_other_video(input, options),
     }
 }
 
@@ -91,7 +88,7 @@ fn open_stdin(options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let whole = BufReader::new(Cursor::new(head.clone()).chain(input));
     match sniff(&head) {
         Format::Y4m => Ok(Box::new(Y4m::open(LABEL, whole, None, options)?)),
-        Format::Gif => Ok(Box::new(GifFrames::open(LABEL, whole, options)?)),
+        Format::Gif => open_gif(LABEL, whole, options),
         Format::Empty => Err(Error::new(ErrorKind::Damaged, "nothing came (0 bytes)").at(LABEL)),
         other => Err(Error::new(ErrorKind::Unsupported, format!("expected YUV4MPEG2, found {}", other.name()))
             .at(LABEL)
@@ -134,51 +131,38 @@ fn has_image_name(path: &Path) -> bool {
     path.extension().is_some_and(|e| NAMES.iter().any(|n| e.eq_ignore_ascii_case(n)))
 }
 
-/// The files that a glob or a numbered pattern names, in natural order; `None` if the text is neither.
-fn expand(input: &str) -> Result<Option<Vec<PathBuf>>> {
-    let pattern = match numbered(input) {
-        Some(pattern) => pattern,
-        None if input.contains(['*', '?', '[']) => input.to_string(),
-        None => return Ok(None),
-    };
-    let paths = glob::glob(&pattern).map_err(|e| Error::new(ErrorKind::NotFound, e.to_string()).at(input))?;
-    let mut files: Vec<PathBuf> = Vec::new();
-    for path in paths {
-        let path = path.map_err(|e| Error::new(ErrorKind::NotFound, e.to_string()).at(input))?;
-        if path.is_file() && numbered(input).is_none_or(|_| matches_number(input, &path)) {
-            files.push(path);
-        }
-    }
-    if files.is_empty() {
-        let error = Error::new(ErrorKind::NotFound, "no file has such a name").at(input);
-        return Err(if input.contains('[') {
-            error.hint(
-                "[ ] stand for one of the letters between them; write [[] for a bracket itself, or give the folder",
-            )
-        } else {
-            error
-        });
-    }
-    files.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-    Ok(Some(files))
+fn open_images(input: &str, files: Vec<PathBuf>, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    #[cfg(feature = "images")]
+    return Ok(Box::new(super::folder::ImageFiles::open(input, files, options)?));
+    #[cfg(not(feature = "images"))]
+    return Err(not_built(&(input, files, options).0, "images", "images"));
 }
 
-/// Splits `head%04dtail` at its number.
-fn split_number(input: &str) -> Option<(&str, &str)> {
-    let at = input.find('%')?;
-    let rest = input[at + 1..].trim_start_matches(|c: char| c.is_ascii_digit());
-    Some((&input[..at], rest.strip_prefix('d')?))
+fn open_gif(input: &str, whole: impl Read + Send + 'static, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    #[cfg(feature = "images")]
+    return Ok(Box::new(super::gif_frames::GifFrames::open(input, whole, options)?));
+    #[cfg(not(feature = "images"))]
+    return Err(not_built((input, whole, options).0, "GIF", "images"));
 }
 
-/// Turns `frame_%04d.png` into a glob.
-fn numbered(input: &str) -> Option<String> {
-    let (head, tail) = split_number(input)?;
-    Some(format!("{}*{}", glob::Pattern::escape(head), glob::Pattern::escape(tail)))
+fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    #[cfg(feature = "video")]
+    return super::video::open_mp4(path, options);
+    #[cfg(not(feature = "video"))]
+    return Err(not_built(&(path, options).0.to_string_lossy(), "video", "video"));
 }
 
-fn matches_number(input: &str, path: &Path) -> bool {
-    let Some((head, tail)) = split_number(input) else { return false };
-    let name = path.to_string_lossy();
-    let digits = name.strip_prefix(head.trim_start_matches("./")).or_else(|| name.strip_prefix(head));
-    digits.and_then(|d| d.strip_suffix(tail)).is_some_and(|d| !d.is_empty() && d.bytes().all(|b| b.is_ascii_digit()))
+/// What is neither image nor MP4: through `ffmpeg`.
+fn open_other_video(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    #[cfg(feature = "video")]
+    return super::video::open_ffmpeg(input, options);
+    #[cfg(not(feature = "video"))]
+    return Err(not_built((input, options).0, "video", "video"));
+}
+
+#[cfg(not(all(feature = "images", feature = "video")))]
+fn not_built(input: &str, what: &str, feature: &str) -> Error {
+    Error::new(ErrorKind::Unsupported, format!("this build of boresight does not read {what}"))
+        .at(input)
+        .hint(format!("switch on the feature '{feature}' of the crate boresight"))
 }

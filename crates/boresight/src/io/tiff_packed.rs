@@ -3,7 +3,8 @@
 //! Strips or tiles; uncompressed, LZW, deflate or PackBits; horizontal predictor for 8-bit palettes. Samples are packed
 //! from the high bit on, each row starts at a byte. Source: TIFF 6.0, sections 3 to 5, 9, 14, 15 and 8 (palette colour).
 
-use super::pixels::{Samples, check_size};
+use super::pixels::check_size;
+use super::samples::Samples;
 use super::still::damaged;
 use super::{Colour, tiff_pages::failed};
 use crate::{Error, ErrorKind, Pixels, Result};

@@ -6,7 +6,8 @@
 //! round so that bright is large. Of a hyperstack one channel and plane is read: see `tiff_stack`. Palettes and 10, 12 and 14 bit samples: see `tiff_packed`. Not read: zstd, WebP.
 
 use super::Colour;
-use super::pixels::{Samples, check_size};
+use super::pixels::check_size;
+use super::samples::Samples;
 use super::still::{damaged, guarded};
 use super::{tiff_lzw, tiff_packed, tiff_stack};
 use crate::{Error, ErrorKind, Pixels, Result};

@@ -23,6 +23,7 @@ pub mod preprocess;
 pub mod set;
 pub mod siap;
 pub mod state;
+#[cfg(feature = "trajectory-gospa")]
 pub mod trajectory_gospa;
 
 pub use clear_classic::{ClearClassic, clear_classic};

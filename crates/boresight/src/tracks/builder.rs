@@ -36,7 +36,14 @@ impl TrackTableBuilder {
             extra: Vec::new(),
             starts: vec![0],
         };
-        Self { table, frames: Vec::new(), of_id: HashMap::new(), last: (i64::MIN, u32::MAX), sorted: true, has_states: false }
+        Self {
+            table,
+            frames: Vec::new(),
+            of_id: HashMap::new(),
+            last: (i64::MIN, u32::MAX),
+            sorted: true,
+            has_states: false,
+        }
     }
 
     /// Makes room for rows to come.

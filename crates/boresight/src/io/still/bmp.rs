@@ -5,7 +5,8 @@
 //! Storage* (BITMAPFILEHEADER, BITMAPCOREHEADER, BITMAPINFOHEADER, BITMAPV5HEADER, *Bitmap Compression*).
 
 use super::damaged;
-use crate::io::pixels::{Samples, check_size};
+use crate::io::pixels::check_size;
+use crate::io::samples::Samples;
 use crate::{Error, ErrorKind, Pixels, Result, io::Colour};
 
 /// Values of the header's `compression` field.

@@ -3,7 +3,8 @@
 //! The decoder runs in its strict mode: a picture that breaks off is an error instead of a half-grey frame.
 
 use super::damaged;
-use crate::io::pixels::{Samples, check_size};
+use crate::io::pixels::check_size;
+use crate::io::samples::Samples;
 use crate::{Pixels, Result, io::Colour};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;

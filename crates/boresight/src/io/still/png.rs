@@ -2,7 +2,8 @@
 //! scaled to 0..=255 as the standard says; palettes are expanded to RGB; alpha is dropped. Checksums are checked.
 
 use super::damaged;
-use crate::io::pixels::{Samples, check_size};
+use crate::io::pixels::check_size;
+use crate::io::samples::Samples;
 use crate::{Pixels, Result, io::Colour};
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use std::io::Cursor;

@@ -5,7 +5,8 @@
 //! Source: netpbm's format pages pbm(5), pgm(5), ppm(5), pfm(5). A PBM's black (1) becomes 0, white (0) becomes 255.
 
 use super::damaged;
-use crate::io::pixels::{Samples, check_size};
+use crate::io::pixels::check_size;
+use crate::io::samples::Samples;
 use crate::{Error, ErrorKind, Pixels, Result, io::Colour};
 
 /// Reads white-space separated words, with `#` comments.

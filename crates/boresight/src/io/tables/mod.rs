@@ -17,10 +17,10 @@ mod tracks_csv;
 
 pub use atomic::{AtomicFile, Output};
 pub use columns::Columns;
-pub(crate) use number::parse_seconds;
 pub use detections_csv::{DETECTIONS_HEADER, DetectionsCsv};
 pub use json_lines::JsonLines;
 pub use mot::{MotWriter, extent_of_mot_box, mot_box_of_extent};
+pub(crate) use number::parse_seconds;
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
 pub use read_tracks::{StateTable, read_tracks};

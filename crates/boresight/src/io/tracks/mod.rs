@@ -3,6 +3,7 @@
 //! [`read`] finds the format by the look of the file; [`write()`] says what the target cannot hold.
 
 pub mod ctc;
+#[cfg(feature = "images")]
 pub mod ctc_write;
 pub mod kitti;
 pub mod lines;
