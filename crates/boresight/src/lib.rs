@@ -56,7 +56,7 @@
 //! | filter by hand, without std or heap | the crate [`boresight_filters`] |
 //! | fuse several sensors | [`fuse`] |
 //! | judge tracks against a truth | [`metrics`], [`TrackTable`] |
-//! | make scenes with a known truth | [`sim`], [`reproduce`] |
+//! | make scenes with a known truth | [`sim`] |
 //! | configure all of it from one file | [`Config`], [`config`] |
 //!
 //! Positions are (x, y) = (column, row) in pixels, the centre of the top-left pixel is (0, 0); frames count from 0; states are
@@ -81,7 +81,6 @@ pub mod pipeline;
 pub mod record;
 #[cfg(feature = "report")]
 pub mod report;
-pub mod reproduce;
 pub mod sim;
 pub mod time;
 pub mod track;

@@ -1,8 +1,8 @@
 //! `boresight reproduce`: the papers' tables and figures, side by side with ours.
 
 use crate::progress;
-use boresight::reproduce::{ITEMS, Item, Options, Output, html};
 use boresight::{Error, ErrorKind};
+use boresight_reproduce::{ITEMS, Item, Options, Output, html};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;

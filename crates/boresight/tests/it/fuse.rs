@@ -3,7 +3,6 @@
 use boresight::fuse::covariance_intersection::covariance_intersection;
 use boresight::fuse::track_to_track::fuse_independent;
 use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables};
-use boresight::reproduce::follow::{StartAt, Tuning};
 use boresight::sim::Seed;
 use boresight::sim::random::Purpose;
 use boresight::{TrackId, TrackStatus};
@@ -178,10 +177,4 @@ fn tracks_of_different_targets_are_paired_by_the_least_total_distance() {
     assert_eq!(f.pairs, [(TrackId(1), TrackId(6)), (TrackId(2), TrackId(5))]);
     let ids: Vec<u64> = f.frames[9].1.iter().map(|t| t.id.0).collect();
     assert_eq!(ids, [1, 2, 3, 6], "b's lone track gets a number of its own");
-}
-
-#[test]
-fn the_papers_known_start_is_what_it_says() {
-    let (belief, used) = Tuning { r: 0.5, q: 1e-5, start: StartAt::KNOWN }.belief(&[], &[]);
-    assert_eq!((belief.mean.as_slice(), used.len()), (&[10.0, 1.0, 10.0, 1.0][..], 0));
 }

@@ -10,7 +10,6 @@ mod hostile;
 mod images;
 mod memory;
 mod metrics;
-mod reproduce;
 mod rooms;
 mod tables;
 mod track;

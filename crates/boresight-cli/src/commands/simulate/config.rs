@@ -4,10 +4,10 @@
 //! only a band of levels about the target's tells them apart, which must be known beforehand.
 
 use boresight::Config;
-use boresight::reproduce::initiation::{paper_detector, paper_tracker};
 use boresight::sim::SceneConfig;
 use boresight::sim::scene::{Background, Shape};
 use boresight::vision::threshold::{BandConfig, ThresholdConfig};
+use boresight_reproduce::initiation::{paper_detector, paper_tracker};
 
 /// The configuration for scenes of rectangles on white noise; none for others.
 pub fn for_scene(name: &str, scene: &SceneConfig) -> Option<Config> {

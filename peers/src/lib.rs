@@ -1,5 +1,4 @@
 //! What the benchmark workers share: the JSON-lines protocol, `.npy` in and out, CPU time and memory of this process.
-#![allow(dead_code)] // each worker uses a part
 
 use rustix::time::{ClockId, clock_gettime};
 use serde_json::{Value, json};

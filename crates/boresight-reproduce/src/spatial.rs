@@ -7,10 +7,10 @@
 use super::item::{Figure, Output, Row, Section};
 use super::score::spread;
 use super::study::{Options, monte_carlo};
-use crate::sim::Seed;
-use crate::sim::random::Purpose;
-use crate::vision::spatial::{Border, mean_exact, median_exact};
-use crate::{Image, Result};
+use boresight::sim::Seed;
+use boresight::sim::random::Purpose;
+use boresight::vision::spatial::{Border, mean_exact, median_exact};
+use boresight::{Image, Result};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -65,7 +65,7 @@ fn pictures(clean: &Image<f64>, seed: Seed) -> Result<Vec<Figure>> {
     let mut out = Vec::new();
     for (name, sigma) in &NOISES[..2] {
         for (what, image) in ["noisy", "mean", "median"].iter().zip(filtered(clean, *sigma, &mut rng)?) {
-            let levels = image.as_slice().iter().map(|v| crate::sim::quantise(*v)).collect();
+            let levels = image.as_slice().iter().map(|v| boresight::sim::quantise(*v)).collect();
             out.push(Figure {
                 item: "filters-4.2",
                 caption: format!("D1 Figure 4.2: {name}, {what}"),

@@ -1,12 +1,10 @@
 //! Worker for the comparison with peers, workload W5b: Monte Carlo of the small scene, generated, segmented and followed.
 //!
-//! Build: `cargo build --release -p boresight --example peer_w5b`; peers entry:
-//! `{"name": "boresight", "workload": "W5b", "kind": "worker", "command": "target/release/examples/peer_w5b"}`.
+//! Build: `cargo build --release -p peers --bin peer_w5b`; peers entry:
+//! `{"name": "boresight", "workload": "W5b", "kind": "worker", "command": "target/release/peer_w5b"}`.
 
-mod worker;
-
-use boresight::reproduce::bench_scene::BenchScene;
-use worker::{Fault, Job};
+use boresight_reproduce::bench_scene::BenchScene;
+use peers::{Fault, Job};
 
 /// Runs of one repetition, as the bench's own peers do.
 const RUNS: u64 = 20;
@@ -35,5 +33,5 @@ impl Job for MonteCarlo {
 }
 
 fn main() -> Result<(), Fault> {
-    worker::serve(|_| Ok(Box::new(MonteCarlo { scene: BenchScene::new()?, rows: Vec::new() })))
+    peers::serve(|_| Ok(Box::new(MonteCarlo { scene: BenchScene::new()?, rows: Vec::new() })))
 }

@@ -2,14 +2,11 @@
 //!
 //! The work starts with positions and ends with the confirmed tracks' positions, as for every peer there.
 
-#[path = "worker/mod.rs"]
-mod worker;
-
 use boresight::associate::AssociatorConfig;
 use boresight::track::{self, BirthConfig, ExistenceConfig, LifeConfig, TrackerConfig, TwoPointConfig};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use nalgebra::{Matrix2, Vector2};
-use worker::{Fault, Job};
+use peers::{Fault, Job};
 
 struct W4 {
     points: Vec<Vec<Vector2<f64>>>,
@@ -62,7 +59,7 @@ impl Job for W4 {
 }
 
 fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
-    let (rows, _) = worker::read_npy(&std::fs::read(message["inputs"]["det"].as_str().ok_or("no det")?)?)?;
+    let (rows, _) = peers::read_npy(&std::fs::read(message["inputs"]["det"].as_str().ok_or("no det")?)?)?;
     let parameter = |key: &str| message["params"][key].as_f64();
     let n_frames = parameter("frames").ok_or("no frames")? as usize;
     let mut points = vec![Vec::new(); n_frames];
@@ -103,5 +100,5 @@ fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
 }
 
 fn main() -> Result<(), Fault> {
-    worker::serve(load)
+    peers::serve(load)
 }

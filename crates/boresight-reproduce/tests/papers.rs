@@ -1,11 +1,11 @@
 //! The papers' numbers, in runs reduced for CI: they must agree with the specification's independent Monte Carlo.
 
-use boresight::reproduce::follow::{StartAt, Tuning};
-use boresight::reproduce::initiation::{Start, study_ds2};
-use boresight::reproduce::scene_study::READING_A;
-use boresight::reproduce::study::{FilterKind, Job, study};
-use boresight::reproduce::{ITEMS, Options};
 use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight_reproduce::follow::{StartAt, Tuning};
+use boresight_reproduce::initiation::{Start, study_ds2};
+use boresight_reproduce::scene_study::READING_A;
+use boresight_reproduce::study::{FilterKind, Job, study};
+use boresight_reproduce::{ITEMS, Options};
 
 fn options(runs: u64, seed: u64) -> Options<'static> {
     Options { runs, seed, progress: &|_| {} }
@@ -134,4 +134,10 @@ fn every_captioned_figure_with_data_is_drawn() {
             "{number} in {captions}"
         );
     }
+}
+
+#[test]
+fn the_papers_known_start_is_what_it_says() {
+    let (belief, used) = Tuning { r: 0.5, q: 1e-5, start: StartAt::KNOWN }.belief(&[], &[]);
+    assert_eq!((belief.mean.as_slice(), used.len()), (&[10.0, 1.0, 10.0, 1.0][..], 0));
 }

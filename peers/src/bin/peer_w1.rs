@@ -1,16 +1,14 @@
 //! Worker for the comparison with peers, workload W1: threshold, 8-neighbour clusters and weighted centroids of one 8-bit frame.
 //!
-//! Build: `cargo build --release -p boresight --example peer_w1`; peers entry:
-//! `{"name": "boresight", "workload": "W1", "kind": "worker", "command": "target/release/examples/peer_w1"}`.
-
-mod worker;
+//! Build: `cargo build --release -p peers --bin peer_w1`; peers entry:
+//! `{"name": "boresight", "workload": "W1", "kind": "worker", "command": "target/release/peer_w1"}`.
 
 use boresight::Image;
 use boresight::vision::cluster::Clusterer;
 use boresight::vision::config::ClusterConfig;
 use boresight::vision::threshold::band::{band_bits, words};
+use peers::{Fault, Job, serve};
 use serde_json::Value;
-use worker::{Fault, Job, serve};
 
 struct Segmentation {
     frame: Image<u8>,

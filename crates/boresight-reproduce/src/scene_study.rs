@@ -5,12 +5,12 @@
 //! Coordinates: the papers' world counts pixels from 1 (percentage errors depend on it); the 1 is added here.
 //! Units: px, px/scan. Cost: one 64 x 64 frame of data set II about 20 µs a reading.
 
-use crate::sim::{SceneConfig, SceneSource, Seed};
-use crate::vision::centroid::{Surroundings, centroid};
-use crate::vision::cluster::Clusterer;
-use crate::vision::config::{CentroidMethod, ClusterConfig};
-use crate::vision::threshold::band::{band_bits, words};
-use crate::{Error, ErrorKind, FrameSource, Pixels, Result};
+use boresight::sim::{SceneConfig, SceneSource, Seed};
+use boresight::vision::centroid::{Surroundings, centroid};
+use boresight::vision::cluster::Clusterer;
+use boresight::vision::config::{CentroidMethod, ClusterConfig};
+use boresight::vision::threshold::band::{band_bits, words};
+use boresight::{Error, ErrorKind, FrameSource, Pixels, Result};
 use nalgebra::{Vector2, Vector4};
 
 /// A reading of the papers' segmentation.

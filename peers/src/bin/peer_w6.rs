@@ -3,14 +3,11 @@
 //! `peer_w6` scores by CLEAR, identity and HOTA; `peer_w6 gospa` and `peer_w6 ospa` give the mean set distance (c = 10,
 //! p = 2) of all frames. The work starts with the boxes by frame, as for every peer there.
 
-#[path = "worker/mod.rs"]
-mod worker;
-
 use boresight::metrics::hota::mean;
 use boresight::metrics::set::{SetDistance, SetOptions};
 use boresight::metrics::{MatchOptions, evaluate};
 use boresight::{PixelOrigin, TrackRow, TrackTable};
-use worker::{Fault, Job};
+use peers::{Fault, Job};
 
 enum What {
     Scores,
@@ -65,7 +62,7 @@ impl Job for W6 {
 }
 
 fn table(path: &str) -> Result<TrackTable, Fault> {
-    let (v, shape) = worker::read_npy(&std::fs::read(path)?)?;
+    let (v, shape) = peers::read_npy(&std::fs::read(path)?)?;
     if shape.len() != 2 || shape[1] != 6 {
         return Err(format!("{path}: expected 6 columns").into());
     }
@@ -80,7 +77,7 @@ fn table(path: &str) -> Result<TrackTable, Fault> {
 
 fn main() -> Result<(), Fault> {
     let word = std::env::args().nth(1).unwrap_or_default();
-    worker::serve(|message| {
+    peers::serve(|message| {
         let input = |key: &str| message["inputs"][key].as_str().ok_or(format!("no {key}"));
         let what = match word.as_str() {
             "gospa" => What::Gospa,

@@ -7,12 +7,12 @@
 use super::item::{Output, Row, Section};
 use super::score::{MEASURES, four_numbers, spread};
 use super::study::{LOST_PX, Options, monte_carlo};
-use crate::sim::named::{PAPER_START, paper_scene};
-use crate::sim::{SceneConfig, Seed};
-use crate::track::{CueConfig, LifeConfig, MOfNConfig, TrackerConfig};
-use crate::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
-use crate::vision::{DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
-use crate::{FrameSource, Result, Scan, TrackId, TrackStatus};
+use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{SceneConfig, Seed};
+use boresight::track::{CueConfig, LifeConfig, MOfNConfig, TrackerConfig};
+use boresight::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
+use boresight::vision::{DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
+use boresight::{FrameSource, Result, Scan, TrackId, TrackStatus};
 use nalgebra::Vector4;
 use std::collections::BTreeMap;
 
@@ -86,8 +86,8 @@ pub fn initiate(
 ) -> Result<Initiation> {
     let mut source = scene.build(seed)?;
     let cued = !tracker.cues.is_empty();
-    let mut detector = crate::vision::build(detector, source.info())?;
-    let mut tracker = crate::track::build(tracker)?;
+    let mut detector = boresight::vision::build(detector, source.info())?;
+    let mut tracker = boresight::track::build(tracker)?;
     let mut scan = Scan::default();
     let mut ever_near: BTreeMap<TrackId, bool> = BTreeMap::new();
     let (mut out, mut held, mut n) = (Initiation { lost: true, ..Initiation::default() }, 0usize, 0usize);
@@ -100,8 +100,9 @@ pub fn initiate(
         let mut nearest: Option<(f64, Vector4<f64>)> = None;
         for track in tracker.step(&scan)?.iter().filter(|t| t.status != TrackStatus::Tentative) {
             let at = track.kinematics.mean;
-            let near =
-                |t: &crate::TrackState| (t.kinematics.mean[0] - at[0]).hypot(t.kinematics.mean[2] - at[2]) <= NEAR_PX;
+            let near = |t: &boresight::TrackState| {
+                (t.kinematics.mean[0] - at[0]).hypot(t.kinematics.mean[2] - at[2]) <= NEAR_PX
+            };
             *ever_near.entry(track.id).or_default() |= source.truth().iter().any(near);
             on_first |= source.truth().first().is_some_and(near);
             let off = (at[0] - first[0]).hypot(at[2] - first[2]);

@@ -1,18 +1,16 @@
 //! Worker for the comparison with peers, workload W3: predict + update of 4 states and 2 measurements, many tracks.
 //!
 //! Argument: `batch` (lanes, the default), `kf` (one structured Kalman filter a track), `dense` (its structure hidden),
-//! `ud`, `srif`. All step frame by frame over the tracks, as a tracker does. Protocol: `worker/mod.rs`.
-//! Build: `cargo build --release -p boresight --example peer_w3`; peers entry:
-//! `{"name": "boresight-batch", "workload": "W3", "kind": "worker", "command": "target/release/examples/peer_w3 batch"}`.
-
-mod worker;
+//! `ud`, `srif`. All step frame by frame over the tracks, as a tracker does. Protocol: the library `peers`.
+//! Build: `cargo build --release -p peers --bin peer_w3`; peers entry:
+//! `{"name": "boresight-batch", "workload": "W3", "kind": "worker", "command": "target/release/peer_w3 batch"}`.
 
 use boresight_filters::batch::{AxisNoise, Lanes, Variance, step_all_with};
 use boresight_filters::model::{ConstantVelocity, Dense};
 use boresight_filters::{Gaussian, GaussianFilter, Kf, Measurement, Srif, Start, Ud};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use peers::{Fault, Job};
 use serde_json::Value;
-use worker::{Fault, Job};
 
 /// Tracks side by side in one pack.
 const LANES: usize = 8;
@@ -30,7 +28,7 @@ struct Input {
 const ORDER: [usize; 4] = [0, 2, 1, 3];
 
 fn read(message: &Value) -> Result<Input, Fault> {
-    let (values, shape) = worker::read_npy(&std::fs::read(message["inputs"]["z"].as_str().ok_or("no z")?)?)?;
+    let (values, shape) = peers::read_npy(&std::fs::read(message["inputs"]["z"].as_str().ok_or("no z")?)?)?;
     let [frames, n, 2] = shape[..] else { return Err("z is not [frames, tracks, 2]".into()) };
     let matrix = |key: &str| -> Result<Matrix4<f64>, Fault> {
         let list = message["params"][key].as_array().ok_or("no matrix")?;
@@ -114,7 +112,7 @@ fn each<F: GaussianFilter<4, Real = f64> + 'static>(input: Input, first: F) -> B
 
 fn main() -> Result<(), Fault> {
     let form = std::env::args().nth(1).unwrap_or_else(|| "batch".into());
-    worker::serve(|message| {
+    peers::serve(|message| {
         let i = read(message)?;
         // The workload's Q is given as numbers for its one step of 1 s.
         let cv = ConstantVelocity::for_step(i.noise)?;

@@ -1,8 +1,8 @@
 //! Worker for the comparison with peers, workload W2: 3x3 and 5x5 mean and median of an 8-bit frame.
 //!
 //! One JSON object a line on standard input, one answer a line on standard output: `load`, `run`, `result`, `quit`.
-//! Build: `cargo build --release -p boresight --example peer_w2`; peers entry:
-//! `{"name": "boresight", "workload": "W2", "kind": "worker", "command": "target/release/examples/peer_w2"}`.
+//! Build: `cargo build --release -p peers --bin peer_w2`; peers entry:
+//! `{"name": "boresight", "workload": "W2", "kind": "worker", "command": "target/release/peer_w2"}`.
 
 use boresight::Image;
 use boresight::vision::spatial::{SpatialConfig, SpatialFilter, WindowConfig};

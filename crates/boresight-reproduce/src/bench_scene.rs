@@ -5,13 +5,13 @@
 //! centroids; Kalman filter with Q = 1e-3 I, R = 0.5 I, P0 = diag(1, 0.1, 1, 0.1), gate 16, start at the truth.
 //! Result: RMSE from frame 5 on, px; lost if the last error is above 5 px. Coordinates from 0.
 
-use crate::sim::{Seed, named};
-use crate::vision::centroid::{Surroundings, centroid};
-use crate::vision::cluster::Clusterer;
-use crate::vision::config::{CentroidMethod, ClusterConfig};
-use crate::vision::spatial::{Border, SpatialConfig, SpatialFilter, WindowConfig};
-use crate::vision::threshold::band::{band_bits, words};
-use crate::{FrameSource, Image, Pixels, Result};
+use boresight::sim::{Seed, named};
+use boresight::vision::centroid::{Surroundings, centroid};
+use boresight::vision::cluster::Clusterer;
+use boresight::vision::config::{CentroidMethod, ClusterConfig};
+use boresight::vision::spatial::{Border, SpatialConfig, SpatialFilter, WindowConfig};
+use boresight::vision::threshold::band::{band_bits, words};
+use boresight::{FrameSource, Image, Pixels, Result};
 use boresight_filters::Gaussian;
 use boresight_filters::linear::{correct_linear, predict_linear};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector4};

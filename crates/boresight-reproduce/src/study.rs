@@ -7,8 +7,8 @@
 use super::follow::{Tuning, follow};
 use super::scene_study::{Reading, run_scene};
 use super::score::{four_numbers, lost};
-use crate::Result;
-use crate::sim::{SceneConfig, Seed};
+use boresight::Result;
+use boresight::sim::{SceneConfig, Seed};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{FuzzySrif, Gaussian, Kf, Srif, Start, Ud};
 use nalgebra::{Vector2, Vector4};

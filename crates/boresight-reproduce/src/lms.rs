@@ -8,10 +8,10 @@
 use super::item::{Figure, Line, Output, Row, Section};
 use super::score::spread;
 use super::study::{Options, monte_carlo};
-use crate::Result;
-use crate::sim::motion::Mover;
-use crate::sim::random::Purpose;
-use crate::sim::{Seed, named};
+use boresight::Result;
+use boresight::sim::motion::Mover;
+use boresight::sim::random::Purpose;
+use boresight::sim::{Seed, named};
 use boresight_filters::lms::{LmsAxis, LmsRule};
 use nalgebra::Vector4;
 use rand_distr::{Distribution, StandardNormal};

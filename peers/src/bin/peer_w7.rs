@@ -1,10 +1,7 @@
 //! Benchmark worker for peerbench W7 (linear assignment, dense and sparse): kind `worker` of its PLUGIN.md.
 
-#[path = "worker/mod.rs"]
-mod worker;
-
 use boresight::associate::assignment::{csr::Csr, dense::Dense};
-use worker::{Fault, Job};
+use peers::{Fault, Job};
 
 struct DenseJob {
     n: usize,
@@ -64,23 +61,23 @@ fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
     if let Some(path) = message["inputs"]["csr"].as_str() {
         let bytes = std::fs::read(path)?;
         let whole = |name: &str| -> Result<Vec<u32>, Fault> {
-            Ok(worker::read_npz(&bytes, name)?.0.iter().map(|v| *v as u32).collect())
+            Ok(peers::read_npz(&bytes, name)?.0.iter().map(|v| *v as u32).collect())
         };
         let shape = whole("shape")?;
         return Ok(Box::new(SparseJob {
             n_columns: *shape.get(1).ok_or("no shape")? as usize,
             starts: whole("indptr")?,
             indices: whole("indices")?,
-            cost: worker::read_npz(&bytes, "data")?.0,
+            cost: peers::read_npz(&bytes, "data")?.0,
             solver: Csr::default(),
             columns: Vec::new(),
         }));
     }
-    let (cost, shape) = worker::read_npy(&std::fs::read(message["inputs"]["cost"].as_str().ok_or("no cost")?)?)?;
+    let (cost, shape) = peers::read_npy(&std::fs::read(message["inputs"]["cost"].as_str().ok_or("no cost")?)?)?;
     let n = *shape.first().ok_or("no shape")?;
     Ok(Box::new(DenseJob { n, cost, solver: Dense::default(), columns: Vec::new() }))
 }
 
 fn main() -> Result<(), Fault> {
-    worker::serve(load)
+    peers::serve(load)
 }

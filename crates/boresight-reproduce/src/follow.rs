@@ -3,7 +3,7 @@
 //! Source: SPEC D.4 (NN: the gated measurement with the least d², first on ties; none: prediction kept), P_G = 0.99.
 //! World, px and px/scan; T = 1 scan. Cost: all centroids are tested (about 261 a scan in data set II).
 
-use crate::Result;
+use boresight::Result;
 use boresight_filters::{Gaussian, GaussianFilter, Measurement};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 

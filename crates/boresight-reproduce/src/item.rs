@@ -2,7 +2,7 @@
 
 use super::score::Spread;
 use super::study::Options;
-use crate::Result;
+use boresight::Result;
 use serde::Serialize;
 
 /// One number of a paper beside ours.

@@ -12,9 +12,9 @@ use super::printed::four_rows;
 use super::scene_study::{READING_A, READING_B, READING_C, SceneRun, run_scene, run_scene_of};
 use super::study::{FilterKind, Job, Options, Outcome, Scored, monte_carlo, study};
 use super::tracking::words;
-use crate::Result;
-use crate::sim::Seed;
-use crate::sim::named::{PAPER_START, paper_scene};
+use boresight::Result;
+use boresight::sim::Seed;
+use boresight::sim::named::{PAPER_START, paper_scene};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{GaussianFilter, Measurement, Srif, Start};
 use nalgebra::{Matrix2, Vector4};
@@ -113,10 +113,10 @@ fn fusion(options: &Options<'_>) -> Result<Section> {
         let one = run_scene(&s1, seed, &[READING_C])?;
         let same = run_scene_of(s2.build(seed)?.with_target_seed(other), &[READING_C])?;
         let apart = run_scene(&s2, other, &[READING_C])?;
-        let score = |second: &SceneRun| Ok::<_, crate::Error>(Scored::new(&one.truth, &follow_both(&one, second)?));
+        let score = |second: &SceneRun| Ok::<_, boresight::Error>(Scored::new(&one.truth, &follow_both(&one, second)?));
         let alone = |data: &SceneRun| {
             let job = Job { reading: READING_C, tuning: TUNING, filter: FilterKind::Srif };
-            Ok::<_, crate::Error>(Scored::new(
+            Ok::<_, boresight::Error>(Scored::new(
                 &data.truth,
                 &super::study::estimates(&job, &data.centroids[0], &data.truth)?,
             ))
