@@ -3,7 +3,7 @@
 use super::run_options::{self, InputArgs, TrackerArgs};
 use crate::progress;
 use boresight::io::DetectionsCsv;
-use boresight::io::tables::Output;
+use boresight::io::Output;
 use boresight::{Sink, pipeline};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 
 use super::annotate::{Annotator, DrawOptions};
 use super::canvas::Rgb;
-use crate::io::tables::AtomicFile;
+use crate::io::AtomicFile;
 use crate::{Error, ErrorKind, Image, Result, Sink, View};
 use std::io::Write;
 use std::path::{Path, PathBuf};

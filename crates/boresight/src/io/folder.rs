@@ -6,9 +6,10 @@
 //! run of empty files behind a full disk), the sequence ends before it with a warning that counts the loss.
 
 use super::numbered::{self, Numbering};
+use super::options::OpenOptions;
 use super::sniff::{self, Format, sniff};
-use super::tiff_pages::TiffPages;
-use super::{OpenOptions, still};
+use super::stack::tiff::{TiffPages, count_pages};
+use super::still;
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
@@ -82,7 +83,7 @@ impl ImageFiles {
         // Pages of several TIFF files are not counted beforehand.
         source.info.n_frames = match (&source.pages, one_tiff) {
             (None, _) => Some(source.files.len() as u64),
-            (Some((_, pages)), true) => super::tiff_count::count_pages(&source.first_file).map(|n| pages.n_given_of(n)),
+            (Some((_, pages)), true) => count_pages(&source.first_file).map(|n| pages.n_given_of(n)),
             (Some(_), false) => None,
         };
         source.first = Some(first);

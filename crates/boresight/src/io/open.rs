@@ -1,10 +1,10 @@
 //! Opens any input by what it is: a folder, a glob, a numbered pattern, a file (told by content), standard input.
 
-use super::OpenOptions;
 use super::natural::natural_order;
-use super::raw::RawFrames;
+use super::options::OpenOptions;
 use super::sniff::{self, Format, sniff};
-use super::y4m::Y4m;
+use super::stream::raw::RawFrames;
+use super::stream::y4m::Y4m;
 use crate::{Error, ErrorKind, FrameSource, Result};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -140,7 +140,7 @@ fn open_images(input: &str, files: Vec<PathBuf>, options: &OpenOptions) -> Resul
 
 fn open_gif(input: &str, whole: impl Read + Send + 'static, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "images")]
-    return Ok(Box::new(super::gif_frames::GifFrames::open(input, whole, options)?));
+    return Ok(Box::new(super::stack::gif::GifFrames::open(input, whole, options)?));
     #[cfg(not(feature = "images"))]
     return Err(not_built((input, whole, options).0, "GIF", "images"));
 }

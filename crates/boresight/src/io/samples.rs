@@ -3,7 +3,7 @@
 //! 16-bit RGB has no pixel type of its own: in colour it becomes 8-bit RGB (rounded), in grey it keeps its 16 bits (the weights of
 //! `pixels`).
 
-use super::Colour;
+use super::options::Colour;
 use super::pixels::gray_of_rgb8;
 use crate::{Error, ErrorKind, Image, Pixels, Result};
 

@@ -4,10 +4,11 @@
 //! is all grey gives grey frames, for BMP knows no other 8-bit grey; alpha is dropped. Source: Microsoft, *Bitmap
 //! Storage* (BITMAPFILEHEADER, BITMAPCOREHEADER, BITMAPINFOHEADER, BITMAPV5HEADER, *Bitmap Compression*).
 
-use super::damaged;
+use crate::io::guard::damaged;
+use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
-use crate::{Error, ErrorKind, Pixels, Result, io::Colour};
+use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Values of the header's `compression` field.
 const RLE8: u32 = 1;

@@ -2,10 +2,11 @@
 //!
 //! The decoder runs in its strict mode: a picture that breaks off is an error instead of a half-grey frame.
 
-use super::damaged;
+use crate::io::guard::damaged;
+use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
-use crate::{Pixels, Result, io::Colour};
+use crate::{Pixels, Result};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;

@@ -1,4 +1,4 @@
-//! One still image from the bytes of a file: PNG, JPEG, PNM, BMP (TIFF has pages: see `tiff_stack`).
+//! One still image from the bytes of a file: PNG, JPEG, PNM, BMP (TIFF has pages: see `stack::tiff`).
 //!
 //! Every decoder reads the header first, refuses absurd sizes, and only then takes memory. A file that ends early is an
 //! error here, never a half-grey picture. Decoders come from other crates: a panic inside one is turned into an error,
@@ -9,7 +9,9 @@ mod jpeg;
 mod png;
 mod pnm;
 
-use super::{Colour, sniff::Format};
+use super::guard::guarded;
+use super::options::Colour;
+use super::sniff::Format;
 use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Decodes one image file held in memory.
@@ -21,15 +23,4 @@ pub(crate) fn decode(bytes: &[u8], format: Format, colour: Colour, max_pixels: u
         Format::Bmp => bmp::decode(bytes, colour, max_pixels),
         other => Err(Error::new(ErrorKind::Unsupported, format!("{} is not read as a still image", other.name()))),
     })
-}
-
-/// Runs a foreign decoder; its panic becomes an error of the file.
-pub(crate) fn guarded<T>(decode: impl FnOnce() -> Result<T>) -> Result<T> {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode))
-        .unwrap_or_else(|_| Err(Error::new(ErrorKind::Damaged, "the decoder gave up on damaged data")))
-}
-
-/// An error of damaged data with the decoder's own words.
-pub(crate) fn damaged(what: &str, cause: impl std::fmt::Display) -> Error {
-    Error::new(ErrorKind::Damaged, format!("{what}: {cause}"))
 }

@@ -4,10 +4,11 @@
 //! the file says (a 12-bit image with maxval 4095 holds 0..=4095); maxval up to 255 gives 8 bits, above 16 bits.
 //! Source: netpbm's format pages pbm(5), pgm(5), ppm(5), pfm(5). A PBM's black (1) becomes 0, white (0) becomes 255.
 
-use super::damaged;
+use crate::io::guard::damaged;
+use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
-use crate::{Error, ErrorKind, Pixels, Result, io::Colour};
+use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Reads white-space separated words, with `#` comments.
 struct Words<'a> {

@@ -4,8 +4,8 @@
 //! box in pixel-edge coordinates (a single pixel at x has left = x - 0.5), number of pixels, strongest value, sum of
 //! weights (counts), score. Numbers are the shortest that read back to the same bits.
 
-use super::Output;
 use super::number::{push_f32, push_f64, push_seconds};
+use crate::io::atomic::Output;
 use crate::{Result, Sink, View};
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -3,9 +3,9 @@
 //! Numbers that JSON cannot hold (infinite, not a number) become `null`. Covariances are rows of the upper triangle as
 //! in the CSV tables: `[x,x] [x,y] [y,y]`, and the ten entries of `[x, vx, y, vy]`.
 
-use super::Output;
 use super::number::{push_f32, push_f64, push_seconds};
 use super::tracks_csv::status_word;
+use crate::io::atomic::Output;
 use crate::{Detection, Result, Sink, TrackState, View};
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -1,6 +1,5 @@
 //! Tables in and out: tracks, detections, MOTChallenge, JSON lines.
 
-mod atomic;
 mod columns;
 mod detection_row;
 mod detections_csv;
@@ -15,7 +14,6 @@ mod scan_times;
 mod seqinfo;
 mod tracks_csv;
 
-pub use atomic::{AtomicFile, Output};
 pub use columns::Columns;
 pub use detections_csv::{DETECTIONS_HEADER, DetectionsCsv};
 pub use json_lines::JsonLines;

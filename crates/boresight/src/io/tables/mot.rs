@@ -3,8 +3,8 @@
 //! A MOTChallenge box that starts at the top-left pixel has left = top = 1; here that pixel's left edge is -0.5. So left
 //! and top shift by 1.5 px, sizes do not change. Source: Leal-Taixé et al., *MOTChallenge 2015*, section on data format.
 
-use super::Output;
 use super::number::{push_f32, push_f64};
+use crate::io::atomic::Output;
 use crate::{Extent, Result, Sink, TrackStatus, View};
 use std::fmt::Write;
 use std::path::PathBuf;

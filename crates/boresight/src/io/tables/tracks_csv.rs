@@ -5,8 +5,8 @@
 //! the detection that was taken among this frame's detections (empty: none). Numbers are the shortest that read back
 //! to the same bits.
 
-use super::Output;
 use super::number::{push_f64, push_seconds};
+use crate::io::atomic::Output;
 use crate::{Result, Sink, TrackStatus, View};
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! Opens a video: H.264 in MP4 in process, everything else through the program `ffmpeg`.
 
-use super::{ffmpeg, mp4_source};
-use crate::io::OpenOptions;
+use super::{ffmpeg, mp4};
+use crate::io::options::OpenOptions;
 use crate::{Error, ErrorKind, FrameSource, Result};
 use std::ffi::OsStr;
 use std::path::Path;
@@ -14,9 +14,9 @@ const FFMPEG: &str = "ffmpeg";
 /// [`ErrorKind::NotFound`] or [`ErrorKind::Damaged`] for the file, [`ErrorKind::MissingTool`] if
 /// its video is not H.264 (or 4:4:4 or lossless) and there is no `ffmpeg`.
 pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    match mp4_source::open(path, options)? {
-        mp4_source::Opened::Source(source) => Ok(source),
-        mp4_source::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), &path.to_string_lossy(), options) {
+    match mp4::open(path, options)? {
+        mp4::Opened::Source(source) => Ok(source),
+        mp4::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), &path.to_string_lossy(), options) {
             Err(e) if e.kind() == ErrorKind::MissingTool => Err(Error::new(e.kind(), why.to_string()).hint(format!(
                 "such a video is read through the program ffmpeg, which is not installed; {}",
                 ffmpeg::INSTALL

@@ -2,7 +2,8 @@
 //!
 //! Source: ISO/IEC 14496-12, 4.2 (size 32 bit, 64 bit after size 1, to the end of the file for size 0).
 
-use super::{Error, damaged};
+use super::sample::damaged;
+use crate::Error;
 use std::io::{Read, Seek, SeekFrom};
 
 /// A box's name.

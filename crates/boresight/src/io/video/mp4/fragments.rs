@@ -4,7 +4,7 @@
 //! Fragments are placed by their own decoding time (`tfdt`), so that a lost fragment leaves a gap in time.
 
 use super::boxes::{Cursor, be32, cut};
-use super::{Sample, damaged};
+use super::sample::{Sample, damaged};
 use crate::Result;
 
 /// Defaults of one track for its fragments.

@@ -4,7 +4,7 @@
 //! Limits: the number of samples is bounded by the bytes that back it, so that a header cannot claim memory.
 
 use super::boxes::{Cursor, be32, cut};
-use super::{Codec, Sample, damaged};
+use super::sample::{Codec, Sample, damaged};
 use crate::Result;
 
 /// What the tables of a track hold.

@@ -7,7 +7,7 @@
 //! edit list only shifts time.
 
 use super::boxes::Cursor;
-use super::{Sample, damaged};
+use super::sample::{Sample, damaged};
 use crate::Result;
 
 /// One row of an edit list.
@@ -21,7 +21,7 @@ pub(super) struct Edit {
 
 /// One picture to decode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in super::super) struct Step {
+pub(super) struct Step {
     /// Which sample.
     pub sample: u32,
     /// Presentation time, media ticks.

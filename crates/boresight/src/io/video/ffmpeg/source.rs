@@ -5,9 +5,9 @@
 //! drained on a thread of their own; it is killed when the source is dropped.
 //! Limits: how many frames there are is not known beforehand; a live stream that is silent for 30 s is given up.
 
-use super::ffmpeg_log::Log;
-use super::ffmpeg_pictures::{Message, read_all};
-use crate::io::{Colour, OpenOptions};
+use super::log::Log;
+use super::pictures::{Message, read_all};
+use crate::io::options::{Colour, OpenOptions};
 use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Pixels, Result, SourceInfo};
 use std::ffi::OsStr;
 use std::path::Path;
@@ -48,7 +48,7 @@ impl Drop for FfmpegSource {
 }
 
 /// Opens `input` with the program `ffmpeg`.
-pub(super) fn open(program: &OsStr, input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+pub(in crate::io::video) fn open(program: &OsStr, input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let source = match start(program, input, options, "-fps_mode")? {
         Started::Source(source) => source,
         // Programs before 5.1 know the same choice by an older name.
@@ -63,7 +63,7 @@ pub(super) fn open(program: &OsStr, input: &str, options: &OpenOptions) -> Resul
 }
 
 /// How to get the program.
-pub(super) const INSTALL: &str = "install ffmpeg: `apt install ffmpeg` (Debian, Ubuntu), `dnf install ffmpeg` (Fedora), \
+pub(in crate::io::video) const INSTALL: &str = "install ffmpeg: `apt install ffmpeg` (Debian, Ubuntu), `dnf install ffmpeg` (Fedora), \
 `brew install ffmpeg` (macOS), `winget install ffmpeg` (Windows); or convert the video to MP4 with H.264, which is read \
 without it";
 

@@ -3,8 +3,8 @@
 //! One file, a folder of files (each holds one frame or several), or a pipe. Bytes behind the last whole frame are
 //! left out with a warning, since they mostly mean that the size or the type is not the right one.
 
-use super::pixels::gray_of_rgb8;
-use super::{Colour, OpenOptions, RawFormat, RawType};
+use crate::io::options::{Colour, OpenOptions, RawFormat, RawType};
+use crate::io::pixels::gray_of_rgb8;
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };

@@ -3,18 +3,19 @@
 //! 8 and 16 bit grey and 32-bit float stay what they are. Signed and 32-bit integers, half and double floats become
 //! 32-bit float (exact for 16 bits and half; a warning says so for the others). Separate colour planes are joined.
 //! Reduced-size pages (previews, NewSubfileType bit 0) are passed over. Where zero stands for white, samples are turned
-//! round so that bright is large. Of a hyperstack one channel and plane is read: see `tiff_stack`. Palettes and 10, 12 and 14 bit samples: see `tiff_packed`. Not read: zstd, WebP.
+//! round so that bright is large. Of a hyperstack one channel and plane is read: see `hyperstack`. Palettes and 10, 12 and 14 bit samples: see `packed`. Not read: zstd, WebP.
 
-use super::Colour;
-use super::pixels::check_size;
-use super::samples::Samples;
-use super::still::{damaged, guarded};
-use super::{tiff_lzw, tiff_packed, tiff_stack};
+use super::failure::failed;
+use super::{hyperstack, lzw, packed};
+use crate::io::guard::{damaged, guarded};
+use crate::io::options::Colour;
+use crate::io::pixels::check_size;
+use crate::io::samples::Samples;
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
+use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
-use tiff::{ColorType, TiffError};
 
 /// Reads pages in file order.
 pub(crate) struct TiffPages<R: Read + Seek> {
@@ -32,17 +33,6 @@ pub(crate) struct TiffPages<R: Read + Seek> {
     /// Pages that ImageJ's description claims.
     n_claimed: Option<u64>,
     notes: Vec<String>,
-}
-
-pub(super) fn failed(e: TiffError) -> Error {
-    match e {
-        TiffError::UnsupportedError(what) => {
-            Error::new(ErrorKind::Unsupported, format!("a kind of TIFF that is not read: {what}"))
-                .hint("rewrite it uncompressed with 8, 16 or 32 bits a sample, for example with tiffcp -c none")
-        }
-        TiffError::LimitsExceeded => Error::new(ErrorKind::Damaged, "its header asks for more memory than is allowed"),
-        other => damaged("not a whole TIFF", other),
-    }
 }
 
 impl<R: Read + Seek> TiffPages<R> {
@@ -119,7 +109,7 @@ impl<R: Read + Seek> TiffPages<R> {
     fn settled_step(&mut self) -> u64 {
         if self.n_met == 0 {
             let text = self.decoder.find_tag(Tag::ImageDescription).ok().flatten().and_then(|t| t.into_string().ok());
-            let stack = text.as_deref().and_then(tiff_stack::of_description);
+            let stack = text.as_deref().and_then(hyperstack::of_description);
             self.n_claimed = stack.and_then(|s| s.n_pages);
             if let (None, Some(stack)) = (self.step, stack.filter(|s| s.step() > 1)) {
                 self.step = Some(stack.step());
@@ -145,12 +135,12 @@ impl<R: Read + Seek> TiffPages<R> {
     fn read_page(&mut self) -> Result<Pixels> {
         let (w, h) = self.decoder.dimensions().map_err(failed)?;
         let (width, height) = check_size(w.into(), h.into(), self.max_pixels)?;
-        if let Some(pixels) = tiff_packed::read(&mut self.decoder, self.colour, self.max_pixels)? {
+        if let Some(pixels) = packed::read(&mut self.decoder, self.colour, self.max_pixels)? {
             return Ok(pixels);
         }
         let colour_type = self.decoder.colortype().map_err(failed)?;
         let mut buffer = DecodingResult::U8(Vec::new());
-        let planes = match tiff_lzw::read(&mut self.decoder, width, height)? {
+        let planes = match lzw::read(&mut self.decoder, width, height)? {
             Some(samples) => {
                 buffer = samples;
                 1

@@ -6,8 +6,8 @@
 //! as long as the one before.
 
 use super::i420::I420;
-use super::mp4_writer::Mp4Options;
-use crate::io::tables::AtomicFile;
+use super::options::Mp4Options;
+use crate::io::atomic::AtomicFile;
 use crate::{Error, ErrorKind, Image, Result, Timestamp};
 use openh264::OpenH264API;
 use openh264::encoder::{

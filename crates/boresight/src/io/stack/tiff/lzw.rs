@@ -5,9 +5,10 @@
 //! Here: samples of 8, 16, 32 or 64 bits side by side (not in planes), grey or RGB, without or with the horizontal
 //! predictor. Everything else is left to the crate. Source: TIFF 6.0, sections 13, 14 and 15.
 
-use super::still::damaged;
-use super::{tiff_packed::chunk_bytes, tiff_pages::failed};
+use super::chunk::chunk_bytes;
+use super::failure::failed;
 use crate::Result;
+use crate::io::guard::damaged;
 use std::io::{Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::{ByteOrder, Tag};

@@ -4,8 +4,9 @@
 //! What the header claims is checked before memory is taken; buffers of frames that the caller gave back are used again.
 
 use super::nut::{Format, Head, Nut};
-use super::yuv::to_u16;
-use crate::io::{Colour, gray_of_rgb8};
+use crate::io::options::Colour;
+use crate::io::pixels::gray_of_rgb8;
+use crate::io::video::yuv::to_u16;
 use crate::{Frame, FrameIndex, Image, PixelKind, Pixels, Timestamp};
 use std::io::{BufReader, Read};
 use std::process::ChildStdout;

@@ -6,10 +6,12 @@
 //! frame numbers and times stay true, so that lost frames leave a gap, and a warning counts them.
 
 use super::h264::{AccessUnits, Picture, Refusal, start_error};
-use super::mp4::{Codec, Movie, Step, read_movie};
+use super::movie::{Movie, read_movie};
 use super::reorder::{Order, Reorder};
-use super::yuv::{Matrix, Planes, to_rgb, to_u16};
-use crate::io::{Colour, OpenOptions};
+use super::sample::{Codec, Sample};
+use super::timeline::Step;
+use crate::io::options::{Colour, OpenOptions};
+use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
@@ -35,7 +37,7 @@ enum Message {
 }
 
 /// The source.
-pub(super) struct Mp4Source {
+pub(in crate::io::video) struct Mp4Source {
     info: SourceInfo,
     warnings: Vec<String>,
     first: Option<Frame>,
@@ -45,7 +47,7 @@ pub(super) struct Mp4Source {
 }
 
 /// What [`open`] found.
-pub(super) enum Opened {
+pub(in crate::io::video) enum Opened {
     /// Frames.
     Source(Box<Mp4Source>),
     /// A kind of video that another decoder must read, and why.
@@ -55,7 +57,7 @@ pub(super) enum Opened {
 /// Opens an MP4 file.
 /// # Errors
 /// When the file is missing, damaged or too large.
-pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Opened> {
+pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<Opened> {
     let mut file = File::open(path)
         .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be opened").at(path.display()).because(e))?;
     let mut movie = match read_movie(&mut file, path) {
@@ -363,7 +365,7 @@ fn shown_times(steps: &[Step]) -> Vec<i64> {
     times
 }
 
-fn read_sample(file: &mut File, s: &super::mp4::Sample, file_len: u64, data: &mut Vec<u8>) -> Result<(), Refusal> {
+fn read_sample(file: &mut File, s: &Sample, file_len: u64, data: &mut Vec<u8>) -> Result<(), Refusal> {
     if s.offset.saturating_add(u64::from(s.size)) > file_len {
         return Err(Refusal::Damaged("the file ends before it".into()));
     }

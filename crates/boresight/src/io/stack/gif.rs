@@ -4,9 +4,9 @@
 //! zero counts as 0.1 s, as browsers and ffmpeg take it, with a warning. Source: CompuServe, *GIF89a*, section 23
 //! (graphic control extension: disposal, delay in 1/100 s).
 
-use super::pixels::{check_size, gray_of_rgb8};
-use super::still::{damaged, guarded};
-use super::{Colour, OpenOptions};
+use crate::io::guard::{damaged, guarded};
+use crate::io::options::{Colour, OpenOptions};
+use crate::io::pixels::{check_size, gray_of_rgb8};
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };

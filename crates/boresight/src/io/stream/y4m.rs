@@ -5,8 +5,8 @@
 //! that breaks off is left out with a warning. Source: mjpegtools yuv4mpeg(5); depth tags as FFmpeg writes them
 //! (`C420p10`, `Cmono12`).
 
-use super::pixels::check_size;
-use super::{Colour, OpenOptions};
+use crate::io::options::{Colour, OpenOptions};
+use crate::io::pixels::check_size;
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };

@@ -1,11 +1,12 @@
 //! Writes MP4 with H.264 that browsers and ffmpeg play, with the frames' own times.
 //!
-//! Frames are encoded on a thread of their own ([`super::mp4_encoding`]), so that drawing the next frame and encoding this
+//! Frames are encoded on a thread of their own ([`super::encoding`]), so that drawing the next frame and encoding this
 //! one overlap. The first frame is at time 0; times are rounded to 1/720 000 s without drift.
 //! The file has its name only when it is whole: until then it is `NAME.part`, removed if the writer is dropped.
 //! Limits: 8 bit 4:2:0, at most 3840 x 2160 pixels (level 5.2 of the encoder), one hour between two frames.
 
-use super::mp4_encoding::{Encoding, Work};
+use super::encoding::{Encoding, Work};
+use super::options::Mp4Options;
 use crate::{Error, ErrorKind, Image, Result, Timestamp};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
@@ -13,23 +14,6 @@ use std::thread::JoinHandle;
 
 /// Largest picture that the encoder takes, px (longer side, shorter side).
 pub const MAX_SIZE: (usize, usize) = (3840, 2160);
-
-/// How a video is written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mp4Options {
-    /// Quantiser of H.264, 10 (nearly lossless, large) to 40 (coarse, small).
-    pub quantiser: u8,
-    /// Frames between two from which decoding can start.
-    pub key_every: u32,
-    /// Number of frames, if known: their table is then put in front, so that players can start before all is loaded.
-    pub expected_frames: Option<u64>,
-}
-
-impl Default for Mp4Options {
-    fn default() -> Self {
-        Self { quantiser: 24, key_every: 60, expected_frames: None }
-    }
-}
 
 /// A video being written.
 pub struct Mp4Writer {

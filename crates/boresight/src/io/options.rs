@@ -1,0 +1,93 @@
+//! How a source of frames is opened: wanted pixels, layout of raw frames, rate, limits.
+
+use crate::{Error, ErrorKind, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which pixels are wanted from a source that could give several kinds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Colour {
+    /// What the file holds: grey stays grey; colour stills give RGB; video gives its luma plane.
+    #[default]
+    Native,
+    /// Grey always: luma of video, BT.601 of RGB.
+    Gray,
+    /// RGB always, if the file has colour.
+    Rgb,
+}
+
+/// Pixel type of headerless (raw) frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawType {
+    /// 8-bit grey.
+    U8,
+    /// 16-bit grey, least significant byte first.
+    U16Le,
+    /// 16-bit grey, most significant byte first.
+    U16Be,
+    /// 32-bit float grey, least significant byte first.
+    F32Le,
+    /// 8-bit RGB, interleaved.
+    Rgb8,
+}
+
+/// Layout of headerless (raw) frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct RawFormat {
+    /// Width, px, above 0.
+    pub width: usize,
+    /// Height, px, above 0.
+    pub height: usize,
+    /// Type of a pixel.
+    pub pixel: RawType,
+}
+
+/// How a source is to be opened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenOptions {
+    /// Which pixels are wanted.
+    pub colour: Colour,
+    /// Layout of raw frames; needed for raw input only.
+    pub raw: Option<RawFormat>,
+    /// Rate for sequences without times of their own, frames/s.
+    pub rate_hz: f64,
+    /// Largest accepted frame, pixels; a header that claims more is refused before memory is taken.
+    pub max_pixels: u64,
+    /// Of a TIFF's pages every how many-th is a frame, 1 or more; `None`: as ImageJ's or OME's description says, else every one.
+    pub page_step: Option<u64>,
+    /// Number of the first such page, from 0.
+    pub first_page: u64,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28, page_step: None, first_page: 0 }
+    }
+}
+
+impl OpenOptions {
+    /// Checks the rate and the limits.
+    /// # Errors
+    /// [`ErrorKind::Config`] for a rate that is not positive, raw frames of no size, or a limit of no pixels.
+    pub fn validate(&self) -> Result<()> {
+        if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
+            return Err(Error::new(ErrorKind::Config, "expected a positive number of frames/s")
+                .at(format!("rate-hz = {}", self.rate_hz)));
+        }
+        if self.max_pixels == 0 {
+            return Err(Error::new(ErrorKind::Config, "expected at least 1 pixel").at("max-pixels = 0"));
+        }
+        if self.page_step == Some(0) {
+            return Err(Error::new(ErrorKind::Config, "expected a whole number of at least 1").at("page-step = 0"));
+        }
+        if let Some(raw) = self.raw {
+            super::pixels::check_size(raw.width as u64, raw.height as u64, self.max_pixels)
+                .map_err(|_| Error::new(ErrorKind::Config, "expected a size of at least 1 x 1 and at most max-pixels"))
+                .map_err(|e| e.at(format!("raw frames of {} x {} pixels", raw.width, raw.height)))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,18 @@
+//! How a video is written.
+
+/// How a video is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mp4Options {
+    /// Quantiser of H.264, 10 (nearly lossless, large) to 40 (coarse, small).
+    pub quantiser: u8,
+    /// Frames between two from which decoding can start.
+    pub key_every: u32,
+    /// Number of frames, if known: their table is then put in front, so that players can start before all is loaded.
+    pub expected_frames: Option<u64>,
+}
+
+impl Default for Mp4Options {
+    fn default() -> Self {
+        Self { quantiser: 24, key_every: 60, expected_frames: None }
+    }
+}
