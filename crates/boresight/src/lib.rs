@@ -67,6 +67,7 @@ mod macros;
 
 pub mod associate;
 pub mod auto;
+pub mod camera;
 pub mod config;
 pub mod detection;
 #[cfg(feature = "draw")]

@@ -4,8 +4,9 @@
 //! above its median, over the whole frame. Cells are there if most of what is cut out lies in pieces of one size that fill their boxes as
 //! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
 
+use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
-use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::spatial::{SpatialConfig, WindowConfig};
 use crate::vision::threshold::{LocalConfig, Polarity, ThresholdConfig};
 use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};

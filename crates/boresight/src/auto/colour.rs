@@ -1,10 +1,11 @@
 //! A single target told by its colour: a ball, a marker; the colour is chosen from the frames looked at.
 
 use super::scene::{Camera, Scene};
+use crate::camera::CameraConfig;
 use crate::io::Colour;
 use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig};
 use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
-use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Frame, Pixels, SourceInfo};
 

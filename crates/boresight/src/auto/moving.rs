@@ -1,9 +1,10 @@
 //! Things that move before a fixed camera: people, cars, animals; detector and tracker from the size of what moves.
 
 use super::scene::{Camera, Scene};
+use crate::camera::CameraConfig;
 use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, SharingConfig, TrackerConfig};
 use crate::vision::background::{BackgroundConfig, ShadowConfig};
-use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, SourceInfo};
 

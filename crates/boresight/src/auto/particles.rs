@@ -4,8 +4,9 @@
 //! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.45 times as wide.
 
 use super::scene::{Camera, Scene};
+use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
-use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, Scan, SourceInfo};

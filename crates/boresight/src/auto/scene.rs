@@ -1,7 +1,7 @@
 //! What the first frames show as a whole: whether the camera stands still, what moves before it, and whether isolated blobs explain it.
 //!
 //! Source: our own. How:
-//! 1. the camera: the background's shift from frame to frame ([`CameraMotion`]); where too little texture says nothing, the edges of
+//! 1. the camera: the background's shift from frame to frame ([`CameraMotionEstimator`]); where too little texture says nothing, the edges of
 //!    the median frame must stay where they are;
 //! 2. what moves: the median of all frames is the background ([`Background::prime`], on a grid of at most 400 px), and what differs from it
 //!    in a frame, without shadows and changes of light, is joined to regions;
@@ -9,8 +9,8 @@
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
+use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage};
-use crate::vision::camera::CameraMotion;
 use crate::vision::cluster::Clusterer;
 use crate::vision::colour::grey;
 use crate::vision::config::{ClusterConfig, DetectorConfig};
@@ -167,7 +167,7 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
 
 /// Whether the camera stands still; `edges_moved` is the share of edge pixels that move, if there are edges.
 fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
-    let mut motion = CameraMotion::default();
+    let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
     let mut moved = Vector2::<f64>::zeros();
     let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);

@@ -1,7 +1,8 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
+use crate::camera::CameraConfig;
 use crate::track::{SharingConfig, TrackerConfig};
-use crate::vision::config::{CameraConfig, DetectorConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::vision::{self};

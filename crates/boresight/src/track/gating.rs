@@ -6,8 +6,8 @@
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
 //! in one pixel cost bounded time and memory.
 
-use super::proof::CameraWay;
 use crate::associate::{Gates, Pair, UniformGrid};
+use crate::camera::CameraPath;
 use crate::{Detection, Error, ErrorKind, Result, Scan};
 use nalgebra::{Matrix2, Vector2};
 
@@ -60,7 +60,7 @@ pub struct ScanTable {
     /// Half of the widest and of the tallest box, px.
     pub largest_half_px: [f64; 2],
     /// What the camera did over all scans so far.
-    pub camera: CameraWay,
+    pub camera: CameraPath,
     grid: UniformGrid,
 }
 

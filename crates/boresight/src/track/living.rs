@@ -4,8 +4,9 @@ use super::config::TrackerConfig;
 use super::filter::Belief;
 use super::gating::Noise;
 use super::life::Life;
-use super::proof::{CameraWay, Proof};
+use super::proof::Proof;
 use super::terms::Look;
+use crate::camera::CameraPath;
 use crate::record::Innovation;
 use crate::{Detection, Extent, Timestamp, TrackId, TrackState, TrackStatus};
 use boresight_filters::{Filter, Gaussian};
@@ -68,7 +69,7 @@ impl Track {
 
     /// What is said of the track after a scan.
     #[inline]
-    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraWay) -> TrackState {
+    pub(super) fn state(&mut self, outcome: &Outcome, config: &TrackerConfig, camera: CameraPath) -> TrackState {
         let kinematics = self.belief.kinematics();
         let at = [kinematics.mean[0], kinematics.mean[2]];
         let proven = self.proof.holds(&config.proof, at, self.look.size, camera, outcome.hit);

@@ -10,8 +10,8 @@
 //! image's, where clutter travels with a panning camera.
 
 use crate::Result;
+use crate::camera::CameraPath;
 use crate::validate::not_negative;
-use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -58,40 +58,11 @@ impl ProofConfig {
     }
 }
 
-/// What the camera did so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CameraWay {
-    /// Length of its way, px.
-    pub way_px: f64,
-    /// Times that a background which was followed for some scans was lost: another view, or a jerk.
-    pub cuts: u32,
-    known: u32,
-}
-
-impl CameraWay {
-    /// Scans that a background must have been followed before its loss is a cut.
-    const FOLLOWED: u32 = 10;
-
-    /// Takes the next scan's shift in.
-    pub fn step(&mut self, shift_px: Option<Vector2<f64>>) {
-        match shift_px.map(|s| s.norm()).filter(|way| way.is_finite()) {
-            Some(way) => {
-                self.way_px += way;
-                self.known = self.known.saturating_add(1);
-            }
-            None => {
-                self.cuts = self.cuts.saturating_add(u32::from(self.known >= Self::FOLLOWED));
-                self.known = 0;
-            }
-        }
-    }
-}
-
 /// What a track has shown so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Proof {
     start: [f64; 2],
-    camera: CameraWay,
+    camera: CameraPath,
     score_sum: f64,
     hits: u32,
     in_a_row: u32,
@@ -100,7 +71,7 @@ pub struct Proof {
 
 impl Proof {
     /// Begins at a position (px) with the first detection's score; `camera` is what the camera did before.
-    pub fn begin(position: [f64; 2], camera: CameraWay, score: f32) -> Self {
+    pub fn begin(position: [f64; 2], camera: CameraPath, score: f32) -> Self {
         Self { start: position, camera, score_sum: f64::from(score), hits: 1, in_a_row: 0, proven: false }
     }
 
@@ -124,7 +95,7 @@ impl Proof {
         config: &ProofConfig,
         position: [f64; 2],
         size: [f64; 2],
-        camera: CameraWay,
+        camera: CameraPath,
         hit: bool,
     ) -> bool {
         if config.travel_px <= 0.0 {
@@ -140,7 +111,7 @@ impl Proof {
             let sure = self.score_sum >= config.sure_score * f64::from(self.hits);
             let least = if sure { config.sure_travel_px.min(config.travel_px) } else { config.travel_px };
             let least = least.max(config.size_share * size[0].max(size[1]));
-            self.proven = travel >= least + config.camera_share * (camera.way_px - self.camera.way_px);
+            self.proven = travel >= least + config.camera_share * (camera.length_px - self.camera.length_px);
         }
         self.proven
     }
@@ -149,9 +120,12 @@ impl Proof {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
 
-    fn way(way_px: f64) -> CameraWay {
-        CameraWay { way_px, ..CameraWay::default() }
+    fn way(length_px: f64) -> CameraPath {
+        let mut path = CameraPath::default();
+        path.length_px = length_px;
+        path
     }
 
     #[test]
@@ -164,7 +138,7 @@ mod tests {
     #[test]
     fn a_cut_asks_for_the_proof_anew() {
         let config = ProofConfig { sure_score: 9.0, sure_travel_px: 0.5, travel_px: 3.0, ..ProofConfig::default() };
-        let mut camera = CameraWay::default();
+        let mut camera = CameraPath::default();
         let mut lamp = Proof::begin([10.0, 10.0], camera, 20.0);
         (0..12).for_each(|_| camera.step(Some(Vector2::zeros())));
         assert!(!lamp.holds(&config, [10.1, 10.0], [3.0, 2.0], camera, true));

@@ -1,63 +1,44 @@
 //! A tracker that stands still while the camera moves: tracks live in the coordinates of the first scan's background.
 //!
-//! Source: our own. Each scan says how far the background moved since the scan before ([`Scan::camera_shift_px`]); the sum is taken
-//! from every detection before the tracker inside sees it and given back to every track after. Filters, gates, starts and proofs
-//! then see targets against the ground, whatever the camera does. Positions and boxes that leave are the image's again.
+//! Source: our own. [`SteadyGround`] turns every scan into those coordinates before the tracker inside sees it, and its tracks back into the image's.
+//! Filters, gates, initiation and confirmation then see targets against the ground, whatever the camera does.
 //! Where the image's size is known, tracks that have left it are no longer reported (they may come back while they coast).
-//! Departures: velocities stay relative to the background (px/s); the shift's own error is not added to any covariance.
-//! Limits: translation only. Scans without a shift (`None`) pass through untouched, bit by bit, until the first one with a shift.
+//! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a shift.
 
 use super::Tracking;
+use crate::camera::SteadyGround;
 use crate::{Result, Scan, TrackState};
-use nalgebra::Vector2;
 
 /// Keeps the tracker inside on steady ground.
 pub struct Stabilised {
     inner: Box<dyn Tracking>,
     field_px: Option<[f64; 2]>,
-    camera: Vector2<f64>,
-    /// Whether the camera was ever seen to move: only then are scans copied.
-    moved: bool,
-    steady: Scan,
+    ground: SteadyGround,
+    on_ground: Scan,
     states: Vec<TrackState>,
 }
 
 opaque_debug!(Stabilised);
 
 impl Stabilised {
-    /// Puts a tracker on steady ground.
+    /// Puts a tracker on steady ground; `field_px` is the image's width and height.
     pub fn new(inner: Box<dyn Tracking>, field_px: Option<[f64; 2]>) -> Self {
-        Self { inner, field_px, camera: Vector2::zeros(), moved: false, steady: Scan::default(), states: Vec::new() }
+        Self { inner, field_px, ground: SteadyGround::default(), on_ground: Scan::default(), states: Vec::new() }
     }
 }
 
 impl Tracking for Stabilised {
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
-        let shift = scan.camera_shift_px.filter(|s| s.iter().all(|v| v.is_finite())).unwrap_or_default();
-        self.moved |= shift != Vector2::zeros();
-        if !self.moved && self.field_px.is_none() {
+        let ground = self.ground.after(scan);
+        if !ground.has_moved() && self.field_px.is_none() {
             return self.inner.step(scan);
         }
-        let camera = self.camera + shift;
-        self.steady.index = scan.index;
-        self.steady.time = scan.time;
-        self.steady.camera_shift_px = scan.camera_shift_px;
-        self.steady.detections.clone_from(&scan.detections);
-        for d in &mut self.steady.detections {
-            d.position -= camera;
-            d.extent.left_px -= camera.x;
-            d.extent.top_px -= camera.y;
-        }
+        ground.scan_on_ground(scan, &mut self.on_ground);
         self.states.clear();
-        self.states.extend_from_slice(self.inner.step(&self.steady)?);
+        self.states.extend_from_slice(self.inner.step(&self.on_ground)?);
         // Only now: a scan that was refused has not moved the ground.
-        self.camera = camera;
-        for s in &mut self.states {
-            s.kinematics.mean[0] += camera.x;
-            s.kinematics.mean[2] += camera.y;
-            s.extent.left_px += camera.x;
-            s.extent.top_px += camera.y;
-        }
+        self.ground = ground;
+        ground.tracks_in_image(&mut self.states);
         if let Some([width, height]) = self.field_px {
             self.states.retain(|s| {
                 let (x, y) = (s.kinematics.mean[0], s.kinematics.mean[2]);
@@ -73,7 +54,7 @@ mod tests {
     use super::*;
     use crate::track::{Tracker, TrackerConfig};
     use crate::{Detection, Extent, FrameIndex, Timestamp};
-    use nalgebra::Matrix2;
+    use nalgebra::{Matrix2, Vector2};
 
     fn scan(k: u64, points: &[(f64, f64)], shift: Option<(f64, f64)>) -> Scan {
         let detections = points

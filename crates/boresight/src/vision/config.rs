@@ -7,6 +7,7 @@ use super::spatial::SpatialConfig;
 use super::threshold::ThresholdConfig;
 use super::window::FollowConfig;
 use crate::Result;
+use crate::camera::CameraConfig;
 use crate::validate::wrong;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,17 +35,6 @@ pub struct DetectorConfig {
     /// Protects what follows from a threshold that floods it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_detections: Option<u32>,
-}
-
-/// Whether the camera's motion is followed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum CameraConfig {
-    /// The camera stands still, or its motion is none of the tracker's business.
-    #[default]
-    Fixed,
-    /// The background's shift is measured in every frame and taken from every position before tracking.
-    Moving,
 }
 
 /// How set pixels are joined and which clusters are kept.

@@ -1,11 +1,10 @@
 //! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
 
 use super::background::BitImage;
-use super::camera::CameraMotion;
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
 use super::colour::{ColourMask, grey_image};
-use super::config::{CameraConfig, CentroidMethod, DetectorConfig, NoiseConfig, Weight};
+use super::config::{CentroidMethod, DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
@@ -20,6 +19,7 @@ use super::threshold::spot::SpotDetector;
 use super::threshold::{LevelConfig, Side, ThresholdConfig};
 use super::window::Follower;
 use super::{Detector, region::Region};
+use crate::camera::{CameraConfig, CameraMotionEstimator};
 use crate::{
     Detection, Error, ErrorKind, Extent, Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo, Timestamp,
 };
@@ -40,14 +40,14 @@ pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Det
     let detector = Box::new(ThresholdDetector::new(config.clone(), (source.width, source.height), source.kind)?);
     Ok(match config.camera {
         CameraConfig::Fixed => detector,
-        CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotion::default() }),
+        CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotionEstimator::default() }),
     })
 }
 
 /// A detector that also says how far the background moved.
 struct WithCamera {
     detector: Box<dyn Detector>,
-    camera: CameraMotion,
+    camera: CameraMotionEstimator,
 }
 
 impl Detector for WithCamera {

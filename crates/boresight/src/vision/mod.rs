@@ -4,7 +4,6 @@
 //! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
 
 pub mod background;
-pub mod camera;
 pub mod centroid;
 pub mod cluster;
 pub mod colour;

@@ -2,8 +2,9 @@
 
 use super::track::{detection, trackers};
 use super::vision_conformance::{source, thresholds};
+use boresight::camera::CameraConfig;
 use boresight::track::{self, ClutterConfig, FilterConfig, TrackerConfig};
-use boresight::vision::config::{CameraConfig, DetectorConfig};
+use boresight::vision::config::DetectorConfig;
 use boresight::vision::{self, spatial::SpatialConfig, spatial::WindowConfig};
 use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, Timestamp};
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -1,4 +1,4 @@
-//! Camera motion: how far the background moved in the image since the frame before.
+//! Camera motion from pixels: how far the background moved in the image since the frame before.
 //!
 //! Source: our own; block matching against a key frame with a consensus, as every video stabiliser does it in some form.
 //! How: the frame is reduced to about 320 px. In the key frame the best-textured 12 x 12 patch of every cell of an 8 x 6 grid is
@@ -9,9 +9,21 @@
 //! Symbols: reduction f; shift (px of the full frame).
 //! Limits: translation only, at most 10 reduced px a frame; less than 6 textured patches, or no majority, says nothing (`None`).
 
-use super::pixel::Pixel;
 use crate::{Image, Pixels};
 use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Whether the camera's motion is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CameraConfig {
+    /// The camera stands still, or its motion is none of the tracker's business.
+    #[default]
+    Fixed,
+    /// The background's shift is measured in every frame and taken from every position before tracking.
+    Moving,
+}
 
 /// Side of a patch, reduced px.
 const PATCH: usize = 12;
@@ -59,7 +71,7 @@ struct Vote {
 
 /// Follows the background from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub struct CameraMotion {
+pub struct CameraMotionEstimator {
     now: Image<f32>,
     key: Image<f32>,
     patches: Vec<Patch>,
@@ -71,15 +83,16 @@ pub struct CameraMotion {
     best: Vec<Textured>,
 }
 
-impl CameraMotion {
+impl CameraMotionEstimator {
     /// Takes the next frame and returns the background's shift since the last one, px; `None` where nothing can be said.
     pub fn step(&mut self, pixels: &Pixels) -> Option<Vector2<f64>> {
         let factor = pixels.width().div_ceil(REDUCED_PX).max(1);
         match pixels {
-            Pixels::Gray8(i) => reduce(i, factor, &mut self.now),
-            Pixels::Gray16(i) => reduce(i, factor, &mut self.now),
-            Pixels::GrayF32(i) => reduce(i, factor, &mut self.now),
-            Pixels::Rgb8(i) => reduce_green(i, factor, &mut self.now),
+            Pixels::Gray8(i) => reduce(i, factor, &mut self.now, f32::from),
+            Pixels::Gray16(i) => reduce(i, factor, &mut self.now, f32::from),
+            Pixels::GrayF32(i) => reduce(i, factor, &mut self.now, |p| p),
+            // The green channel stands for the light.
+            Pixels::Rgb8(i) => reduce(i, factor, &mut self.now, |p| f32::from(p[1])),
         }
         if (self.key.width(), self.key.height()) != (self.now.width(), self.now.height()) {
             self.new_key();
@@ -178,16 +191,7 @@ impl CameraMotion {
 }
 
 /// Mean over blocks of `factor` x `factor` pixels.
-fn reduce<T: Pixel>(image: &Image<T>, factor: usize, out: &mut Image<f32>) {
-    reduce_by(image, factor, out, |p| p.value_f32());
-}
-
-/// The green channel stands for the light.
-fn reduce_green(image: &Image<[u8; 3]>, factor: usize, out: &mut Image<f32>) {
-    reduce_by(image, factor, out, |p| f32::from(p[1]));
-}
-
-fn reduce_by<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
+fn reduce<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
     let (w, h) = (image.width() / factor, image.height() / factor);
     out.reset(w, h, 0.0);
     let scale = 1.0 / (factor * factor) as f32;
@@ -300,7 +304,7 @@ mod tests {
     #[test]
     fn a_pan_is_followed_whatever_a_target_does() {
         let ground = ground();
-        let mut camera = CameraMotion::default();
+        let mut camera = CameraMotionEstimator::default();
         assert_eq!(camera.step(&view(&ground, 100, 100, 10)), None, "the first frame has no shift");
         let mut sum = Vector2::zeros();
         for k in 1..30 {
@@ -314,7 +318,7 @@ mod tests {
     fn a_fixed_camera_is_exactly_fixed_under_noise() {
         let ground = ground();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut camera = CameraMotion::default();
+        let mut camera = CameraMotionEstimator::default();
         for k in 0..20 {
             let Pixels::Gray8(mut frame) = view(&ground, 50, 50, 10 + k) else { unreachable!() };
             frame.as_mut_slice().iter_mut().for_each(|p| *p = p.saturating_add(rng.random_range(0..6)));
@@ -326,7 +330,7 @@ mod tests {
     #[test]
     fn an_even_sky_and_tiny_frames_say_nothing() {
         for (w, h) in [(320, 256), (1, 1), (5, 300), (0, 0)] {
-            let mut camera = CameraMotion::default();
+            let mut camera = CameraMotionEstimator::default();
             for _ in 0..3 {
                 assert_eq!(camera.step(&Pixels::Gray8(Image::filled(w, h, 7))), None);
                 assert_eq!(camera.clone().step(&Pixels::GrayF32(Image::filled(w, h, f32::NAN))), None);
