@@ -1,4 +1,5 @@
-//! Why square roots: the same f32 arithmetic, P0 = 1e6, R = 1e-6, 200 steps; each form against f64 (SPEC E-D7).
+//! Why square roots: the same f32 arithmetic, P0 = 1e6, R = 1e-6, 200 steps; each form against f64
+//! (docs/theory/filters.md).
 //!
 //! Writes the plot `f32_roots.svg` to the folder given (default: the current one).
 //! Run: `cargo run -p boresight-filters --example f32_roots -- docs/images`

@@ -1,13 +1,15 @@
 //! Scalar AR(1) recursion per coordinate: the next coordinate is α times this one, α learnt by least squares.
 //!
-//! Source: SPEC I.4 (D4 §3.5, corrected: E-I6, E-I7): K = P μ/(1 + P μ²), e = z - α μ, α += K e, P -= K μ P,
-//! prediction α z; α_0 = 1, P_0 = 1, μ the coordinate before. Closed form: least squares without forgetting.
+//! Source: F. Cai, J. Cui 2014, 3.5, corrected (`docs/theory/adaptive.md`): K = P μ/(1 + P μ²), e = z - α μ, α += K e,
+//! P -= K μ P, prediction α z; α_0 = 1, P_0 = 1, μ the coordinate before. Closed form: least squares without
+//! forgetting.
 //! Differs from it: a tracker needs a covariance, which the paper does not give. The predicted variance returned for
 //! gating is the larger of the measurement variance r and the running mean square of the
 //! prediction error e (time constant 10 updates) less r, so that the gate follows the filter's own lag.
 //! The velocity reported is the last predicted step over its time, with variance 2 r/dt².
 //! Limits: depends on the origin of the coordinates; lags a steady motion by up to half a step for ever and a reversal
-//! for dozens of frames (SPEC I, behaviour); a step is one frame whatever its length. For comparison with the paper.
+//! for dozens of frames (figures in the chapter); a step is one frame whatever its length. For comparison with the
+//! paper.
 //! Symbols: μ, z px; α, P no unit and px⁻². Cost: about 30 flops a coordinate.
 
 use crate::filter::{check_dt, check_measurement};
@@ -34,7 +36,7 @@ impl<T: Real> Ar1Axis<T> {
 
     /// Takes an observation and returns the prediction for the next frame.
     ///
-    /// The worked example W8 of the specification:
+    /// The worked example of `docs/theory/adaptive.md`:
     /// ```
     /// let mut axis = boresight_filters::ar1::Ar1Axis::new(100.0);
     /// assert!((axis.observe(104.0) - 108.1595840416_f64).abs() < 1e-9);

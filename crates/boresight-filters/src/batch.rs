@@ -1,8 +1,9 @@
 //! Many constant-velocity tracks of one kind, lane beside lane: the batch (structure-of-arrays) Kalman filter.
 //!
-//! Source: SPEC D.1 for each axis alone: with uncorrelated axes and diagonal R the 4 x 4 filter falls apart into two
-//! 2 x 2 ones, 46 flops a step. Lanes holds L tracks as arrays, so that the compiler turns each line into vector
-//! instructions of whatever width the machine has. With the feature `simd` the widest is chosen at run time.
+//! Source: `docs/theory/filters.md`, for each axis alone: with uncorrelated axes and diagonal R the 4 x 4 filter falls
+//! apart into two 2 x 2 ones, 46 flops a step. Lanes holds L tracks as arrays, so that the compiler turns each line
+//! into vector instructions of whatever width the machine has. With the feature `simd` the widest is chosen at run
+//! time.
 //! Differs from it: P^ = (1 - k) P~ per axis, k = p/(p + r) written as r/(p + r): no difference of nearly equal numbers,
 //! so the short form is as good as Joseph's here. p11 is reduced by k1 p01, positive by Cauchy-Schwarz up to rounding.
 //! Symbols: per axis x px, v px/s, p00 px², p01 px²/s, p11 px²/s². A variance of infinity is a missed scan.

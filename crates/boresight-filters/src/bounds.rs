@@ -1,8 +1,9 @@
 //! Accuracy bounds of a constant-velocity coordinate: what no filter, or no linear one without a prior, can beat.
 //!
-//! Source: SPEC M. (1) exact posterior of a coordinate seen through rounding: the polygon of (p, v) that fits all scans,
-//! its centroid is the optimal estimate; (2) posterior Cramér-Rao bound P. Tichavský et al., IEEE Trans. SP 46(5), 1998:
-//! for a linear Gaussian model it is the Kalman covariance; (3) no prior, no process noise: var_k = r(4k-2)/(k(k+1)).
+//! Source: `docs/theory/measures.md`. (1) exact posterior of a coordinate seen through rounding: the polygon of (p, v)
+//! that fits all scans, its centroid is the optimal estimate; (2) posterior Cramér-Rao bound P. Tichavský et al., IEEE
+//! Trans. SP 46(5), 1998: for a linear Gaussian model it is the Kalman covariance; (3) no prior, no process noise:
+//! var_k = r(4k-2)/(k(k+1)).
 //! Symbols: p px, v px/step, r px², q px²/step⁴; a step is one scan.
 //! Limits: the polygon has few corners (digital lines: 4, plus those of the velocity interval); 32 are provided for.
 //! Cost: the polygon's corners a scan, the others closed forms.
@@ -35,7 +36,7 @@ impl RoundedPosterior {
 
     /// Takes the rounded position of the next scan and returns the posterior mean of position and velocity.
     ///
-    /// The worked example W12 of the specification:
+    /// The worked example of `docs/theory/measures.md`:
     /// ```
     /// let mut posterior = boresight_filters::bounds::RoundedPosterior::new(0.5, 1.5).unwrap();
     /// let mut last = (0.0, 0.0);

@@ -1,7 +1,7 @@
 //! The [2 -1; 1 0] displacement model: the state is the coordinate now and at the frame before.
 //!
-//! Source: SPEC I.5 (D4 eqs 7-13, corrected: E-I2). s = (d(t), d(t-1)) per axis, Phi = [[2, -1], [1, 0]], H = [1 0],
-//! process noise diag(q, 0), then the Kalman update.
+//! Source: F. Cai, J. Cui 2014, eqs 7-13, corrected (`docs/theory/adaptive.md`). s = (d(t), d(t-1)) per axis,
+//! Phi = [[2, -1], [1, 0]], H = [1 0], process noise diag(q, 0), then the Kalman update.
 //! Differs from it: for a step of another length than the last, Phi = [[1 + ρ, -ρ], [1, 0]] with ρ = dt/dt_last: the
 //! same straight-line extrapolation in real time; q is the variance per frame at any frame time.
 //! Symbols: `[x(t), x(t-1), y(t), y(t-1)]` (px); q px². Velocity = (d(t) - d(t-1))/dt_last.

@@ -22,7 +22,7 @@ pub trait Filter {
     /// Corrects the belief by the hypotheses of one scan; `[]` is a missed scan, weights sum to at most 1.
     ///
     /// The rest of the weights, p0 = 1 - Σ weights, is the probability that none is the target's own: the PDA update
-    /// (SPEC E). One hypothesis of weight 1 is the plain update.
+    /// (`docs/theory/association.md`). One hypothesis of weight 1 is the plain update.
     /// # Errors
     /// [`FilterError`] for NaN, infinity or a covariance that cannot be factored; the state is then unchanged.
     fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError>;

@@ -1,7 +1,7 @@
 //! The fuzzy-logic correlator: a map of innovation and its difference to a corrected innovation.
 //!
-//! Source: SPEC G.1 (R-FLC; D3 gives only the inputs, the derivative and the name). Per axis u1 = ν/(k_e σ),
-//! u2 = (ν - ν_last)/(k_d σ), σ = sqrt(S_ii), both clipped to -1..1; output r = k_o σ · infer(u1, u2).
+//! Source: `docs/theory/adaptive.md`; Parimala and Raol give only the inputs, the derivative and the name. Per axis
+//! u1 = ν/(k_e σ), u2 = (ν - ν_last)/(k_d σ), σ = sqrt(S_ii), both clipped to -1..1; output r = k_o σ · infer(u1, u2).
 //! Zero-order Takagi-Sugeno, product AND. Memberships and rule base are data ([`Correlator`] has public fields).
 //! Differs from it: the output is divided by the sum of the weights, which is 1 for the default memberships, so that
 //! memberships that do not sum to 1 still give an average of their rules.
@@ -57,7 +57,7 @@ pub struct Correlator<T = f64> {
     pub output_scale: T,
 }
 
-/// The rule base of SPEC G.1 in thirds: LN = -3 … LP = 3.
+/// The rule base of `docs/theory/adaptive.md` in thirds: LN = -3 … LP = 3.
 const RULES: [[i8; SETS]; SETS] = [
     [-3, -3, -2, -2, -2, -1, 0],
     [-3, -2, -2, -2, -1, 0, 1],
@@ -120,7 +120,7 @@ impl<T: Real> Correlator<T> {
 
     /// Returns the inferred output, -1..=1 for rules in that range.
     ///
-    /// The worked example W11 of the specification:
+    /// The worked example of `docs/theory/adaptive.md`:
     /// ```
     /// use boresight_filters::fuzzy::Correlator;
     /// let c = Correlator::default();

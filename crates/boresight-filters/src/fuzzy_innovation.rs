@@ -1,7 +1,7 @@
 //! The fuzzy correlator in front of any Gaussian filter: the innovation is corrected before the filter sees it.
 //!
-//! Source: SPEC G.1 (D3 eq 7 and X^ = X~ + K C(k+1)). z is replaced by H x~ + r_flc(ν, ν - ν_last, S); the covariance
-//! update is that of the plain filter. Departures: see [`crate::fuzzy`].
+//! Source: `docs/theory/adaptive.md`; Parimala and Raol, eq. 7. z is replaced by H x~ + r_flc(ν, ν - ν_last, S); the
+//! covariance update is that of the plain filter. Departures: see [`crate::fuzzy`].
 //! Weighted hypotheses (PDA): each is corrected by itself; ν_last is then their mean innovation by weight.
 //! Symbols: ν = z - H x~ 2 x 1 (px); S = H P~ Hᵀ + R 2 x 2 (px²). Cost: two inferences, about 200 flops an update.
 //! Limits: the covariance does not widen, so a filter that is too stiff stays over-confident.

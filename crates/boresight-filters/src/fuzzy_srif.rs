@@ -1,8 +1,8 @@
-//! CTFSRIF: the square-root information filter with the fuzzy-logic correlator in front (D3).
+//! CTFSRIF: the square-root information filter with the fuzzy-logic correlator in front (Parimala and Raol).
 //!
-//! Source: SPEC G and G.1. Per update: ν = z - H x~, S = H P~ Hᵀ + R_m, z is replaced by H x~ + r_flc(ν, ν - ν_last, S),
-//! then the SRIF measurement update; the covariance is that of the plain filter.
-//! Departures: see [`crate::fuzzy`]. The published gain is small (error ratio 0.975-0.986, SPEC G.1): robustness to
+//! Source: `docs/theory/adaptive.md`. Per update: ν = z - H x~, S = H P~ Hᵀ + R_m, z is replaced by H x~ +
+//! r_flc(ν, ν - ν_last, S), then the SRIF measurement update; the covariance is that of the plain filter.
+//! Departures: see [`crate::fuzzy`]. The published gain is small (error ratio 0.975-0.986): robustness to
 //! heavy-tailed centroids, nothing else; with light tails (mask centroid) it is 1 % worse than the plain SRIF.
 //! Symbols: ν, r_flc 2 x 1 (px); S 2 x 2 (px²). Limits: those of [`crate::srif`] and [`crate::fuzzy`]. Cost: the SRIF's
 //! and two inferences.

@@ -1,9 +1,9 @@
 //! Kalman filter in covariance form: Joseph update (default) or short form.
 //!
-//! Source: SPEC D.1. P^ = (I - K H) P~ (I - K H)ᵀ + K R Kᵀ (Joseph), or P~ - K H P~ (short).
+//! Source: `docs/theory/filters.md`. P^ = (I - K H) P~ (I - K H)ᵀ + K R Kᵀ (Joseph), or P~ - K H P~ (short).
 //! Differs from it: H selects two states, so its products are picks; S is inverted in closed form (2 x 2).
 //! Symbols: x N x 1; P N x N; z, ν 2 x 1 (px); S, R 2 x 2 (px²); K N x 2.
-//! Limits: in f32 with P0/R of 1e12 both forms lose all digits (SPEC E-D7): take [`crate::Ud`] or [`crate::Srif`].
+//! Limits: in f32 with P0/R of 1e12 both forms lose all digits: take [`crate::Ud`] or [`crate::Srif`].
 //! Two uncorrelated axes are filtered apart, side by side in vector registers (`pack_axes`), until a full R or a PDA update
 //! couples them. With a nonlinear model this is the extended Kalman filter: Phi is the Jacobian at the state.
 //! Cost: N = 4, constant velocity: about 60 flops to predict, 130 to correct (Joseph).

@@ -1,6 +1,7 @@
 //! The general linear Kalman step for any H of any height: what the golden vectors and nonlinear forms use.
 //!
-//! Source: SPEC D.1 (Joseph form, symmetrised). Symbols: x N x 1; P N x N; H M x N; R, S M x M; K N x M; ν M x 1.
+//! Source: `docs/theory/filters.md` (Joseph form, symmetrised). Symbols: x N x 1; P N x N; H M x N; R, S M x M; K N x M;
+//! ν M x 1.
 //! Cost: about 2 N³ flops for the Joseph product; trackers of positions use [`crate::Kf`], whose H only picks.
 //! Limits: S must be positive definite; no structure is used.
 

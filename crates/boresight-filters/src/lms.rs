@@ -1,17 +1,18 @@
 //! Time-varying Kalman filter whose acceleration transition is learnt by LMS, per axis: as printed, or guarded.
 //!
-//! Source: SPEC H (D2: Obolensky, Erdogmus, Principe, corrected: E-H1 … E-H8). State s = (p, v, a_1 … a_{N+1}), a_i at
-//! time k is a[k + 1 - i]; N = S - 3. A(W): p += T v, v += T a_1, accelerations by W (upper triangular). Measured: p
-//! and the second differences a[k-2] … a[k-N] of measured positions. After the Kalman step (Joseph):
-//! e_i = a_out,i - W_i · a_in, W_i += η e_i a_in, Q = diag(0, 0, e_1² …); η = α ‖A - K C‖₂ (printed) or the guard:
-//! η = μ/(1e-6 + ‖a_in‖²), leak to W_0, rows with Σ|w| > 1 scaled to 1, NIS watchdog that restarts the weights.
+//! Source: N. Obolensky, D. Erdogmus, J. Principe 2002, corrected (`docs/theory/adaptive.md`). State s = (p, v, a_1 …
+//! a_{N+1}), a_i at time k is a[k + 1 - i]; N = S - 3. A(W): p += T v, v += T a_1, accelerations by W (upper
+//! triangular). Measured: p and the second differences a[k-2] … a[k-N] of measured positions. After the Kalman step
+//! (Joseph): e_i = a_out,i - W_i · a_in, W_i += η e_i a_in, Q = diag(0, 0, e_1² …); η = α ‖A - K C‖₂ (printed) or the
+//! guard: η = μ/(1e-6 + ‖a_in‖²), leak to W_0, rows with Σ|w| > 1 scaled to 1, NIS watchdog that restarts the weights.
 //! Differs from it: second differences are taken in real time (uneven steps), and a sample that is not yet there is left
-//! out of the measurement. The printed line "R = C P Cᵀ" is not used (E-H7: R collapses, the output is the input).
-//! Divergence, measured in SPEC H: with α <= 1e-14 (T = 0.04 s) the printed rule is a plain filter; at 1e-12 a quarter
-//! of the runs diverge, at 1e-8 all overflow: the regressors are noisy, W shrinks, Q = e² goes to 0 and the filter
-//! leaves a turning target without noticing. This file returns an error instead of an overflow. Guarded never diverged.
+//! out of the measurement. The printed line "R = C P Cᵀ" is not used: R collapses, the output is the input.
+//! Divergence (table in that chapter): with α <= 1e-14 (T = 0.04 s) the printed rule is a plain filter; at 1e-12 a
+//! quarter of the runs diverge, at 1e-8 all overflow: the regressors are noisy, W shrinks, Q = e² goes to 0 and the
+//! filter leaves a turning target without noticing. This file returns an error instead of an overflow. Guarded never
+//! diverged.
 //! Symbols: W (N+1)²; σ px; T s. Cost: about 12 S³ flops an axis and step.
-//! Limits: uncorrelated axes; S = N + 3 >= 5; a window of N = 2 gains nothing over longer ones in SPEC H's runs.
+//! Limits: uncorrelated axes; S = N + 3 >= 5; a window of N = 2 gains nothing over longer ones.
 
 use crate::linalg::{Cholesky, mul, mul_transposed, spectral_norm, symmetrize};
 use crate::real::all_finite;
@@ -62,9 +63,9 @@ pub struct LmsAxis<const S: usize, T: Real = f64> {
     n_past: usize,
 }
 
-/// Returns e and the updated W, both over S states (accelerations from index 2): SPEC H eq 5.
+/// Returns e and the updated W, both over S states (accelerations from index 2): the paper's eq. 5.
 ///
-/// The worked example W7 of the specification:
+/// The worked step of `docs/theory/adaptive.md`:
 /// ```
 /// use boresight_filters::lms::lms_step;
 /// use nalgebra::{Matrix5, Vector5};

@@ -1,7 +1,7 @@
 //! The LMS filter as trackers use it: two axes behind [`Filter`].
 //!
-//! Source: SPEC H; the mathematics is in [`crate::lms`]. Axes are independent, so the off-diagonal of a measurement's
-//! covariance is not used. Covariance for gating: the axis' own P after predict, P_pp of SPEC H.
+//! Source: `docs/theory/adaptive.md`; the code is in [`crate::lms`]. Axes are independent, so the off-diagonal of a
+//! measurement's covariance is not used. Covariance for gating: the axis' own P_pp after predict.
 //! Several weighted hypotheses are taken as one measurement: their mean by weight, with variance r/Σw + spread, which
 //! is the plain update for one sure hypothesis and a weak one for doubtful ones.
 //! Limits: a missed scan leaves the second differences with a longer step, in real time.

@@ -1,8 +1,8 @@
 //! The PDA update on any Gaussian filter: several weighted measurements and the chance that none is the target's own.
 //!
-//! Source: SPEC E (D1 eqs 4.25-4.34): P^ = p0 P~ + (1 - p0)(P~ - K S Kᵀ) + K (Σ p_i ν_i ν_iᵀ - ν νᵀ) Kᵀ.
+//! Source: `docs/theory/association.md`: P^ = p0 P~ + (1 - p0)(P~ - K S Kᵀ) + K (Σ p_i ν_i ν_iᵀ - ν νᵀ) Kᵀ.
 //! Differs from it: each hypothesis may have a covariance of its own, then each has its own gain and the result is the
-//! exact moment match of the mixture Σ p_i N(x_i, P_i); with one covariance for all it is SPEC E's update. The spread
+//! exact moment match of the mixture Σ p_i N(x_i, P_i); with one covariance for all it is the PDA update. The spread
 //! is summed about its own mean, so it cannot lose positive definiteness to cancellation.
 //! Symbols: p_i weights; p0 = 1 - Σ p_i; K_i N x 2; S_i 2 x 2 (px²). Cost: about 2 m N² + N² flops for m hypotheses.
 //! Limits: the mixture's shape is lost: two far hypotheses of equal weight give a wide Gaussian between them.

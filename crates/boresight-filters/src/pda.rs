@@ -1,7 +1,8 @@
 //! The association probabilities of probabilistic data association: which measurement in the gate is the target's own.
 //!
-//! Source: SPEC E (D1 eqs 4.28-4.34, corrected: E-E1, E-E2): e_i = exp(-d_i²/2), b = λ sqrt(det 2πS) (1 - P_D P_G)/P_D,
-//! p_i = e_i/(b + Σ e), p_0 = b/(b + Σ e). The weights go to [`crate::Filter::update`], which makes the PDA update.
+//! Source: `docs/theory/association.md`, with the corrections to the thesis: e_i = exp(-d_i²/2),
+//! b = λ sqrt(det 2πS) (1 - P_D P_G)/P_D, p_i = e_i/(b + Σ e), p_0 = b/(b + Σ e). The weights go to [`crate::Filter::update`], which makes the
+//! PDA update.
 //! Differs from it: with measurements of different covariance, e_i is divided by sqrt(det S_i) and b becomes
 //! 2π λ (1 - P_D P_G)/P_D, which is the same for equal covariances. The exponents are shifted by the smallest d², so
 //! far measurements do not underflow to 0/0.
@@ -26,7 +27,7 @@ pub struct Clutter<T = f64> {
 /// Writes the probability of each measurement to `out` and returns p0, the probability that none is the target's own.
 ///
 /// `out` must be as long as the measurements; only measurements inside the gate belong here.
-/// The worked example W4 of the specification:
+/// The worked example of `docs/theory/association.md`:
 /// ```
 /// use boresight_filters::{Gaussian, Measurement, pda::{Clutter, association_probabilities}};
 /// use nalgebra::{Matrix2, Vector2};

@@ -1,7 +1,7 @@
 //! Square-root information filter: keeps [R | y] with R x = y - ν, ν ~ N(0, I), so P = R⁻¹ R⁻ᵀ can never lose its sign.
 //!
-//! Source: SPEC G (D3, corrected: E-G1 whitening, E-G4 Bierman's time propagation); G. J. Bierman, *Factorization
-//! Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Uses I and L_q in place of R_w, so Q may be singular.
+//! Source: `docs/theory/filters.md` (Parimala and Raol, corrected: whitening, time update); G. J. Bierman,
+//! *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Uses I and L_q in place of R_w, so Q may be singular.
 //! Symbols: r N x N upper triangular, diagonal >= 0 (1/px); y N x 1; R_m = L Lᵀ measurement covariance (px²).
 //! Limits: the measurement covariance must be positive definite (a perfect measurement has infinite information), Phi
 //! must have an inverse, and a nonlinear model must not be strongly curved over one step.
@@ -104,7 +104,7 @@ impl<const N: usize, T: Real> InformationPair<N, T> {
 
     /// Adds M whitened measurement rows (unit noise) and returns the whitened residual e; |e|² = νᵀ S⁻¹ ν.
     ///
-    /// The worked example W3 of the specification:
+    /// The worked example of `docs/theory/filters.md`:
     /// ```
     /// use boresight_filters::{Gaussian, srif::InformationPair};
     /// use nalgebra::{Matrix2x4, Matrix4, Vector2, Vector4};
@@ -167,7 +167,7 @@ impl<M: Model<N, T>, const N: usize, T: Real> Srif<M, N, T> {
         if self.apart { unpack(&self.held) } else { self.held }
     }
 
-    /// Corrects by two sensors at once (SPEC G eq 10): the same as one after the other, with one triangularisation.
+    /// Corrects by two sensors at once: the same as one after the other, with one triangularisation.
     /// # Errors
     /// As [`GaussianFilter::correct`].
     pub fn correct_both(&mut self, first: &Measurement<T>, second: &Measurement<T>) -> Result<(), FilterError> {

@@ -1,8 +1,8 @@
 //! The square-root information filter of two uncorrelated axes side by side: the fast path of [`crate::Srif`].
 //!
-//! Source: SPEC G; plane rotations (W. Givens, 1958; G. H. Golub, C. F. Van Loan, *Matrix Computations*, 5.1) in place of
-//! reflections where one entry is removed at a time: c = head/n, s = tail/n, n = sqrt(head² + tail²). The diagonal comes
-//! out positive by itself.
+//! Source: `docs/theory/filters.md`; plane rotations (W. Givens, 1958; G. H. Golub, C. F. Van Loan, *Matrix
+//! Computations*, 5.1) in place of reflections where one entry is removed at a time: c = head/n, s = tail/n, n =
+//! sqrt(head² + tail²). The diagonal comes out positive by itself.
 //! Layout: entry (i, j) of either axis' block of R (K = N/2 states) at the rows 2 i (x) and 2 i + 1 (y) of column j, y
 //! likewise: both axes lie in one vector register, and a step loads what the step before stored in the same width.
 //! Symbols: R upper triangular, 1/px; y no unit. Cost: N = 4, W = 2: 4 roots and 4 divisions for both axes a step.
@@ -69,7 +69,7 @@ pub(crate) fn move_back<T: Real, const N: usize>(r: &mut SMatrix<T, N, N>, back:
     }
 }
 
-/// Removes the noise x' = x + L w, w ~ N(0, I), with the root L of one axis (K x `noise`): SPEC G, time update.
+/// Removes the noise x' = x + L w, w ~ N(0, I), with the root L of one axis (K x `noise`): the time update.
 #[inline(always)]
 pub(crate) fn spread<T: Real, const N: usize, const W: usize>(
     pair: &mut InformationPair<N, T>,

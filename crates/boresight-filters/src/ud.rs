@@ -1,7 +1,8 @@
 //! Bierman-Thornton U-D filter: keeps P = U D Uᵀ, so P stays symmetric and positive by construction.
 //!
-//! Source: SPEC D.2 (Bierman's measurement update), D.3 (Thornton's time update by weighted Gram-Schmidt); G. J. Bierman,
-//! *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Errata of the paper: SPEC E-D5, E-D6.
+//! Source: `docs/theory/filters.md` (Bierman's measurement update, Thornton's time update by weighted Gram-Schmidt); G.
+//! J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. V-VI. Misprints of the paper:
+//! `docs/theory/papers.md`.
 //! Differs from it: a row of U that is measured itself becomes u r/α, which is u + λ K without its cancellation (P may
 //! exceed r by the square of the working precision); a full R is whitened first (R = L Lᵀ); the PDA update is made in factors
 //! too: P^ = Σ of weighted factors, joined by Gram-Schmidt, so it cannot lose definiteness.
@@ -28,7 +29,7 @@ pub struct ScalarUpdate<const N: usize, T = f64> {
 
 /// Bierman's update of x and U, D by a scalar z = aᵀ x + v, var v = r, in place.
 ///
-/// The worked example W1 of the specification:
+/// The worked example of `docs/theory/filters.md`:
 /// ```
 /// use boresight_filters::{linalg::UdFactors, ud::ud_scalar_update};
 /// use nalgebra::{Matrix4, Vector4};

@@ -1,6 +1,7 @@
 //! The U-D filter of two uncorrelated axes side by side: the fast path of [`crate::Ud`].
 //!
-//! Source: SPEC D.2, D.3, each axis alone: Bierman's update with the row e_at, Thornton's update of K = N/2 states.
+//! Source: `docs/theory/filters.md`, each axis alone: Bierman's update with the row e_at, Thornton's update of K = N/2
+//! states.
 //! Differs from it: the quotients of successive α share one division (1/α_j serves λ_{j+1} and d_j); conditions are
 //! selections, so that both axes stay in step; the measured row of U is multiplied by r/α instead of reduced.
 //! Layout: entry (i, j) of either axis' U at the rows 2 i (x) and 2 i + 1 (y) of column j, d likewise; see

@@ -1,7 +1,7 @@
 //! Orthogonal triangularisation by Householder reflections, on the block shapes that square-root filters have.
 //!
-//! Source: SPEC G (column j: s = -sign(A_jj) ‖A_j..m,j‖, u = column with u_j -= s, β = 1/(s u_j)); G. H. Golub,
-//! C. F. Van Loan, *Matrix Computations*, 5.1. A zero column is skipped.
+//! Source: `docs/theory/filters.md` (column j: s = -sign(A_jj) ‖A_j..m,j‖, u = column with u_j -= s, β = 1/(s u_j)); G.
+//! H. Golub, C. F. Van Loan, *Matrix Computations*, 5.1. A zero column is skipped.
 //! Differs from it: the blocks' known zeros are not touched, and columns are kept as the contiguous direction.
 
 use crate::Real;

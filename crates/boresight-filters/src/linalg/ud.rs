@@ -1,6 +1,7 @@
 //! U-D factors: P = U diag(d) Uᵀ with U unit upper triangular; factorisation and weighted Gram-Schmidt.
 //!
-//! Source: SPEC D.2, D.3; G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977, ch. III, VI.
+//! Source: `docs/theory/filters.md`; G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
+//! ch. III, VI.
 //! Symbols: u N x N unit upper triangular; d N (variances, >= 0). A zero pivot gives a zero column (semi-definite P).
 //! Cost: N³/3 for the factorisation, N²(N + W) for the Gram-Schmidt.
 

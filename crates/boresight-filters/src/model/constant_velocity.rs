@@ -1,6 +1,6 @@
 //! Constant velocity in two axes, driven by white acceleration: discrete or continuous.
 //!
-//! Source: SPEC 0 and D; Y. Bar-Shalom, X. R. Li, T. Kirubarajan, *Estimation with Applications to Tracking and
+//! Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, *Estimation with Applications to Tracking and
 //! Navigation*, 2001, 6.2.2 (continuous), 6.3.2 (discrete).
 //! Symbols: state `[x, vx, y, vy]` (px, px/s); discrete: G = [dt²/2, dt] per axis, acceleration variance q (px²/s⁴)
 //! constant over a step; continuous: q [[dt³/3, dt²/2], [dt²/2, dt]] per axis, q a power density (px²/s³).

@@ -1,6 +1,7 @@
 //! The reason for square roots: in f32 with P0 = 1e6 and R = 1e-6 the covariance forms lose all digits, factors hold.
 //!
-//! SPEC E-D7 (independent reference, 200 steps): relative error 0.99 conventional, 0.74 Joseph, 1.2e-6 U-D.
+//! `docs/theory/filters.md` (independent reference, 200 steps): relative error 0.99 conventional, 0.74 Joseph, 1.2e-6
+//! U-D.
 
 use boresight_filters::model::{ConstantVelocity, Dense};
 use boresight_filters::{CovarianceForm, Gaussian, GaussianFilter, Kf, Measurement, SquareRoot, Srif, Start, Ud};

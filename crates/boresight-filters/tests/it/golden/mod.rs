@@ -1,7 +1,7 @@
-//! Reader of the golden vectors (SPEC N) and the comparison they prescribe: |a - b| <= abs_tol + rel_tol |b|.
+//! Reader of the golden vectors (`golden/README.md`) and the comparison they prescribe: |a - b| <= abs_tol + rel_tol
+//! |b|.
 //!
-//! The folder is `BORESIGHT_GOLDEN`, by default `shared/spec/golden` beside the repository. A missing folder skips the
-//! tests and says so; a missing file in a folder that exists fails.
+//! The folder is the repository's `golden/`; `BORESIGHT_GOLDEN` names another of the same form. A missing file fails.
 
 mod adaptive;
 mod bounds;
@@ -54,20 +54,17 @@ pub struct Golden {
     pub cases: Vec<(Value, Value)>,
 }
 
-/// Reads a file; `None` if there is no golden folder at all.
-pub fn golden(name: &'static str) -> Option<Golden> {
+/// Reads `NAME.json`.
+pub fn golden(name: &'static str) -> Golden {
     let folder = std::env::var_os("BORESIGHT_GOLDEN")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/spec/golden"), PathBuf::from);
-    if !folder.is_dir() {
-        println!("skipped: no golden vectors at {} (set BORESIGHT_GOLDEN)", folder.display());
-        return None;
-    }
-    let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap();
-    let v: Value = serde_json::from_str(&text).unwrap();
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../golden"), PathBuf::from);
+    let path = folder.join(format!("{name}.json"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("golden vectors {}: {e}", path.display()));
+    let v: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let cases: Vec<_> =
         v["cases"].as_array().unwrap().iter().map(|c| (c["inputs"].clone(), c["outputs"].clone())).collect();
     assert!(!cases.is_empty(), "{name} has no cases");
-    Some(Golden { name, rel_tol: num(&v["rel_tol"]), abs_tol: num(&v["abs_tol"]), cases })
+    Golden { name, rel_tol: num(&v["rel_tol"]), abs_tol: num(&v["abs_tol"]), cases }
 }
 
 /// Reads a number; the strings "inf", "-inf" and "nan" stand for what JSON cannot write.

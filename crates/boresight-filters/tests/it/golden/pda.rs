@@ -1,6 +1,6 @@
-//! Golden vectors of gating and probabilistic data association (SPEC D.4, E).
+//! Golden vectors of gating and probabilistic data association (`docs/theory/association.md`).
 
-use super::{golden, list, matrix, num, vector};
+use super::{golden, list, matrix, num, rows, vector};
 use crate::forms::{each_form, exact_forms};
 use boresight_filters::linalg::invert_pair;
 use boresight_filters::pda::{Clutter, association_probabilities};
@@ -15,7 +15,7 @@ fn measurements(inp: &Value) -> Vec<Measurement> {
 
 #[test]
 fn every_form_gives_the_golden_pda_update() {
-    let Some(g) = golden("pda") else { return };
+    let g = golden("pda");
     for (i, (inp, out)) in g.cases.iter().enumerate() {
         let belief = Gaussian { mean: vector(&inp["x"]), cov: matrix(&inp["P"]) };
         for (name, mut filter) in exact_forms(&belief) {
@@ -38,6 +38,7 @@ fn every_form_gives_the_golden_pda_update() {
             let mut p = vec![0.0; inside.len()];
             let p0 = association_probabilities(&predicted, &inside, &clutter, &mut p).unwrap();
             let want = list(&out["p"]);
+            assert_eq!(want.len(), p.len() + 1, "case {i}: probabilities");
             g.close(i, "p0", p0, want[0]);
             for (j, p) in p.iter().enumerate() {
                 g.close(i, "p", *p, want[j + 1]);
@@ -54,7 +55,7 @@ fn every_form_gives_the_golden_pda_update() {
 
 #[test]
 fn gate_distances_and_the_nearest_are_the_golden_ones() {
-    let Some(g) = golden("gate_nn") else { return };
+    let g = golden("gate_nn");
     for (i, (inp, out)) in g.cases.iter().enumerate() {
         let belief = Gaussian { mean: vector(&inp["x"]), cov: matrix(&inp["P"]) };
         each_form(&belief, |_, filter| {
@@ -68,6 +69,7 @@ fn gate_distances_and_the_nearest_are_the_golden_ones() {
                     invert_pair(&s, "S").unwrap().distance2(&nu)
                 })
                 .collect();
+            assert_eq!(d2.len(), rows(&out["d2"]), "case {i}: distances");
             for (a, b) in d2.iter().zip(list(&out["d2"])) {
                 g.close(i, "d2", *a, b);
             }

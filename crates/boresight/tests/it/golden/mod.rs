@@ -1,5 +1,6 @@
-//! Golden vectors, read from the folder named by `BORESIGHT_GOLDEN` (default `../shared/spec/golden` beside the repository).
-//! One submodule a room; each reads its own files with [`cases`].
+//! Golden vectors (`golden/README.md`): numbers of an independent implementation, compared as |a - b| <= abs_tol +
+//! rel_tol |b|. The folder is the repository's `golden/`; `BORESIGHT_GOLDEN` names another of the same form. A missing
+//! file fails. One submodule a room; each reads its own files with [`load`].
 
 mod fuse;
 mod sim;
@@ -9,7 +10,7 @@ mod track_metrics;
 mod vision;
 
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One file of golden vectors: its tolerances and its cases.
 pub struct Golden {
@@ -18,27 +19,57 @@ pub struct Golden {
     pub cases: Vec<Value>,
 }
 
-/// The folder of the golden vectors.
-pub fn folder() -> PathBuf {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    std::env::var_os("BORESIGHT_GOLDEN").map_or_else(|| root.join("../shared/spec/golden"), PathBuf::from)
+/// The repository's folder of golden vectors.
+fn repository_folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../golden")
 }
 
-/// Reads `NAME.json`; prints that the test is skipped and returns `None` where the file is missing.
-pub fn load(name: &str) -> Option<Golden> {
-    let path = folder().join(format!("{name}.json"));
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: golden vectors {} are not here (set BORESIGHT_GOLDEN)", path.display());
-        return None;
-    };
+/// Reads `NAME.json`.
+pub fn load(name: &str) -> Golden {
+    let folder = std::env::var_os("BORESIGHT_GOLDEN").map_or_else(repository_folder, PathBuf::from);
+    let path = folder.join(format!("{name}.json"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("golden vectors {}: {e}", path.display()));
     let v: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let cases = v["cases"].as_array().expect("cases").clone();
     assert!(!cases.is_empty(), "{name}: no cases");
-    Some(Golden {
+    Golden {
         rel_tol: v["rel_tol"].as_f64().expect("rel_tol"),
         abs_tol: v["abs_tol"].as_f64().expect("abs_tol"),
         cases,
-    })
+    }
+}
+
+/// All Rust text of a folder of tests.
+fn sources(dir: &Path) -> String {
+    let mut text = String::new();
+    for entry in std::fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            text += &sources(&path);
+        } else {
+            text += &std::fs::read_to_string(&path).unwrap();
+        }
+    }
+    text
+}
+
+/// A file that nobody reads would look like evidence and be none.
+#[test]
+fn every_golden_file_is_read_by_a_test_and_described() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let tests = ["crates/boresight/tests/it/golden", "crates/boresight-filters/tests/it/golden"]
+        .map(|dir| sources(&root.join(dir)))
+        .concat();
+    let readme = std::fs::read_to_string(repository_folder().join("README.md")).unwrap();
+    let mut n_files = 0;
+    for entry in std::fs::read_dir(repository_folder()).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let Some(stem) = name.strip_suffix(".json") else { continue };
+        assert!(tests.contains(&format!("(\"{stem}\")")), "no test reads golden/{name}");
+        assert!(readme.contains(&format!("`{name}`")), "golden/README.md says nothing of {name}");
+        n_files += 1;
+    }
+    assert!(n_files > 0, "no golden files");
 }
 
 /// A number of a golden file; non-finite values are the strings "inf", "-inf", "nan".

@@ -23,7 +23,7 @@ fn grey(v: &Value) -> Image<u8> {
 
 #[test]
 fn clusters_and_centroids_are_the_golden_ones() {
-    let Some(golden) = load("segmentation") else { return };
+    let golden = load("segmentation");
     for case in &golden.cases {
         let image = grey(&case["inputs"]["image"]);
         let (lo, hi) = (number(&case["inputs"]["lo"]), number(&case["inputs"]["hi"]));
@@ -62,7 +62,9 @@ fn clusters_and_centroids_are_the_golden_ones() {
                 (CentroidMethod::Binary, "centroid_binary"),
                 (CentroidMethod::Bbox, "centroid_bbox"),
             ] {
-                for (r, expected) in regions.iter().zip(rows(&out[key])) {
+                let expected = rows(&out[key]);
+                assert_eq!(regions.len(), expected.len(), "{name} {key}");
+                for (r, expected) in regions.iter().zip(expected) {
                     // The papers count pixels from 1.
                     let c = centroid(r, &image, method, &plain).position.add_scalar(1.0);
                     golden.all_close(c.as_slice(), &expected, &format!("{name} {key}"));
@@ -74,7 +76,7 @@ fn clusters_and_centroids_are_the_golden_ones() {
 
 #[test]
 fn pixel_probabilities_and_the_proximity_range_are_the_golden_ones() {
-    let Some(golden) = load("pixel_probability") else { return };
+    let golden = load("pixel_probability");
     for case in &golden.cases {
         let (i, o) = (&case["inputs"], &case["outputs"]);
         let level = |m: &str, s: &str| Level { mean: number(&i[m]), sd: number(&i[s]) };
@@ -98,7 +100,7 @@ fn table(inputs: &Value) -> LlrTable {
 
 #[test]
 fn likelihood_ratio_scores_are_the_golden_ones() {
-    let Some(golden) = load("llr_detector") else { return };
+    let golden = load("llr_detector");
     for case in &golden.cases {
         let (i, o) = (&case["inputs"], &case["outputs"]);
         let (image, table) = (grey(&i["image"]), table(i));
@@ -117,13 +119,14 @@ fn likelihood_ratio_scores_are_the_golden_ones() {
 
 #[test]
 fn the_track_before_detect_density_is_the_golden_one() {
-    let Some(golden) = load("tbd") else { return };
+    let golden = load("tbd");
     for case in &golden.cases {
         let i = &case["inputs"];
         let table = table(i);
         let n = i["size"].as_u64().unwrap() as usize;
         let mut filter = TrackBeforeDetect::new(i["vmax"].as_u64().unwrap() as usize, number(&i["pv"]));
         let mut scores = ScoreImage::default();
+        assert_eq!(i["images"].as_array().unwrap().len(), case["outputs"].as_array().unwrap().len(), "frames");
         for (k, (image, o)) in
             i["images"].as_array().unwrap().iter().zip(case["outputs"].as_array().unwrap()).enumerate()
         {
@@ -138,7 +141,7 @@ fn the_track_before_detect_density_is_the_golden_one() {
 
 #[test]
 fn the_dark_box_and_the_search_window_are_the_golden_ones() {
-    let Some(golden) = load("dark_bbox_window") else { return };
+    let golden = load("dark_bbox_window");
     for case in &golden.cases {
         let (i, o) = (&case["inputs"], &case["outputs"]);
         let image = grey(&i["gray"]);
