@@ -1,4 +1,5 @@
-//! One target in clutter (SPEC E): share of tracks lost by nearest neighbour, PDA, JPDA, IPDA and MHT, beside the printed ones.
+//! One target in clutter: share of tracks lost by nearest neighbour, PDA, JPDA, IPDA and MHT, beside
+//! `docs/theory/association.md`.
 //!
 //! Scene: constant velocity with acceleration noise 0.05 px/scan², measurements of 0.5 px, clutter uniform in a square that
 //! moves with the target; a few clean scans to start, then 50 scans; lost: more than 5 px off at the end.
@@ -20,12 +21,13 @@ pub struct Args {
     /// First seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Scans without clutter and misses at the start (SPEC E does not say how its tracks start; five come nearest).
+    /// Scans without clutter and misses at the start (how the reference's tracks start is not known; five come
+    /// nearest).
     #[arg(long, default_value_t = 5)]
     clean: u64,
 }
 
-/// P_D, λ, then SPEC E's shares lost: NN, PDA; with a blackout of scans 15-25: NN, PDA.
+/// P_D, λ, then the shares lost in `docs/theory/association.md`: NN, PDA; with a blackout of scans 15-25: NN, PDA.
 const CELLS: [(f64, f64, [f64; 4]); 5] = [
     (1.0, 0.01, [0.010, 0.007, 0.703, 0.620]),
     (1.0, 0.06, [0.260, 0.053, 0.790, 0.727]),
@@ -45,7 +47,7 @@ pub fn run(args: &Args) -> Result<()> {
         args.runs,
         0.5 / (args.runs as f64).sqrt()
     );
-    println!("P_D  λ/px²  blackout   NN (SPEC)       PDA (SPEC)      JPDA   IPDA   MHT");
+    println!("P_D  λ/px²  blackout   NN (reference)  PDA (reference) JPDA   IPDA   MHT");
     for blackout in [false, true] {
         for (p_d, lambda, spec) in CELLS {
             let lost: Vec<f64> = methods(p_d, lambda)

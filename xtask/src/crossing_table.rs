@@ -1,4 +1,5 @@
-//! Crossing targets (SPEC A, data set III): share of scans tracked and identity switches for each method.
+//! Crossing targets (data set III, `docs/theory/simulation.md`): share of scans tracked and identity switches for each
+//! method.
 //!
 //! The scene is rendered and segmented as the papers do (band 90..110, d_p 2); clusters below 0.35 of a target are dropped,
 //! merged ones are kept. A target is tracked in a scan when a confirmed track is within 3 px; a switch is a change of the

@@ -35,7 +35,7 @@ enum Chore {
     BenchTrack(bench_track::Args),
     /// What the automatic choice says of every public clip.
     Choices(choices::Args),
-    /// One target in clutter: share lost by each method, beside SPEC E.
+    /// One target in clutter: share lost by each method, beside the reference's.
     ClutterTable(clutter_table::Args),
     /// Crossing targets: share tracked and identity switches of each method.
     CrossingTable(crossing_table::Args),

@@ -195,7 +195,8 @@ fn simulated_runs_have_state_errors_their_bound_and_consistency_over_runs() {
         assert!((csv_value(&csv, run, "ANIS") - nis).abs() < 0.00501, "{run}: {nis} over {n}");
         assert!(shown.contains(&format!("over {n} values")), "{n}: {shown}");
     }
-    // The bound of 0.5 px² of a target that moves straight: 0.696 √r over 50 scans, more over fewer (SPEC M).
+    // The bound of 0.5 px² of a target that moves straight: 0.696 √r over 50 scans, more over fewer
+    // (docs/theory/measures.md).
     let bound = csv_value(&csv, "0", "bound");
     assert!((0.4..1.0).contains(&bound), "{bound}");
     for name in ["PFE_x", "RMSPE", "RMSVE", "ANEES", "ANEES4", "NCI"] {
@@ -214,7 +215,7 @@ fn pgm(folder: &Path, name: &str, pixels: &[u8]) -> String {
 #[test]
 fn two_images_are_compared_by_the_numbers_of_the_worked_example() {
     let dir = tempfile::tempdir().unwrap();
-    // SPEC W9.
+    // The worked example of docs/theory/measures.md.
     let a = pgm(dir.path(), "a.pgm", &[10, 20, 30, 40, 50, 60, 70, 80, 90]);
     let b = pgm(dir.path(), "b.pgm", &[11, 18, 30, 43, 50, 55, 70, 84, 90]);
     let out = boresight(&["evaluate", &a, &b, "--require", "PSNR=40.26", "--require", "MSE=6.2"]);

@@ -1,8 +1,9 @@
-//! The captioned figures of D0, D1 and D3 from one seeded run each.
+//! The captioned figures of Roopa et al., the thesis chapter, and Parimala and Raol, from one seeded run each.
 //!
-//! Source: captions of D1 Figures 4.5-4.14 (synthetic images, trajectories, states and errors, RSSPE and RSSVE, errors and
-//! innovations with their bounds), D0 Figures 1 and 3, D3 Figure 1. Bounds are two standard deviations of the filter's own
-//! covariance. Units: px, px/scan, scans from 1; positions in the papers' world (from 1).
+//! Source: captions of the thesis' Figures 4.5-4.14 (synthetic images, trajectories, states and errors, RSSPE and
+//! RSSVE, errors and innovations with their bounds), Roopa et al., Figures 1 and 3, Parimala and Raol, Figure 1. Bounds
+//! are two standard deviations of the filter's own covariance. Units: px, px/scan, scans from 1; positions in the
+//! papers' world (from 1).
 
 use super::follow::{StartAt, Tuning, nearest_gated};
 use super::item::{Figure, Line, Output};
@@ -77,7 +78,7 @@ fn picture(number: &str, what: &str, target_std: f64, background_std: f64, seed:
     };
     Ok(Figure {
         item: "figures",
-        caption: format!("D1 Figure {number}: synthetic image of {what}, scan 25"),
+        caption: format!("Thesis Figure {number}: synthetic image of {what}, scan 25"),
         axes: ["x, px".into(), "y, px".into()],
         lines: Vec::new(),
         picture,
@@ -109,7 +110,7 @@ fn pair(d: &Detail, first: usize, numbers: &str, what: &str, unit: &str) -> Vec<
         .map(|(i, axis)| {
             let error = |sign: f64| line(if sign > 0.0 { "+2σ" } else { "−2σ" }, d.bounds.iter().map(move |b| sign * b[i]));
             let lines = vec![line("error", d.run.truth.iter().zip(&d.estimates).map(|(t, e)| t[i] - e[i])), error(1.0), error(-1.0)];
-            over_scans(format!("D1 Figure {numbers}: error of the {axis}-{what} with its theoretical bounds"), unit, lines, "The errors stay well inside the bounds: R = 0.5 px² is larger than the centroids' true variance of 0.1 px².")
+            over_scans(format!("Thesis Figure {numbers}: error of the {axis}-{what} with its theoretical bounds"), unit, lines, "The errors stay well inside the bounds: R = 0.5 px² is larger than the centroids' true variance of 0.1 px².")
         })
         .collect()
 }
@@ -122,7 +123,7 @@ fn states(d: &Detail, i: usize, number: &str, what: &str, unit: &str) -> Figure 
         of("estimated y", &d.estimates, i + 2),
     ];
     over_scans(
-        format!("D1 Figure {number}: true and estimated {what}, data set II"),
+        format!("Thesis Figure {number}: true and estimated {what}, data set II"),
         unit,
         lines,
         "The start is known.",
@@ -137,13 +138,13 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
         super::figures_fusion::gate(seed)?,
         picture("4.5", "data set I", 0.0, 0.0, seed)?,
         trajectory(
-            "D1 Figure 4.6: trajectory, data set I".into(),
+            "Thesis Figure 4.6: trajectory, data set I".into(),
             &one.run.truth,
             &[("estimated", &one.estimates)],
             "Estimates lie on the truth.",
         ),
         over_scans(
-            "D1 Figure 4.7: errors of position, data set I".into(),
+            "Thesis Figure 4.7: errors of position, data set I".into(),
             "px",
             vec![
                 line("x", one.run.truth.iter().zip(&one.estimates).map(|(t, e)| t[0] - e[0])),
@@ -153,7 +154,7 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
         ),
         picture("4.8", "data set II", 10.0, 50.0, seed)?,
         trajectory(
-            "D1 Figure 4.9: trajectory, data set II".into(),
+            "Thesis Figure 4.9: trajectory, data set II".into(),
             &two.run.truth,
             &[("estimated", &two.estimates)],
             "The target is held in every scan.",
@@ -166,7 +167,7 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
     let root =
         |i: usize| two.run.truth.iter().zip(&two.estimates).map(move |(t, e)| (t[i] - e[i]).hypot(t[i + 2] - e[i + 2]));
     figures.push(over_scans(
-        "D1 Figure 4.12: root sum square errors of position and velocity, data set II".into(),
+        "Thesis Figure 4.12: root sum square errors of position and velocity, data set II".into(),
         "px, px/scan",
         vec![line("RSSPE", root(0)), line("RSSVE", root(1))],
         "Below 1 px and 0.4 px/scan throughout, as the text says; with tunings that match Table 4.2 this holds in at most 5 % of runs.",
@@ -177,7 +178,7 @@ pub fn figures(options: &Options<'_>) -> Result<Output> {
         };
         let line = |name: &str, points| Line { name: name.into(), points, marks: false };
         figures.push(over_scans(
-            format!("D1 Figure 4.14: innovations of {axis} with their bounds, data set II"),
+            format!("Thesis Figure 4.14: innovations of {axis} with their bounds, data set II"),
             "px",
             vec![line("innovation", of(&|v| v[0])), line("+2σ", of(&|v| v[1])), line("−2σ", of(&|v| -v[1]))],
             "Far fewer than 5 % lie outside: the filter is cautious.",
@@ -199,13 +200,13 @@ fn tracking_of_d0(seed: Seed) -> Result<Vec<Figure>> {
     let errors = vec![line("position", root(0)), line("velocity", root(1))];
     Ok(vec![
         trajectory(
-            "D0 Figure 1: tracking of the centroid, CTUDF, Vn = 1".into(),
+            "Roopa et al. 2016, Figure 1: tracking of the centroid, CTUDF, Vn = 1".into(),
             &run.truth,
             &[("estimated", &e)],
             "One run of reading B.",
         ),
         over_scans(
-            "D0 Figure 3: errors of position and velocity, CTUDF, Vn = 1".into(),
+            "Roopa et al. 2016, Figure 3: errors of position and velocity, CTUDF, Vn = 1".into(),
             "px, px/scan",
             errors,
             "The velocity settles after the two-point start.",
@@ -232,7 +233,7 @@ fn fusion_of_d3(seed: Seed) -> Result<Figure> {
     }
     lines.push(line("fused, CTSRIF", root(&super::srif::follow_both(&a, &b)?).into_iter()));
     Ok(over_scans(
-        "D3 Figure 1: measurement-level fusion, position errors".into(),
+        "Parimala and Raol, Figure 1: measurement-level fusion, position errors".into(),
         "px",
         lines,
         "One run of reading C, independent sensors.",

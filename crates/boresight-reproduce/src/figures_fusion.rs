@@ -1,6 +1,7 @@
-//! D1 Figures 4.3 and 4.16-4.21: a gate among centroids; each fusion sensor's states and the fused trajectory.
+//! Thesis Figures 4.3 and 4.16-4.21: a gate among centroids; each fusion sensor's states and the fused trajectory.
 //!
-//! Source: captions of D1; readings F1 of SPEC L.4 (unbiased independent sensors) unless said. One seeded run.
+//! Source: captions of the thesis; reading F1 (unbiased independent sensors, `docs/theory/papers.md`) unless said. One
+//! seeded run.
 //! Units: px, px/scan, scans from 1; positions in the papers' world (from 1).
 
 use super::follow::{GATE_99, StartAt, Tuning};
@@ -23,7 +24,7 @@ fn over_scans(name: &str, states: &[Vector4<f64>], i: usize) -> Line {
     Line { name: name.into(), points, marks: false }
 }
 
-/// D1 Figure 4.3: the gate of one track among all centroids of a scan.
+/// Thesis Figure 4.3: the gate of one track among all centroids of a scan.
 pub fn gate(seed: Seed) -> Result<Figure> {
     let scene = paper_scene(&[PAPER_START], (100.0, 10.0), (50.0, 50.0));
     let data = run_scene(&scene, seed, &[READING_A])?;
@@ -56,14 +57,14 @@ pub fn gate(seed: Seed) -> Result<Figure> {
         Line { name: "predicted".into(), points: vec![[p.mean.x, p.mean.y]], marks: true },
     ];
     Ok(figure(
-        "D1 Figure 4.3: gating, data set II, scan 10".into(),
+        "Thesis Figure 4.3: gating, data set II, scan 10".into(),
         ["x, px", "y, px"],
         lines,
         "Of some 260 centroids in the frame hardly more than the target's own lies in the gate.",
     ))
 }
 
-/// D1 Figures 4.16-4.21.
+/// Thesis Figures 4.16-4.21.
 pub fn fusion_of_d1(seed: Seed) -> Result<Vec<Figure>> {
     let truth = truth();
     let mut out = Vec::new();
@@ -83,7 +84,7 @@ pub fn fusion_of_d1(seed: Seed) -> Result<Vec<Figure>> {
                 ];
                 let sentence = if loss { "Where there are no data the track is predicted on." } else { "Reading F1." };
                 out.push(figure(
-                    format!("D1 Figure {}: {what} from the {name}{lost}", numbers[i]),
+                    format!("Thesis Figure {}: {what} from the {name}{lost}", numbers[i]),
                     ["scan", unit],
                     lines,
                     sentence,
@@ -103,7 +104,7 @@ pub fn fusion_of_d1(seed: Seed) -> Result<Vec<Figure>> {
         ];
         let with = if loss { "with" } else { "without" };
         out.push(figure(
-            format!("D1 Figure {}: fused trajectory {with} measurement loss", numbers[2]),
+            format!("Thesis Figure {}: fused trajectory {with} measurement loss", numbers[2]),
             ["x, px", "y, px"],
             lines,
             "The fused track lies nearer the truth than either sensor's.",
@@ -128,7 +129,7 @@ pub fn fusion_of_d1(seed: Seed) -> Result<Vec<Figure>> {
                 .collect();
             let table = if loss { "4.4, with loss" } else { "4.3" };
             out.push(figure(
-                format!("Position errors behind D1 Table {table}, reading {name}"),
+                format!("Position errors behind Thesis Table {table}, reading {name}"),
                 ["scan", "px"],
                 lines,
                 "One run.",

@@ -1,13 +1,14 @@
 //! Follows one target through scans of centroids: gate, nearest neighbour, any filter.
 //!
-//! Source: SPEC D.4 (NN: the gated measurement with the least d², first on ties; none: prediction kept), P_G = 0.99.
-//! World, px and px/scan; T = 1 scan. Cost: all centroids are tested (about 261 a scan in data set II).
+//! Source: `docs/theory/association.md` (NN: the gated measurement with the least d², first on ties; none: prediction
+//! kept), P_G = 0.99. World, px and px/scan; T = 1 scan. Cost: all centroids are tested (about 261 a scan in data set
+//! II).
 
 use boresight::Result;
 use boresight_filters::{Gaussian, GaussianFilter, Measurement};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-/// γ = −2 ln(1 − 0.99), χ² with 2 degrees of freedom (SPEC D.4).
+/// γ = −2 ln(1 − 0.99), χ² with 2 degrees of freedom.
 pub const GATE_99: f64 = 9.210_340_371_976_182;
 
 /// How a filter is started.
@@ -20,7 +21,7 @@ pub enum StartAt {
         /// Variances of position (px²) and velocity (px²/scan²).
         variances: (f64, f64),
     },
-    /// From the measurements nearest the truth in the first two scans (SPEC D.5 (5)).
+    /// From the measurements nearest the truth in the first two scans (`docs/theory/track-management.md`).
     TwoPoints,
 }
 

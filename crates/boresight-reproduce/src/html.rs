@@ -23,7 +23,7 @@ pub fn page(outputs: &[Output], runs: u64, seed: u64) -> String {
     let mut h = format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>boresight reproduce</title><style>{STYLE}</style>\
          <h1>The papers' tables and figures</h1><p>{runs} Monte Carlo runs of each study, seed {seed}. \"Percentile\" is the share of our runs below the \
-         paper's value: near 0 or 100 the print is not a typical run of this reading. \"Reference\" is the specification's independent Monte Carlo of \
+         paper's value: near 0 or 100 the print is not a typical run of this reading. \"Reference\" is an independent Monte Carlo of \
          the same reading and tuning (200 runs), \"off\" our distance from it in standard errors.</p>"
     );
     for output in outputs {

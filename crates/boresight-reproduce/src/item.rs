@@ -16,7 +16,7 @@ pub struct Row {
     pub paper: Option<f64>,
     /// Our mean, standard deviation, percentile of the paper's value.
     pub ours: Spread,
-    /// The specification's own independent Monte Carlo (mean, standard deviation, runs) for the same reading and tuning.
+    /// The reference: an independent Monte Carlo (mean, standard deviation, runs) for the same reading and tuning.
     pub reference: Option<(f64, f64, usize)>,
     /// Runs lost and left out.
     pub lost: usize,

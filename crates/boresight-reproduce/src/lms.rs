@@ -1,9 +1,10 @@
-//! D2 Figures 2-4: the LMS filter on manoeuvring targets, position and acceleration errors over the steps.
+//! Obolensky et al. 2002, Figures 2-4: the LMS filter on manoeuvring targets, position and acceleration errors over the
+//! steps.
 //!
-//! Source: SPEC H: 25 frames/s, T = 0.04 s, σ = 5 or 10 px, 1500 steps; sines of 40 s and 17 s with 100 px amplitude stand for the first
-//! video, Singer manoeuvres for the second (the paper's videos are not public). Both axes count. Rules: the guard, α = 0 (weights
-//! frozen), and a printed step that is large enough to do anything. A run has diverged if the filter refuses a step or ends more
-//! than 50 px off. Units: px, px/s², steps from 1.
+//! Source: `docs/theory/adaptive.md`: 25 frames/s, T = 0.04 s, σ = 5 or 10 px, 1500 steps; sines of 40 s and 17 s with
+//! 100 px amplitude stand for the first video, Singer manoeuvres for the second (the paper's videos are not public).
+//! Both axes count. Rules: the guard, α = 0 (weights frozen), and a printed step that is large enough to do anything. A
+//! run has diverged if the filter refuses a step or ends more than 50 px off. Units: px, px/s², steps from 1.
 
 use super::item::{Figure, Line, Output, Row, Section};
 use super::score::spread;
@@ -55,7 +56,7 @@ fn one(scene: &str, std: f64, rule: LmsRule, seed: Seed) -> Result<Run> {
                 out.diverged = true;
                 break;
             }
-            // The last state is a[k - 2] (SPEC H).
+            // The last state is a[k - 2].
             let a = (p[k] - 2.0 * p[k - 1] + p[k - 2]) / (T * T);
             let (e, n, b) = (filter.state[0] - p[k], z[k] - p[k], filter.state[4] - a);
             let s = &mut out.squares[k];
@@ -83,7 +84,7 @@ fn line(name: &str, values: &[f64]) -> Line {
     Line { name: name.into(), points, marks: false }
 }
 
-/// The table behind D2 Figures 2-4, and the figures.
+/// The table behind Figures 2-4, and the figures.
 pub fn figures_2_to_4(options: &Options<'_>) -> Result<Output> {
     let printed = LmsRule::AsPrinted { alpha: 1e-9 };
     let studies = [
@@ -117,7 +118,7 @@ pub fn figures_2_to_4(options: &Options<'_>) -> Result<Output> {
         let mut add = |what: &str, unit: &str, lines, sentence: &str| {
             figures.push(Figure {
                 item: "lms-2-4",
-                caption: format!("D2 Figure {figure}: {what}, {case}"),
+                caption: format!("Obolensky et al. 2002, Figure {figure}: {what}, {case}"),
                 axes: ["step".into(), unit.into()],
                 lines,
                 picture: None,
@@ -146,7 +147,7 @@ pub fn figures_2_to_4(options: &Options<'_>) -> Result<Output> {
     let sentence = format!(
         "\"Goes below the measurement error\", \"5 px to below 3 px\" ({:.1} px at the end) and \"10 px to 5 px and less\" ({:.1} px) are reproduced by the guarded rule, and as well \
          with frozen weights ({:.1} px): it is not the adaptation that achieves it. With a step that does anything (α = 1e-9) {lost} of {} runs diverge. \
-         (The specification's own runs: 3.8-3.9, 2.0-2.2, 1.7-1.8 px guarded; 3.9, 2.6-2.8, 1.7-1.8 px frozen.)",
+         (The reference: 3.8-3.9, 2.0-2.2, 1.7-1.8 px guarded; 3.9, 2.6-2.8, 1.7-1.8 px frozen.)",
         m(2),
         m(14),
         m(5),
@@ -155,7 +156,7 @@ pub fn figures_2_to_4(options: &Options<'_>) -> Result<Output> {
     Ok(Output {
         sections: vec![Section {
             item: "lms-2-4",
-            title: "D2 Figures 2-4: time-varying Kalman filter with LMS weights, error of the position".into(),
+            title: "Obolensky et al. 2002, Figures 2-4: time-varying Kalman filter with LMS weights, error of the position".into(),
             reading: "sines of 40 s and 17 s, 100 px; Singer 3 px/s², 10 s; 25 frames/s, both axes; root mean square over the steps named".into(),
             rows,
             sentence,

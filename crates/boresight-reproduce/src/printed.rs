@@ -1,7 +1,8 @@
-//! What the papers print and what the specification's independent Monte Carlo found, read from `printed.csv`.
+//! What the papers print and what an independent Monte Carlo found (the reference), read from `printed.csv`.
 //!
-//! Source: the papers' tables; `tables.txt` beside the specification (200 runs for each case, another program in another
-//! language). Columns: item, reading, case, measure, the paper's value, mean and standard deviation of those 200 runs.
+//! Source: the papers' tables; the reference is another program in another language, 200 runs for each case
+//! (`docs/theory/papers.md`). Columns: item, reading, case, measure, the paper's value, mean and standard deviation of
+//! those 200 runs.
 
 use super::item::Row;
 use super::score::{MEASURES, spread};
@@ -10,7 +11,7 @@ use super::study::Outcome;
 /// The table.
 const PRINTED: &str = include_str!("printed.csv");
 
-/// Runs of the specification's Monte Carlo.
+/// Runs of the reference.
 pub const REFERENCE_RUNS: usize = 200;
 
 /// A line of the table.
@@ -22,7 +23,7 @@ pub struct Printed {
     measure: String,
     /// The paper's value.
     pub paper: f64,
-    /// Mean of the specification's runs.
+    /// Mean of the reference's runs.
     pub mean: f64,
     /// Their standard deviation.
     pub std: f64,
@@ -60,7 +61,8 @@ mod tests {
 
     #[test]
     fn the_table_is_whole() {
-        // 15 cases of D0, 1 + 6 of D1's tracking, 12 of its fusion, 18 + 2 of D3; four numbers each.
+        // 15 cases of Roopa et al., 1 + 6 of the thesis' tracking, 12 of its fusion, 18 + 2 of Parimala and Raol; four
+        // numbers each.
         assert_eq!(all().len(), 4 * (15 + 1 + 6 + 12 + 18 + 2));
         assert!(all().iter().all(|p| MEASURES.contains(&p.measure.as_str()) && p.paper >= 0.0));
     }

@@ -1,7 +1,7 @@
 //! One run of a paper's scene: frames drawn, segmented in several readings, all centroids kept, in the papers' world.
 //!
-//! Source: SPEC A, C. A reading says which ambiguity of the papers is taken which way: distance `<` or `<=` d_p, centroid over
-//! the cluster's own pixels or over its bounding box. Frames are drawn once for all readings.
+//! Source: `docs/theory/papers.md`. A reading says which ambiguity of the papers is taken which way: distance `<` or
+//! `<=` d_p, centroid over the cluster's own pixels or over its bounding box. Frames are drawn once for all readings.
 //! Coordinates: the papers' world counts pixels from 1 (percentage errors depend on it); the 1 is added here.
 //! Units: px, px/scan. Cost: one 64 x 64 frame of data set II about 20 µs a reading.
 

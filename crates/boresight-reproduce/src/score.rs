@@ -1,7 +1,8 @@
 //! The papers' four numbers of a run, and what a Monte Carlo study says of them.
 //!
-//! Source: SPEC K: PFE = 100 |x - x̂|₂ / |x|₂ (x = truth, `E-K1`), RMSPE = sqrt(mean(e_x² + e_y²)), RMSVE the same of the
-//! velocities, without "/2" (`E-K2`). Percentile: share of runs at or below the paper's value (half of the ties).
+//! Source: `docs/theory/measures.md`: PFE = 100 |x - x̂|₂ / |x|₂ (x = truth), RMSPE = sqrt(mean(e_x² + e_y²)), RMSVE
+//! the same of the velocities, without "/2". Percentile: share of runs at or below the paper's value (half of the
+//! ties).
 //! Units: per cent, px, px/scan.
 
 use nalgebra::Vector4;
@@ -70,8 +71,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_worked_example_of_the_specification() {
-        // SPEC W10.
+    fn the_worked_example_of_the_chapter_on_measures() {
+        // The worked example of docs/theory/measures.md.
         let truth = [[11.0, 1.0, 11.0, 1.0], [12.0, 1.0, 12.0, 1.0], [13.0, 1.0, 13.0, 1.0]].map(Vector4::from);
         let estimates = [[11.2, 1.1, 10.9, 1.0], [12.1, 0.9, 12.3, 1.05], [12.8, 1.0, 13.1, 0.95]].map(Vector4::from);
         let golden = [1.440046082212, 1.5920308451728, 0.25819888974716, 0.091287092917528];

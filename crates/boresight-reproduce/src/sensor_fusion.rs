@@ -1,9 +1,10 @@
-//! D1 Tables 4.3 and 4.4: track-to-track fusion of an imaging sensor and a radar, without and with measurement loss.
+//! Thesis Tables 4.3 and 4.4: track-to-track fusion of an imaging sensor and a radar, without and with measurement
+//! loss.
 //!
-//! Source: SPEC F, L.4, `tables.txt`. The papers print neither noise nor tuning. Reading F1: unbiased independent sensors of
-//! 2.87 and 2.62 px, q = 1e-3, R matched, P0 = I. Reading F2 (a hypothesis): opposite constant biases of about 1.05 px per axis;
-//! its eight numbers are fitted to the rows of the specification's own F2 study.
-//! Loss: imaging scans 15..25, radar 30..45, both included: predict only, keep fusing.
+//! Source: `docs/theory/fusion.md`, `docs/theory/papers.md`. The thesis prints neither noise nor tuning. Reading F1:
+//! unbiased independent sensors of 2.87 and 2.62 px, q = 1e-3, R matched, P0 = I. Reading F2 (a hypothesis): opposite
+//! constant biases of about 1.05 px per axis; its eight numbers are fitted to the rows of the independent Monte Carlo
+//! of F2. Loss: imaging scans 15..25, radar 30..45, both included: predict only, keep fusing.
 //! Units: px, px/scan, the papers' world (positions 11..60).
 
 use super::follow::{StartAt, Tuning, nearest_gated};
@@ -88,12 +89,12 @@ pub fn run(
     Ok(out)
 }
 
-/// D1 Table 4.3: no loss.
+/// Thesis Table 4.3: no loss.
 pub fn table_43(options: &Options<'_>) -> Result<Output> {
     table(options, "fusion-4.3", false)
 }
 
-/// D1 Table 4.4: imaging lost in scans 15-25, radar in 30-45.
+/// Thesis Table 4.4: imaging lost in scans 15-25, radar in 30-45.
 pub fn table_44(options: &Options<'_>) -> Result<Output> {
     table(options, "fusion-4.4", true)
 }
@@ -134,9 +135,9 @@ fn table(options: &Options<'_>, item: &'static str, loss: bool) -> Result<Output
         sections.push(Section {
             item,
             title: if loss {
-                "D1 Table 4.4 (called 4.5): fusion, imaging lost in scans 15-25, radar in 30-45".into()
+                "Thesis Table 4.4 (called 4.5): fusion, imaging lost in scans 15-25, radar in 30-45".into()
             } else {
-                "D1 Table 4.3 (called 4.4): fusion without measurement loss".into()
+                "Thesis Table 4.3 (called 4.4): fusion without measurement loss".into()
             },
             reading: format!("{name}: {what}; imaging {}; radar {}; P0 = I", q(&sensors[0]), q(&sensors[1])),
             rows,

@@ -1,8 +1,9 @@
-//! D1 Figure 4.2: mean and median filters on salt and pepper (density 0.03) and on Gaussian noise (σ = 1.4, 10, 25).
+//! Thesis Figure 4.2: mean and median filters on salt and pepper (density 0.03) and on Gaussian noise (σ = 1.4, 10,
+//! 25).
 //!
-//! Source: SPEC B, L.6: 64 x 64 frame with a 9 x 9 target of 100 on 50, window 3 x 3, border replicated, noise not clamped.
-//! Numbers are the root mean square error against the clean frame, counts; the paper prints pictures only. The "paper" column
-//! is therefore empty, and the specification's own values stand in the sentence.
+//! Source: `docs/theory/image.md`: 64 x 64 frame with a 9 x 9 target of 100 on 50, window 3 x 3, border replicated,
+//! noise not clamped. Numbers are the root mean square error against the clean frame, counts; the paper prints pictures
+//! only. The "paper" column is therefore empty.
 
 use super::item::{Figure, Output, Row, Section};
 use super::score::spread;
@@ -68,7 +69,7 @@ fn pictures(clean: &Image<f64>, seed: Seed) -> Result<Vec<Figure>> {
             let levels = image.as_slice().iter().map(|v| boresight::sim::quantise(*v)).collect();
             out.push(Figure {
                 item: "filters-4.2",
-                caption: format!("D1 Figure 4.2: {name}, {what}"),
+                caption: format!("Thesis Figure 4.2: {name}, {what}"),
                 axes: ["x, px".into(), "y, px".into()],
                 lines: Vec::new(),
                 picture: Some((image.width(), image.height(), levels)),
@@ -119,7 +120,7 @@ pub fn figure_42(options: &Options<'_>) -> Result<Output> {
     Ok(Output {
         sections: vec![Section {
             item: "filters-4.2",
-            title: "D1 Figure 4.2: mean and median filters, 3 x 3".into(),
+            title: "Thesis Figure 4.2: mean and median filters, 3 x 3".into(),
             reading: "9 x 9 target of 100 on 50, borders replicated; RMSE in counts".into(),
             rows,
             sentence,

@@ -1,10 +1,11 @@
-//! D3 Tables 1-4: square-root information filter, plain (CTSRIF) and with the fuzzy correlator (CTFSRIF), and the
-//! measurement-level fusion of two imagers.
+//! Parimala and Raol, Tables 1-4: square-root information filter, plain (CTSRIF) and with the fuzzy correlator
+//! (CTFSRIF), and the measurement-level fusion of two imagers.
 //!
-//! Source: SPEC G, L.5, `tables.txt`: R_m = 0.5, Q = 1e-5 as printed, P0 = diag(0.5, 0.03, 0.5, 0.03) assumed. Tables 1, 2: target
-//! std 5 on background std 50, 100; Tables 3, 4: sensor 1 with target std 1, sensor 2 with 5, both on 100. Fusion stacks both
-//! measurements (eq 10); each sensor's nearest neighbour is taken from the common prediction.
-//! "Same background": both sensors see the same noise of the background, their targets' pixels are independent.
+//! Source: `docs/theory/filters.md`, `docs/theory/papers.md`: R_m = 0.5, Q = 1e-5 as printed,
+//! P0 = diag(0.5, 0.03, 0.5, 0.03) assumed. Tables 1, 2: target std 5 on background std 50, 100; Tables 3, 4: sensor 1
+//! with target std 1, sensor 2 with 5, both on 100. Fusion stacks both measurements (eq 10); each sensor's nearest
+//! neighbour is taken from the common prediction. "Same background": both sensors see the same noise of the background,
+//! their targets' pixels are independent.
 
 use super::follow::{StartAt, Tuning, nearest_gated};
 use super::item::{Output, Section};
@@ -21,26 +22,37 @@ use nalgebra::{Matrix2, Vector4};
 
 const TUNING: Tuning = Tuning { r: 0.5, q: 1e-5, start: StartAt::KNOWN };
 
-/// D3 Table 1: target std 5, background std 50.
+/// Parimala and Raol, Table 1: target std 5, background std 50.
 pub fn table_1(options: &Options<'_>) -> Result<Output> {
     Ok(Output {
-        sections: single(options, "srif-1", "D3 Table 1: target std 5, background std 50", 5.0, 50.0)?,
+        sections: single(options, "srif-1", "Parimala and Raol, Table 1: target std 5, background std 50", 5.0, 50.0)?,
         ..Output::default()
     })
 }
 
-/// D3 Table 2: target std 5, background std 100.
+/// Parimala and Raol, Table 2: target std 5, background std 100.
 pub fn table_2(options: &Options<'_>) -> Result<Output> {
     Ok(Output {
-        sections: single(options, "srif-2", "D3 Table 2: target std 5, background std 100", 5.0, 100.0)?,
+        sections: single(
+            options,
+            "srif-2",
+            "Parimala and Raol, Table 2: target std 5, background std 100",
+            5.0,
+            100.0,
+        )?,
         ..Output::default()
     })
 }
 
-/// D3 Tables 3 and 4: two sensors and their fusion.
+/// Parimala and Raol, Tables 3 and 4: two sensors and their fusion.
 pub fn tables_3_4(options: &Options<'_>) -> Result<Output> {
-    let mut sections =
-        single(options, "srif-3-4", "D3 Tables 3, 4, sensor 1: target std 1, background std 100", 1.0, 100.0)?;
+    let mut sections = single(
+        options,
+        "srif-3-4",
+        "Parimala and Raol, Tables 3, 4, sensor 1: target std 1, background std 100",
+        1.0,
+        100.0,
+    )?;
     sections.push(fusion(options)?);
     Ok(Output { sections, ..Output::default() })
 }
@@ -140,7 +152,7 @@ fn fusion(options: &Options<'_>) -> Result<Section> {
     );
     Ok(Section {
         item: "srif-3-4",
-        title: "D3 Tables 3, 4, measurement-level fusion (eq 10) of sensors 1 and 2".into(),
+        title: "Parimala and Raol, Tables 3, 4, measurement-level fusion (eq 10) of sensors 1 and 2".into(),
         reading: words(READING_C, &TUNING),
         rows,
         sentence,

@@ -2,7 +2,7 @@
 //!
 //! Runs are independent and seeded by their number; results are gathered in the order of the runs, so that sums do not depend
 //! on the number of threads. Only the four numbers of a run are kept. A run is lost if it ends more than 5 px off the truth;
-//! lost runs are counted and left out of the means, as in the specification's tables.
+//! lost runs are counted and left out of the means, as in the reference's tables.
 
 use super::follow::{Tuning, follow};
 use super::scene_study::{Reading, run_scene};

@@ -1,6 +1,6 @@
-//! Tables of tracking one target: D0 Table 1 (CTUDF), D1 Tables 4.1 and 4.2 (NNKF).
+//! Tables of tracking one target: Roopa et al. 2016, Table 1 (CTUDF), thesis Tables 4.1 and 4.2 (NNKF).
 //!
-//! Source: SPEC L.1-L.3 and `tables.txt`. None of these tables has its tuning printed: the fitted ones of the specification are
+//! Source: `docs/theory/papers.md`. None of these tables has its tuning printed: fitted ones are
 //! used (R in px², q in px²/scan⁴). q/R = 2, 0.2 and 0.1 of Table 4.2 are taken with R = 0.5 and two-point starts.
 
 use super::follow::{StartAt, Tuning};
@@ -13,7 +13,7 @@ use boresight::sim::named::{PAPER_START, paper_scene};
 
 const GOOD: Tuning = Tuning { r: 0.5, q: 1e-5, start: StartAt::KNOWN };
 
-/// D0 Table 1: the U-D filter with target noise Vn = 1..5.
+/// Roopa et al. 2016, Table 1: the U-D filter with target noise Vn = 1..5.
 pub fn ctudf_table_1(options: &Options<'_>) -> Result<Output> {
     let tight = StartAt::State { state: [10.0, 1.0, 10.0, 1.0], variances: (0.05, 50.0) };
     let jobs = [
@@ -24,7 +24,7 @@ pub fn ctudf_table_1(options: &Options<'_>) -> Result<Output> {
     .map(|(reading, tuning)| Job { reading, tuning, filter: FilterKind::Ud });
     let mut sections = jobs.map(|job| Section {
         item: "ctudf-1",
-        title: "D0 Table 1: CTUDF, Vn = standard deviation of the target's pixels".into(),
+        title: "Roopa et al. 2016, Table 1: CTUDF, Vn = standard deviation of the target's pixels".into(),
         reading: words(job.reading, &job.tuning),
         rows: Vec::new(),
         sentence: String::new(),
@@ -50,7 +50,7 @@ pub fn ctudf_table_1(options: &Options<'_>) -> Result<Output> {
     Ok(Output { sections: sections.into(), ..Output::default() })
 }
 
-/// D1 Table 4.1: data set I, without any noise.
+/// Thesis Table 4.1: data set I, without any noise.
 pub fn nnkf_table_41(options: &Options<'_>) -> Result<Output> {
     let scene = paper_scene(&[PAPER_START], (100.0, 0.0), (50.0, 0.0));
     let job = Job { reading: READING_A, tuning: GOOD, filter: FilterKind::Kf };
@@ -62,7 +62,7 @@ pub fn nnkf_table_41(options: &Options<'_>) -> Result<Output> {
     Ok(Output {
         sections: vec![Section {
             item: "nnkf-4.1",
-            title: "D1 Table 4.1: NNKF on data set I, N(100, 0) on N(50, 0)".into(),
+            title: "Thesis Table 4.1: NNKF on data set I, N(100, 0) on N(50, 0)".into(),
             reading: words(READING_A, &GOOD),
             rows,
             sentence: sentence.into(),
@@ -71,7 +71,7 @@ pub fn nnkf_table_41(options: &Options<'_>) -> Result<Output> {
     })
 }
 
-/// D1 Table 4.2: data set II; fitted tunings and a good one.
+/// Thesis Table 4.2: data set II; fitted tunings and a good one.
 pub fn nnkf_table_42(options: &Options<'_>) -> Result<Output> {
     let scene = paper_scene(&[PAPER_START], (100.0, 10.0), (50.0, 50.0));
     let mut jobs = Vec::new();
@@ -93,7 +93,7 @@ pub fn nnkf_table_42(options: &Options<'_>) -> Result<Output> {
         };
         Section {
             item: "nnkf-4.2",
-            title: "D1 Table 4.2 (called 4.3 in its text): NNKF on data set II, N(100, 10²) on N(50, 50²)".into(),
+            title: "Thesis Table 4.2 (called 4.3 in its text): NNKF on data set II, N(100, 10²) on N(50, 50²)".into(),
             reading: words(job.reading, &job.tuning),
             rows,
             sentence: format!("{verdict} The text's RSSPE < 1 px and RSSVE < 0.4 px/scan at all scans holds in {:.0} % of the runs.", 100.0 * small),

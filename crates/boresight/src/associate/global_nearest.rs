@@ -1,6 +1,7 @@
 //! Global nearest neighbour: the one-to-one pairing of least total cost, exact, group by group.
 //!
-//! Source: SPEC D.4: minimise Σ d² over paired + γ (number of unpaired tracks), pairs only with d² ≤ γ.
+//! Source: `docs/theory/association.md`: minimise Σ d² over paired + γ (number of unpaired tracks), pairs only with
+//! d² ≤ γ.
 //! Method: connected groups are solved apart; one track, two tracks and one contested detection in closed form, the rest
 //! by shortest augmenting paths on the sparse graph ([`super::assignment::sparse`]).
 //! Limits: a group so dense that its exact solution would need more than about 10⁹ steps (10⁵ detections in a few pixels)

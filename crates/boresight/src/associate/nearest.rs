@@ -1,6 +1,6 @@
 //! Nearest neighbour: each track takes the gated detection of least cost.
 //!
-//! Source: SPEC D.4 (NNKF: least d², first index on ties).
+//! Source: `docs/theory/association.md` (the thesis' NNKF: least d², first index on ties).
 //! Differs from it with several tracks: by default no detection is used twice; the cheapest pair of all is taken first
 //! (greedy), ties go to the lower track, then the lower detection. `shared = true` lets tracks choose alone, as the paper.
 //! Cost: O(P log P) for P pairs.

@@ -1,8 +1,8 @@
 //! Probabilistic data association: every gated detection counts with the probability that it is the target's own.
 //!
-//! Source: SPEC E (D1 eq. 4.34 corrected): p_i = e_i / (b + Σ e), b = λ √det(2πS) (1 − P_D P_G) / P_D, written here with
-//! densities: p_i ∝ ψ P_D l_i / λ, p_0 ∝ 1 − ψ P_D P_G, the same quotient. With ψ < 1 it is the weight of IPDA.
-//! Tracks do not see each other: two tracks may be corrected by one detection (JPDA mends that).
+//! Source: `docs/theory/association.md` (thesis eq. 4.34, corrected): p_i = e_i / (b + Σ e), b = λ √det(2πS) (1 − P_D
+//! P_G) / P_D, written here with densities: p_i ∝ ψ P_D l_i / λ, p_0 ∝ 1 − ψ P_D P_G, the same quotient. With ψ < 1 it
+//! is the weight of IPDA. Tracks do not see each other: two tracks may be corrected by one detection (JPDA mends that).
 
 use super::{Assignment, Associator, Gates};
 use schemars::JsonSchema;

@@ -1,9 +1,10 @@
 //! Fusion at the level of measurements: one filter takes the reports of several sensors, at their own times, late ones too.
 //!
-//! Source: SPEC G (D3 eq 10): measurements of one time are stacked in the square-root information filter and triangularised once;
-//! every other filter takes them one after the other, which is the same for independent errors (linear Gaussian case).
-//! Late reports: the filter remembers its last steps, goes back before the report's time and runs the rest again: the answer is
-//! that of reports in order, to the bit. Reports older than what is remembered are refused and counted.
+//! Source: `docs/theory/fusion.md` (Parimala and Raol, eq. 10): measurements of one time are stacked in the square-root
+//! information filter and triangularised once; every other filter takes them one after the other, which is the same for
+//! independent errors (linear Gaussian case). Late reports: the filter remembers its last steps, goes back before the
+//! report's time and runs the rest again: the answer is that of reports in order, to the bit. Reports older than what
+//! is remembered are refused and counted.
 //! Symbols: t s, z 2 x 1 px (or m), R 2 x 2. Limits: associations are given; memory of `REMEMBERED` reports.
 
 use crate::Result;

@@ -1,8 +1,8 @@
 //! Track-to-track fusion: two beliefs of one target become one.
 //!
-//! Source: SPEC F (D1 eqs 4.44-4.46, `E-F1`): S = P_i + P_j − C − Cᵀ, W = (P_i − C) S⁻¹, x = x_i + W (x_j − x_i),
-//! P = P_i − W (P_i − C)ᵀ; C = E[e_i e_jᵀ] is zero for independent errors (the papers' form) and not zero where tracks share
-//! process noise or prior (Y. Bar-Shalom, L. Campo, *IEEE Trans. AES* 22, 1986).
+//! Source: `docs/theory/fusion.md` (thesis eqs 4.44-4.46, corrected): S = P_i + P_j − C − Cᵀ, W = (P_i − C) S⁻¹,
+//! x = x_i + W (x_j − x_i), P = P_i − W (P_i − C)ᵀ; C = E[e_i e_jᵀ] is zero for independent errors (the papers' form)
+//! and not zero where tracks share process noise or prior (Y. Bar-Shalom, L. Campo, *IEEE Trans. AES* 22, 1986).
 //! Differs from it: P is summed as V P_i Vᵀ + W P_j Wᵀ + V C Wᵀ + (V C Wᵀ)ᵀ with V = I − W solved for by itself: the same, but no
 //! difference, so that a track of variance 10⁻¹² keeps it beside one of 10¹².
 //! Symbols: x N x 1, P, C, S, W N x N. Units: those of the state. Limits: with independent errors assumed wrongly the result is
@@ -18,7 +18,7 @@ use nalgebra::{SMatrix, SVector};
 /// use boresight::fuse::track_to_track::fuse_independent;
 /// use boresight_filters::Gaussian;
 /// use nalgebra::{Matrix2, Matrix4, Vector4};
-/// // SPEC W6.
+/// // The worked example of docs/theory/fusion.md.
 /// let blocks = |b: Matrix2<f64>| {
 ///     let mut p = Matrix4::zeros();
 ///     p.fixed_view_mut::<2, 2>(0, 0).copy_from(&b);

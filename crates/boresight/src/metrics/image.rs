@@ -1,8 +1,8 @@
 //! How far a filtered image is from the true one: MSE, RMSE, MAE, PFE, SNR, PSNR.
 //!
-//! Source: SPEC B, eqs 4.7-4.12 with its errata. `psnr` is 10 log10(peak² / MSE); `psnr_as_printed` is eq 4.12 as it
-//! stands, too small by 10 log10(n) (`E-B1`). `pfe` takes the Frobenius norm, `pfe_spectral` the largest singular value
-//! as MATLAB's `norm` of a matrix does (`R-PFE`).
+//! Source: `docs/theory/measures.md` (thesis eqs 4.7-4.12, corrected). `psnr` is 10 log10(peak² / MSE);
+//! `psnr_as_printed` is eq 4.12 as it stands, too small by 10 log10(n). `pfe` takes the Frobenius norm, `pfe_spectral`
+//! the largest singular value as MATLAB's `norm` of a matrix does.
 //! Symbols: s truth, y filtered, d = s - y, n pixels. Units: as the pixels; PFE percent; SNR and PSNR dB.
 //! Identical images: all errors 0, SNR and PSNR +inf. An all-zero truth with an error: PFE +inf, SNR -inf.
 //! Cost of `pfe_spectral`: the smaller side squared times the larger, and an eigenvalue problem of the smaller side.
@@ -33,7 +33,7 @@ pub struct ImageMetrics {
 ///
 /// ```
 /// use boresight::{Image, metrics::image::{compare, pfe_spectral}};
-/// // SPEC W9
+/// // The worked example of docs/theory/measures.md.
 /// let s = Image::from_vec(3, 3, vec![10u8, 20, 30, 40, 50, 60, 70, 80, 90]).unwrap();
 /// let y = Image::from_vec(3, 3, vec![11u8, 18, 30, 43, 50, 55, 70, 84, 90]).unwrap();
 /// let m = compare(&s, &y, 255.0)?;
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_fit_error_follows_from_the_signal_to_noise_ratio() {
-        // SPEC B: PFE = 100 * 10^(-SNR / 20).
+        // An identity: PFE = 100 * 10^(-SNR / 20).
         let m = compare(&row(&[10.0, 20.0, 35.0]), &row(&[11.0, 18.5, 35.25]), 255.0).unwrap();
         assert!((m.pfe - 100.0 * 10f64.powf(-m.snr / 20.0)).abs() < 1e-12);
     }

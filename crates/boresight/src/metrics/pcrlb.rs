@@ -55,7 +55,7 @@ pub fn pcrlb<const N: usize, const M: usize>(
 }
 
 /// Bound of the RMSPE over `n_scans` scans of a constant-velocity target without prior knowledge, seen with variance
-/// `r_px2` per axis: √(2 mean r (4k − 2) / (k (k + 1))), px (SPEC section M).
+/// `r_px2` per axis: √(2 mean r (4k − 2) / (k (k + 1))), px (`docs/theory/measures.md`).
 pub fn rmspe_without_prior(r_px2: f64, n_scans: usize) -> f64 {
     let variance = |k: f64| r_px2 * (4.0 * k - 2.0) / (k * (k + 1.0));
     (2.0 * (1..=n_scans).map(|k| variance(k as f64)).sum::<f64>() / n_scans.max(1) as f64).sqrt()

@@ -1,7 +1,7 @@
 //! Errors of state estimates over the scans: PFE, RMSPE, RMSVE, root-sum-square errors, errors against their bounds.
 //!
-//! Source: SPEC section K (the papers' equations with their errata: the denominator of PFE is the norm of the truth; the
-//! printed "/2" under the root was not used for the tables, so it is the `halved` variant).
+//! Source: `docs/theory/measures.md` (the papers' equations, corrected: the denominator of PFE is the norm of the
+//! truth; the printed "/2" under the root was not used for the tables, so it is the `halved` variant).
 //! Symbols: rows `[x, vx, y, vy]` (px, px/s); e = truth − estimate; PFE_x = 100 ‖e_x‖ / ‖x‖ (percent; depends on where the
 //! coordinates begin: the papers count pixels from 1); RMSPE = √mean(e_x² + e_y²), px; RMSVE with velocities, px/s.
 
@@ -37,7 +37,7 @@ fn same_length(truth: &[[f64; 4]], estimate: &[[f64; 4]]) -> Result<()> {
 /// Computes the errors of a run; rows are `[x, vx, y, vy]`.
 ///
 /// ```
-/// // SPEC W10
+/// // The worked example of docs/theory/measures.md.
 /// let truth = [[11.0, 1.0, 11.0, 1.0], [12.0, 1.0, 12.0, 1.0], [13.0, 1.0, 13.0, 1.0]];
 /// let estimate = [[11.2, 1.1, 10.9, 1.0], [12.1, 0.9, 12.3, 1.05], [12.8, 1.0, 13.1, 0.95]];
 /// let e = boresight::metrics::state::state_errors(&truth, &estimate)?;

@@ -1,6 +1,6 @@
 //! How simulated targets move: the exact state `[x, vx, y, vy]` at any sequence of times.
 //!
-//! Constant velocity with white acceleration (SPEC A: X(k+1) = Φ X(k) + G w(k)), coordinated turn, sinusoids about a line,
+//! Constant velocity with white acceleration (X(k+1) = Φ X(k) + G w(k)), coordinated turn, sinusoids about a line,
 //! Singer acceleration (R. A. Singer, *IEEE Trans. AES* 6, 1970: da/dt = -a/τ + white, stationary std σ), way points.
 //! Symbols: t seconds from the scene's start; positions px, velocities px/s. Randomness: stream (Motion, target) of the seed.
 //! Departure: Singer's acceleration is an exact AR(1) on steps of dt/16, its integrals are trapezoids.

@@ -1,10 +1,11 @@
 //! The scenes of the papers by name.
 //!
-//! Source: SPEC A, table of data sets; the papers' world counts pixels from 1 and scans from 1, and scan k shows the start
-//! state after k steps. The conversion is done here and nowhere else: the papers' (11, 11) at scan 1 is (10, 10) in frame 0.
-//! `ds3` is our definition (`R-DS3`): two targets that cross at scan 22.5. `lms-sines` and `lms-singer` are the manoeuvres of
-//! SPEC H (25 frames/s; sines of 40 s and 17 s with 100 px amplitude), drawn as spots. `montecarlo` is the Monte Carlo scene
-//! of the peers' bench (one target of 9 x 9, 150 counts above N(50, 50²)), with a start that the seed draws.
+//! Source: `docs/theory/simulation.md`, table of data sets; the papers' world counts pixels from 1 and scans from 1,
+//! and scan k shows the start state after k steps. The conversion is done here and nowhere else: the papers' (11, 11)
+//! at scan 1 is (10, 10) in frame 0. `ds3` is our definition: two targets that cross at scan 22.5. `lms-sines` and
+//! `lms-singer` are manoeuvres for the LMS filter (25 frames/s; sines of 40 s and 17 s with 100 px amplitude), drawn as
+//! spots. `montecarlo` is the Monte Carlo scene of the peers' bench (one target of 9 x 9, 150 counts above N(50, 50²)),
+//! with a start that the seed draws.
 
 use super::motion::{ConstantVelocity, MotionConfig, Singer, Sinusoid};
 use super::radar_config::{Measures, PositionErrors, RadarConfig};
@@ -86,7 +87,7 @@ pub fn named(name: &str, seed: Seed) -> Result<SceneConfig> {
     })
 }
 
-/// The thesis' ground radar: positions of 2.62 px, one scan a frame (SPEC L.4; its noise is fitted, none is printed).
+/// The thesis' ground radar: positions of 2.62 px, one scan a frame (its noise is fitted, none is printed).
 fn ground_radar(silent_s: &[[f64; 2]]) -> RadarConfig {
     RadarConfig {
         measures: Measures::Position(PositionErrors { std_px: 2.62, bias_px: [0.0; 2] }),

@@ -1,7 +1,7 @@
 //! Seeded randomness: independent streams by name, and white pixel noise at the speed of memory.
 //!
 //! Streams: ChaCha8 keyed by (seed, run), one stream per (purpose, index), so that frame 40 of target 2 draws the same
-//! numbers whatever was drawn before it. Pixel noise of 8-bit frames: the quantised, clamped normal of SPEC A is a
+//! numbers whatever was drawn before it. Pixel noise of 8-bit frames: the quantised, clamped normal is a
 //! distribution over 256 levels, sampled without rounding error by the alias method (A. J. Walker, *Electronics Letters*
 //! 10, 1974; table built as in M. D. Vose, *IEEE Trans. Softw. Eng.* 17, 1991) from the 32-bit words of 16 interleaved
 //! xoshiro128++ generators (D. Blackman, S. Vigna, *ACM Trans. Math. Softw.* 47, 2021), each seeded by ChaCha8.
@@ -75,8 +75,8 @@ impl Seed {
     }
 }
 
-/// Probability of each 8-bit level under `q(mean + std z)`, q = round half up and clamp to 0..=255 (SPEC A step 3).
-/// `std = 0` puts all on one level.
+/// Probability of each 8-bit level under `q(mean + std z)`, q = round half up and clamp to 0..=255
+/// (`docs/theory/image.md`). `std = 0` puts all on one level.
 pub fn level_probabilities(mean: f64, std: f64) -> [f64; 256] {
     let mut p = [0.0; 256];
     if std <= 0.0 {

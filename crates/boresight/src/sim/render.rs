@@ -1,7 +1,8 @@
 //! The papers' synthetic FLIR frame from supplied standard normals.
 //!
-//! Source: SPEC A (D0 eqs 12-16; D1 eqs 4.35-4.39). Target pixels **replace** the background (`E-A3`); "N(m, s)" are standard
-//! deviations (`R-STD`). Symbols: background mean, std (counts); target centre (x, y) px, nx x ny px, mean, std (counts).
+//! Source: `docs/theory/image.md` (Roopa et al. 2016, eqs 12-16). Target pixels **replace** the background; "N(m, s)"
+//! are standard deviations. Symbols: background mean, std (counts); target centre (x, y) px, nx x ny px, mean, std
+//! (counts).
 //! Departure: coordinates here count from 0, centre of the top-left pixel = (0, 0); the papers count from 1.
 //! Limits: a centre between pixels is rounded to the grid, so that a sub-pixel truth has an error of up to half a pixel.
 
@@ -84,7 +85,7 @@ mod tests {
 
     #[test]
     fn a_nine_by_nine_target_at_the_papers_sixty_ends_at_the_last_column() {
-        // SPEC R-COORD: centre 60 (from 1) covers 56..64, that is 55..=63 from 0.
+        // docs/theory/image.md: centre 60 (from 1) covers 56..64, that is 55..=63 from 0.
         assert_eq!(first_pixel(59.0, 9), 55);
         assert_eq!(clip(first_pixel(59.0, 9), 9, 64), Some((55, 0, 9)));
     }

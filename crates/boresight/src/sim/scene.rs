@@ -1,8 +1,9 @@
 //! What a simulated scene is made of: frame, targets, background, sensor, clock; read from TOML.
 //!
-//! Source: SPEC A for the papers' scenes; the rest is the usual model of an imaging sensor (optics blur, shot noise, fixed
-//! pattern, read noise, dead pixels, salt and pepper, saturation, rounding). Order of a frame: background, targets in order,
-//! occluders, blur, shot noise, fixed pattern, read noise, dead pixels, salt and pepper, clamp and round.
+//! Source: `docs/theory/simulation.md` for the papers' scenes; the rest is the usual model of an imaging sensor (optics
+//! blur, shot noise, fixed pattern, read noise, dead pixels, salt and pepper, saturation, rounding). Order of a frame:
+//! background, targets in order, occluders, blur, shot noise, fixed pattern, read noise, dead pixels, salt and pepper,
+//! clamp and round.
 //! Units: px, s, counts. Coordinates: (x, y) = (column, row), centre of the top-left pixel = (0, 0).
 
 use super::motion::MotionConfig;
@@ -275,7 +276,7 @@ pub struct Sensor {
     pub gain_std: f64,
     /// Share of dead pixels (always 0), 0..=1.
     pub dead_share: f64,
-    /// Share of pixels set to 0 or to full scale in each frame (half each, SPEC B 4.4), 0..=1.
+    /// Share of pixels set to 0 or to full scale in each frame (half each), 0..=1.
     pub salt_pepper_share: f64,
     /// Value at which pixels saturate, counts; none (the default) means 2^bits - 1.
     pub saturation: Option<f64>,

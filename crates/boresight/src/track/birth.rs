@@ -1,8 +1,8 @@
 //! Starts of tracks from detections that no track took: from one point, from two points, or within velocity bounds.
 //!
-//! Source: two points SPEC D.5 (5): x = [z, Δz/T], P = R[[1, 1/T], [1/T, 2/T²]] per axis; with a covariance of its own on
-//! each point this is cov(z₂) = R₂, cov(z₂, v) = R₂/T, cov(v) = (R₁ + R₂)/T². One point: velocity unknown within bounds,
-//! its variance that of a uniform density.
+//! Source: two points `docs/theory/track-management.md`: x = [z, Δz/T], P = R[[1, 1/T], [1/T, 2/T²]] per axis; with a
+//! covariance of its own on each point this is cov(z₂) = R₂, cov(z₂, v) = R₂/T, cov(v) = (R₁ + R₂)/T². One point:
+//! velocity unknown within bounds, its variance that of a uniform density.
 //! Symbols: T time between the points, s; R measurement covariance, px².
 
 use crate::Result;
@@ -49,7 +49,7 @@ impl Default for OnePointConfig {
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct TwoPointConfig {
     /// Standard deviation of the targets' velocities per axis, px/s, above 0, if it is known: starts are then surer and
-    /// better told from clutter. Left out: nothing is known but the largest speed (SPEC D.5).
+    /// better told from clutter. Left out: nothing is known but the largest speed.
     pub velocity_std_px_per_s: Option<f64>,
 }
 

@@ -1,8 +1,9 @@
 //! The correction of one track by what was associated with it, and what the scan says of its existence.
 //!
-//! Source: SPEC D.1, E. Λ of a hard choice is P_D l / λ, of a miss 1 − P_D P_G; of soft weights (JIPDA, D. Mušicki,
-//! R. Evans, IEEE Trans. AES 40, 2004) it follows from β₀, the probability that no detection is the target's:
-//! ψ ← β₀ ψ (1 − P_D P_G) / (1 − ψ P_D P_G) + (1 − β₀), weights given existence β_j / ψ.
+//! Source: `docs/theory/filters.md`, `docs/theory/association.md`. Λ of a hard choice is P_D l / λ, of a miss 1 − P_D
+//! P_G; of soft weights (JIPDA, D. Mušicki, R. Evans, IEEE Trans. AES 40, 2004) it follows from β₀, the probability
+//! that no detection is the target's: ψ ← β₀ ψ (1 − P_D P_G) / (1 − ψ P_D P_G) + (1 − β₀), weights given existence
+//! β_j / ψ.
 
 use super::config::TrackerConfig;
 use super::gating::{Predicted, ScanTable, innovation_cov, normalised_square};
@@ -107,7 +108,7 @@ impl Scratch {
         if track.belief.update(&self.weighted).is_err() {
             return missed;
         }
-        // With M-of-N any gated detection is a hit (SPEC D.5); else the target was seen if that is likelier than not.
+        // With M-of-N any gated detection is a hit; else the target was seen if that is likelier than not.
         let hit = matches!(config.life, LifeConfig::MOfN(_)) || seen >= 0.5;
         if hit {
             track.seen(&scan.detections[best.detection as usize], &table.noise(best.detection), config.look_gain);

@@ -1,6 +1,6 @@
 //! Cues: targets known before the first scan become confirmed tracks at once.
 //!
-//! Source: our own; the papers' trackers start from a known state (SPEC D.6). A cue is a state with its standard deviations some
+//! Source: our own; the papers' trackers start from a known state. A cue is a state with its standard deviations some
 //! time before the first scan (an operator's designation, a radar's hand-over); it is predicted to the first scan and then lives
 //! like any confirmed track: gated, corrected, coasting, deleted.
 //! Symbols: state `[x, vx, y, vy]` px, px/s. Limits: the plain tracker only, not multiple hypotheses; errors of a cue are taken as

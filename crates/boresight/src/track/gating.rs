@@ -1,6 +1,6 @@
 //! From predicted tracks and a scan to the sparse table of pairs that are near.
 //!
-//! Source: SPEC D.4: d² = νᵀ S⁻¹ ν ≤ γ, S = H P Hᵀ + R, with the R of each detection.
+//! Source: `docs/theory/association.md`: d² = νᵀ S⁻¹ ν ≤ γ, S = H P Hᵀ + R, with the R of each detection.
 //! Method: a grid over the detections hands out candidates in the rectangle that holds the gate's ellipse (pre-gate); the
 //! ellipse decides. A gate that has grown while its track coasted is cut to what the largest speed allows.
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections

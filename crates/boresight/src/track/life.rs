@@ -1,8 +1,9 @@
 //! The life of a track: tentative, confirmed, deleted; by counting, by a sequential test, or by existence probability.
 //!
-//! Source: M-of-N SPEC D.5 (4); score: S. S. Blackman, R. Popoli, *Design and Analysis of Modern Tracking Systems*, 1999,
-//! ch. 6 (Wald's sequential probability ratio test); existence: D. Mušicki, R. Evans, S. Stanković, "Integrated
-//! probabilistic data association", IEEE Trans. Automatic Control 39, 1994 (Markov chain one).
+//! Source: M-of-N `docs/theory/track-management.md`; score: S. S. Blackman, R. Popoli, *Design and Analysis of Modern
+//! Tracking Systems*, 1999, ch. 6 (Wald's sequential probability ratio test); existence: D. Mušicki, R. Evans,
+//! S. Stanković, "Integrated probabilistic data association", IEEE Trans. Automatic Control 39, 1994 (Markov chain
+//! one).
 //! Symbols: Λ likelihood ratio of this scan, target against none (no unit); ψ existence probability.
 //! Limits: M-of-N windows of at most 64 scans. A confirmed track also ends when its coasting budget (s) is over.
 

@@ -1,7 +1,7 @@
 //! One stage of association: some of the tracks against the detections still free.
 //!
-//! Source: SPEC D.5 (2), (3). Rows are tracks in ascending order; detections taken by an earlier stage are not seen.
-//! In soft stages (PDA and its kin) all gated detections count as used, as SPEC D.5 says.
+//! Source: `docs/theory/track-management.md`, steps 2 and 3. Rows are tracks in ascending order; detections taken by an
+//! earlier stage are not seen. In soft stages (PDA and its kin) all gated detections count as used.
 
 use super::clutter::Clutter;
 use super::config::TrackerConfig;

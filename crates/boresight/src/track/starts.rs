@@ -1,8 +1,8 @@
 //! Starting tracks from the detections that no track took.
 //!
-//! Source: SPEC D.5 (5): each left-over of the scan before, in order, with the nearest left-over of this scan that a
-//! target can have reached. With a known spread of velocities the second point corrects a one-point start instead, and
-//! its likelihood under that start says how much likelier a target is than clutter.
+//! Source: `docs/theory/track-management.md`: each left-over of the scan before, in order, with the nearest left-over
+//! of this scan that a target can have reached. With a known spread of velocities the second point corrects a one-point
+//! start instead, and its likelihood under that start says how much likelier a target is than clutter.
 //! Limits: at most `max_tracks` tracks; at most 4096 candidates are looked at for each left-over.
 
 use super::birth::{BirthConfig, from_one_point, from_two_points};

@@ -1,6 +1,7 @@
 //! The tracker: predict, gate, associate, update, live, start; one scan at a time.
 //!
-//! Source: SPEC D.5. Confirmed tracks choose first, tentative ones among what is left, what is left then starts tracks.
+//! Source: `docs/theory/track-management.md`. Confirmed tracks choose first, tentative ones among what is left, what is
+//! left then starts tracks.
 //! Method: tracks lie in one vector in the order of their ids; every pass runs through it from front to back. All scratch
 //! memory is kept, so a step allocates nothing once the largest scan was seen. A step is refused as a whole before
 //! anything changes. Ids are never used twice.

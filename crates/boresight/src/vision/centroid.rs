@@ -1,7 +1,7 @@
 //! Centroids of regions, each with the covariance that the noise of its pixels gives it.
 //!
-//! Source: SPEC C.6 (mask, binary, bbox): c = Σ w p / Σ w with w = s (I - b). The covariance is ours; it adds three parts.
-//! Inside: first-order propagation, Σ σ² (p - c)(p - c)ᵀ / (Σ w)².
+//! Source: `docs/theory/centroid.md` (mask, binary, bbox): c = Σ w p / Σ w with w = s (I - b). The covariance is ours;
+//! it adds three parts. Inside: first-order propagation, Σ σ² (p - c)(p - c)ᵀ / (Σ w)².
 //! Edge: noise and the pixel grid decide which pixels pass the threshold T. With the width δ = σ / slope over which
 //! the edge is undecided (px), a pixel of the edge adds the variance of f = (v - b)[v >= T], per length of edge
 //! δ (J²/√π + Jσ + A₁σ²), and the grid J² Q(δ) per row or column crossed; J = T - b, A₁ = ∫ Var(X⁺) - 1(u > 0) du = -0.3761 for

@@ -1,9 +1,9 @@
 //! Clusters of set pixels by proximity distance d_p, from rows of bits, without a label or mask image.
 //!
-//! Source: SPEC C.3 (single linkage: two set pixels are linked iff their Euclidean distance is < d_p, or <= d_p).
-//! A row becomes runs. Row offset dy is reached by horizontal distances up to `reach[dy]`, so two runs are linked iff the
-//! gap between them is at most that reach; runs are joined by union-find, their moments added as they come.
-//! Distances are compared as correctly rounded square roots, so d_p = √2 given as the nearest f64 means √2.
+//! Source: `docs/theory/segmentation.md` (single linkage: two set pixels are linked iff their Euclidean distance is <
+//! d_p, or <= d_p). A row becomes runs. Row offset dy is reached by horizontal distances up to `reach[dy]`, so two runs
+//! are linked iff the gap between them is at most that reach; runs are joined by union-find, their moments added as
+//! they come. Distances are compared as correctly rounded square roots, so d_p = √2 given as the nearest f64 means √2.
 //! Symbols: d_p proximity distance (px); reach\[dy\] whole px. Cost: one pass over the runs per reached row offset.
 //! Regions come out in raster order of their first pixel: the smaller number wins a union, and numbers are given in raster order.
 
@@ -210,7 +210,7 @@ impl Clusterer {
 
 /// Returns the regions of the pixels with `low` <= value <= `high` of a whole image.
 ///
-/// SPEC, worked example W5 (its coordinates count from 1):
+/// The worked example of `docs/theory/segmentation.md` (its coordinates count from 1):
 /// ```
 /// use boresight::{Image, vision::cluster::segment};
 /// use boresight::vision::{config::{CentroidMethod, ClusterConfig}, centroid::{Surroundings, centroid}};
@@ -316,7 +316,7 @@ mod tests {
 
     #[test]
     fn the_reach_gives_the_neighbour_sets_of_the_specification() {
-        // SPEC C.3: neighbours of one pixel for each range of d_p.
+        // docs/theory/segmentation.md: neighbours of one pixel for each range of d_p.
         let count = |d: f64, inclusive: bool| {
             let r = reaches(d, inclusive);
             let all: u32 = r.iter().enumerate().map(|(dy, &h)| (2 * h + 1) * if dy == 0 { 1 } else { 2 }).sum();

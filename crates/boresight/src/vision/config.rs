@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn absent_area_limits_follow_from_the_targets_size() {
-        // SPEC C.5: a 9 x 9 target keeps 29..=129 pixels.
+        // docs/theory/segmentation.md: a 9 x 9 target keeps 29..=129 pixels.
         let config = ClusterConfig { target_size_px: Some([9.0, 9.0]), ..Default::default() };
         assert_eq!(config.area_limits(), (29, 129));
         assert_eq!(ClusterConfig::default().area_limits(), (1, u32::MAX));

@@ -1,9 +1,10 @@
 //! Likelihood-ratio detector: box sums of the log-likelihood ratio of quantised pixel levels.
 //!
-//! Source: SPEC J. ℓ(g) = ln P_t(g) - ln P_b(g) with P(g) = Φ((g+½-μ)/σ) - Φ((g-½-μ)/σ), the tails lumped into the first and last
-//! level; score(position) = Σ ℓ over the target's window wholly inside the image; posterior = softmax(score).
-//! It uses the target's variance as well as its mean, which a band cannot. Limits: a rectangular target on the pixel grid,
-//! pixels independent; probabilities below 2e-308 count as that, so that no score is infinite.
+//! Source: `docs/theory/likelihood-ratio.md`. ℓ(g) = ln P_t(g) - ln P_b(g) with P(g) = Φ((g+½-μ)/σ) - Φ((g-½-μ)/σ), the
+//! tails lumped into the first and last level; score(position) = Σ ℓ over the target's window wholly inside the image;
+//! posterior = softmax(score). It uses the target's variance as well as its mean, which a band cannot. Limits: a
+//! rectangular target on the pixel grid, pixels independent; probabilities below 2e-308 count as that, so that no score
+//! is infinite.
 //! Symbols: μ, σ mean and standard deviation (counts); g level (counts). Cost: 4 additions a pixel.
 
 use super::pixel::Pixel;

@@ -1,8 +1,9 @@
 //! Noise put on images to test filters: salt and pepper, and Gaussian.
 //!
-//! Source: SPEC B, eqs 4.4 and 4.5-4.6. The generators take the random numbers (uniforms in [0, 1), standard normals), so
-//! that results can be checked against any other program; the seeded forms draw them from ChaCha8, the same on every
-//! machine. Gaussian noise is added without clamping, so its result is a float image; quantise it as the scene needs.
+//! Source: `docs/theory/image.md` (thesis eqs 4.4-4.6). The generators take the random numbers (uniforms in [0, 1),
+//! standard normals), so that results can be checked against any other program; the seeded forms draw them from
+//! ChaCha8, the same on every machine. Gaussian noise is added without clamping, so its result is a float image;
+//! quantise it as the scene needs.
 
 use crate::{Error, ErrorKind, Image, Result};
 use rand::{RngExt, SeedableRng};

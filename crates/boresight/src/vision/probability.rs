@@ -1,8 +1,9 @@
 //! How likely a pixel passes a band, the range of d_p that follows, and a band proposed from what target and surroundings show.
 //!
-//! Source: SPEC C.2 (eq. 4.14) and C.4 (eq. 4.15). Symbols: p_t, p_v share of target and background pixels inside the band;
-//! d_p proximity distance (px), which should lie between √(1/p_t) (else the target falls apart) and √(1/p_v) (else clutter
-//! grows together). Proposal: the contiguous band with the largest p_t - p_v of the two histograms (exact, one pass).
+//! Source: `docs/theory/segmentation.md` (thesis eqs 4.14, 4.15). Symbols: p_t, p_v share of target and background
+//! pixels inside the band; d_p proximity distance (px), which should lie between √(1/p_t) (else the target falls apart)
+//! and √(1/p_v) (else clutter grows together). Proposal: the contiguous band with the largest p_t - p_v of the two
+//! histograms (exact, one pass).
 
 use super::pixel::Pixel;
 use crate::{Error, ErrorKind, Image, Result};
@@ -190,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_distance_outside_the_range_is_warned_of() {
-        // SPEC C.4: data set II allows 1.2103 to 3.2144.
+        // docs/theory/segmentation.md: data set II allows 1.2103 to 3.2144.
         assert_eq!(distance_warning(2.0, 0.682689, 0.096786), None);
         assert!(distance_warning(1.2, 0.682689, 0.096786).unwrap().contains("below the range 1.21 to 3.21 px"));
         assert!(distance_warning(3.3, 0.682689, 0.096786).unwrap().contains("above the range"));

@@ -1,8 +1,8 @@
 //! Track before detect: a density over positions and velocities on the pixel grid, fed with likelihood-ratio scores.
 //!
-//! Source: SPEC J. Per frame: each velocity component changes by one with probability p_v/2 each way (reflected at the ends; y
-//! first, then x), positions move by the velocity (what leaves the grid is lost), the density is multiplied by
-//! exp(score - max), a floor of 1e-12 / size of the total is added, and it is normalised.
+//! Source: `docs/theory/likelihood-ratio.md`. Per frame: each velocity component changes by one with probability p_v/2
+//! each way (reflected at the ends; y first, then x), positions move by the velocity (what leaves the grid is lost),
+//! the density is multiplied by exp(score - max), a floor of 1e-12 / size of the total is added, and it is normalised.
 //! It holds one target that no single frame shows. Limits: one target; whole-pixel velocities; memory and time
 //! proportional to positions x (2v+1)². Symbols: v largest velocity component (px/frame); p_v probability of a velocity change.
 

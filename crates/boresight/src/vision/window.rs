@@ -1,7 +1,8 @@
 //! The box of a dark target and the window to look for it in the next frame.
 //!
-//! Source: SPEC I.2, I.3, I.6 (0-based pixels). One stray dark pixel ruins a box that is taken over a whole frame, so the
-//! box is taken inside a window around the predicted centre. Δ = d(t-1) - d(t-2), the last displacement per axis.
+//! Source: `docs/theory/segmentation.md` (F. Cai, J. Cui 2014, corrected). One stray dark pixel ruins a box that is
+//! taken over a whole frame, so the box is taken inside a window around the predicted centre. Δ = d(t-1) - d(t-2), the
+//! last displacement per axis.
 
 use super::pixel::Pixel;
 use super::probability::PixelRect;
@@ -100,7 +101,7 @@ impl FollowConfig {
 
 /// Keeps of each frame's detections the largest whose box reaches into the search window.
 ///
-/// The place is predicted with the last displacement (SPEC I.5: coordinates extrapolated by `[2 -1]`).
+/// The place is predicted with the last displacement (coordinates extrapolated by `[2 -1]`).
 #[derive(Clone, Debug)]
 pub struct Follower {
     config: FollowConfig,

@@ -2,6 +2,7 @@
 
 mod auto_real;
 mod background;
+mod citations;
 mod colour_real;
 mod fuse;
 mod fuse_real;

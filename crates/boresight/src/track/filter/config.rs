@@ -19,18 +19,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FilterConfig {
-    /// Kalman filter in covariance form, Joseph update (Kalman 1960; SPEC D.1): the default. Exact for linear models in
+    /// Kalman filter in covariance form, Joseph update (Kalman 1960): the default. Exact for linear models in
     /// f64 and the fastest: without options it is kept in place in the track.
     Kf(FormConfig),
     /// Kalman filter with the short update P - K H P: to compare with. Saves little and loses digits first.
     KfShort(FormConfig),
-    /// U-D factors P = U D Uᵀ (Bierman 1977, Thornton 1976; SPEC D.2-3): the covariance cannot lose its sign. For tiny
+    /// U-D factors P = U D Uᵀ (Bierman 1977, Thornton 1976): the covariance cannot lose its sign. For tiny
     /// measurement noise beside a large first uncertainty, and as the papers' CTUDF.
     Ud(FormConfig),
-    /// Square-root information filter by Householder reflections (Bierman 1977; SPEC G): best conditioned, works without
+    /// Square-root information filter by Householder reflections (Bierman 1977): best conditioned, works without
     /// process noise; as the papers' CTSRIF.
     Srif(FormConfig),
-    /// Square-root information filter with the fuzzy-logic correlator (CTFSRIF; SPEC G.1): the papers' filter for
+    /// Square-root information filter with the fuzzy-logic correlator (CTFSRIF; Parimala, Raol): the papers' filter for
     /// heavy-tailed centroids; its memberships and rules can be replaced.
     FuzzySrif(FuzzySrifConfig),
     /// Information filter P⁻¹, P⁻¹x (Maybeck 1979): measurements add up cheaply; for many sensors, few readings.
@@ -58,13 +58,13 @@ pub enum FilterConfig {
     /// Interacting multiple models (Blom, Bar-Shalom 1988): a quiet and a manoeuvring filter of any form side by side,
     /// weighed by likelihood. For straight flight with bouts of manoeuvre.
     Imm(ImmConfig),
-    /// Time-varying Kalman filter with learnt acceleration weights (Obolensky, Erdogmus, Principe; SPEC H): guarded by
+    /// Time-varying Kalman filter with learnt acceleration weights (Obolensky, Erdogmus, Principe 2002): guarded by
     /// default; as printed on request, which diverges (a track whose filter does keeps its last state until it ends).
     Lms(LmsConfig),
-    /// Scalar AR(1) recursion of each coordinate (Cai, Cui; SPEC I.4): the paper's baseline. Lags a steady motion and
+    /// Scalar AR(1) recursion of each coordinate (Cai, Cui 2014): the paper's baseline. Lags a steady motion and
     /// depends on the origin: to compare with.
     Ar1(Ar1Config),
-    /// Coordinate now and one frame before, [2 -1; 1 0] (Cai, Cui; SPEC I.5): straight-line extrapolation with two states
+    /// Coordinate now and one frame before, [2 -1; 1 0] (Cai, Cui 2014): straight-line extrapolation with two states
     /// an axis, without the faults of `ar1`.
     Displacement(DisplacementConfig),
 }

@@ -1,9 +1,10 @@
 //! Constant-velocity Kalman filter of one track with the structure of the model used: no heap, 15 numbers.
 //!
-//! Source: SPEC D.1 (prediction with G Q Gᵀ, Joseph update), SPEC E for several weighted detections.
+//! Source: `docs/theory/filters.md` (prediction with G Q Gᵀ, Joseph update), `docs/theory/association.md` for weighted
+//! detections.
 //! Method: the covariance is kept as two axis blocks and their coupling; while every measurement covariance is diagonal
 //! the axes stay independent and a step is two 2x2 filters. Several hypotheses: each is corrected by itself and the
-//! mixture is matched in mean and covariance, which is SPEC E when all share one R.
+//! mixture is matched in mean and covariance, which is PDA's update when all share one R.
 //! Symbols: state `[x, vx, y, vy]` (px, px/s); q acceleration variance, px²/s⁴; r measurement variance, px².
 //! Limits: linear, constant velocity with piecewise-constant acceleration over each dt.
 

@@ -108,7 +108,7 @@ impl Default for StudentTConfig {
     }
 }
 
-/// Scales, memberships and rules of the fuzzy-logic correlator (SPEC G.1); everything can be replaced.
+/// Scales, memberships and rules of the fuzzy-logic correlator; everything can be replaced.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CorrelatorConfig {

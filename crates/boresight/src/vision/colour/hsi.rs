@@ -1,6 +1,6 @@
 //! Grey, hue, saturation and intensity of a colour, and how far two colours are apart.
 //!
-//! Source: SPEC I.1 (BT.601 in integers, bit for bit OpenCV's 8-bit conversion) and I.7 (`R-HSI`).
+//! Source: `docs/theory/segmentation.md` (BT.601 in integers, bit for bit OpenCV's 8-bit conversion).
 //! Symbols: I = (R + G + B) / 3 in 0..1; S = 1 - min / I; H in degrees, 0 <= H < 360, 0 where undefined (greys).
 //! D² = (dH / 180)² + (dS / 2)², dH circular; intensity is left out.
 
@@ -58,7 +58,7 @@ pub fn hsi([r, g, b]: [u8; 3]) -> Hsi {
     Hsi { hue_deg: if b <= g { theta } else { 360.0 - theta }, saturation, intensity }
 }
 
-/// The colour distance D (no unit) of SPEC I.7.
+/// The colour distance D (no unit) of `docs/theory/segmentation.md`.
 pub fn distance(a: &Hsi, b: &Hsi) -> f64 {
     let turn = (a.hue_deg - b.hue_deg).abs();
     let hue = turn.min(360.0 - turn) / 180.0;

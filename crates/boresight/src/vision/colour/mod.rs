@@ -1,8 +1,8 @@
 //! Targets told by their colour: grey and HSI of a colour, pixels that match a reference, and the choice of a reference.
 //!
-//! Source: SPEC I.1, I.7. [`ColourMatch`] gives one bit a pixel of an RGB frame, exactly where [`distance`] and the
-//! saturation say match, at a few operations a pixel: the comparison of angles is done by their cosines in single
-//! precision, and the few pixels that lie too near a limit to be sure are computed in full.
+//! Source: `docs/theory/segmentation.md`. [`ColourMatch`] gives one bit a pixel of an RGB frame, exactly where
+//! [`distance`] and the saturation say match, at a few operations a pixel: the comparison of angles is done by their
+//! cosines in single precision, and the few pixels that lie too near a limit to be sure are computed in full.
 
 mod hsi;
 mod mask;

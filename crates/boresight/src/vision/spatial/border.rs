@@ -1,7 +1,7 @@
 //! What lies outside an image: border rules and a ring of padded rows for filters that walk down an image.
 //!
-//! Source: SPEC B (`R-BORDER`). `zero`: 0 outside; `replicate`: the nearest edge pixel; `reflect`: mirrored with the edge
-//! pixel repeated (d c b a | a b c d | d c b a), as often as the window needs.
+//! Source: `docs/theory/image.md`. `zero`: 0 outside; `replicate`: the nearest edge pixel; `reflect`: mirrored with the
+//! edge pixel repeated (d c b a | a b c d | d c b a), as often as the window needs.
 //! Symbols: r radius of the window, px; n = 2r + 1. Limits: any image size from 1x1 on, any radius. No allocation once
 //! the ring has seen an image of the size.
 

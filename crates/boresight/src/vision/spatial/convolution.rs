@@ -1,7 +1,8 @@
 //! Convolution with any odd n x n kernel: y(i, j) = Σ h(a, b) x(i - a, j - b), the kernel turned round.
 //!
-//! Source: SPEC B, eq 4.1: a true convolution (a correlation has x(i + a, j + b)). Sums in f64; integer results round to
-//! the nearest, half away from zero, and saturate. Limits: n odd, up to [`super::MAX_SIZE_PX`]; finite weights.
+//! Source: `docs/theory/image.md` (thesis eq. 4.1): a true convolution (a correlation has x(i + a, j + b)). Sums in
+//! f64; integer results round to the nearest, half away from zero, and saturate. Limits: n odd, up to
+//! [`super::MAX_SIZE_PX`]; finite weights.
 
 use super::border::{Border, RowRing};
 use super::check_size;

@@ -1,6 +1,7 @@
 //! The spatial filters in f64, without rounding: for references, golden vectors and measurements of the fast forms.
 //!
-//! Source: SPEC B. Written the plain way; the fast forms must agree with these after rounding. They allocate their result.
+//! Source: `docs/theory/image.md`. Written the plain way; the fast forms must agree with these after rounding. They
+//! allocate their result.
 
 use super::convolution::{Kernel, each_row};
 use super::{Border, MAX_SIGMA_PX, SpatialPixel, check_sigma, check_size, gaussian};
@@ -13,7 +14,7 @@ use crate::{Image, Result};
 /// let s = Image::from_vec(3, 3, vec![10u8, 20, 30, 40, 50, 60, 70, 80, 90]).unwrap();
 /// let zero = mean_exact(&s, 3, Border::Zero)?;
 /// let w9 = [13.333333333333, 23.333333333333, 17.777777777778, 30.0, 50.0, 36.666666666667, 26.666666666667, 43.333333333333, 31.111111111111];
-/// assert!(zero.as_slice().iter().zip(w9).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-12)); // SPEC W9
+/// assert!(zero.as_slice().iter().zip(w9).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-12)); // docs/theory/image.md
 /// # Ok::<(), boresight::Error>(())
 /// ```
 /// # Errors
@@ -38,7 +39,7 @@ pub fn median_exact<T: SpatialPixel>(src: &Image<T>, size: usize, border: Border
     }))
 }
 
-/// Convolution with a kernel (SPEC eq 4.1), unrounded.
+/// Convolution with a kernel, unrounded.
 pub fn convolve_exact<T: SpatialPixel>(src: &Image<T>, kernel: &Kernel, border: Border) -> Image<f64> {
     let mut out = Image::filled(src.width(), src.height(), 0.0);
     each_row(src, kernel, border, |y, sum| out.row_mut(y).copy_from_slice(sum));

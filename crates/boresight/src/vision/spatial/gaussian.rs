@@ -1,9 +1,9 @@
 //! Gaussian filter: two one-dimensional passes, down the columns and along the row.
 //!
-//! Source: SPEC B, eq 4.1, with the sampled Gaussian h(i) ∝ exp(-i² / (2 sigma²)), |i| <= r = floor(4 sigma + 1/2), summing
-//! to 1 (the same truncation as SciPy's `gaussian_filter`). Single precision inside: against the exact result, u8 may
-//! differ by one count where that lies within 1e-4 of a tie, u16 within 0.05; f32 within 1e-6 of the window's maximum.
-//! Symmetric pixels are added first, so a window of n costs (n + 1) / 2 products a pass.
+//! Source: `docs/theory/image.md`, with the sampled Gaussian h(i) ∝ exp(-i² / (2 sigma²)), |i| <= r = floor(4
+//! sigma + 1/2), summing to 1 (the same truncation as SciPy's `gaussian_filter`). Single precision inside: against the
+//! exact result, u8 may differ by one count where that lies within 1e-4 of a tie, u16 within 0.05; f32 within 1e-6 of
+//! the window's maximum. Symmetric pixels are added first, so a window of n costs (n + 1) / 2 products a pass.
 
 use super::border::{Border, RowRing};
 use super::pixel::SpatialPixel;

@@ -1,10 +1,11 @@
 //! Mean of an n x n window: column sums that run down the image, then the sum of n neighbouring columns.
 //!
-//! Source: SPEC B, eq 4.2. Integers: column sums are updated by the row that enters and the row that leaves; u8 up to
-//! 15x15 stays in 16-bit lanes (15² * 255 < 2¹⁶), the rest in 32 bits; the result is the nearest integer (n² is odd, so
-//! there are no ties: OpenCV's `blur` gives the same). f32: summed afresh in f64, rounded once, so that one NaN or
-//! infinity spoils its own windows only. The sums are padded, not the pixels: a padded column is a copy of another.
-//! The sum of n neighbours: n additions up to 5; above, doubling (1, 2, 4, ... columns) or, in 32 bits, a running sum.
+//! Source: `docs/theory/image.md` (thesis eq. 4.2). Integers: column sums are updated by the row that enters and the
+//! row that leaves; u8 up to 15x15 stays in 16-bit lanes (15² * 255 < 2¹⁶), the rest in 32 bits; the result is the
+//! nearest integer (n² is odd, so there are no ties: OpenCV's `blur` gives the same). f32: summed afresh in f64,
+//! rounded once, so that one NaN or infinity spoils its own windows only. The sums are padded, not the pixels: a padded
+//! column is a copy of another. The sum of n neighbours: n additions up to 5; above, doubling (1, 2, 4, ... columns)
+//! or, in 32 bits, a running sum.
 
 use super::border::Border;
 use super::pixel::SpatialPixel;

@@ -1,9 +1,10 @@
 //! Median of an n x n window: networks of minima and maxima for 3x3 and 5x5, bisection up to 15x15, histograms beyond.
 //!
-//! Source: SPEC B (n odd, so the median is a pixel of the window). 3x3 and 5x5: see [`super::network`]; columns are sorted
-//! once and padded after sorting, which is the same as padding the pixels. Bisection: the median's key is built from
-//! its highest bit down; a bit is set if at most half the window lies below; one register of pixels counts at a time,
-//! with no branch: n² * bits / lanes operations a pixel. Above 15x15 for u8: [`super::median_histogram`].
+//! Source: `docs/theory/image.md` (n odd, so the median is a pixel of the window). 3x3 and 5x5: see [`super::network`];
+//! columns are sorted once and padded after sorting, which is the same as padding the pixels. Bisection: the median's
+//! key is built from its highest bit down; a bit is set if at most half the window lies below; one register of pixels
+//! counts at a time, with no branch: n² * bits / lanes operations a pixel. Above 15x15 for u8:
+//! [`super::median_histogram`].
 
 use super::border::{Border, RowRing};
 use super::median_histogram::Histograms;

@@ -1,9 +1,9 @@
 //! Spatial filters: mean, median and Gaussian, n x n, for u8, u16 and f32 frames; general convolution; exact f64 twins.
 //!
-//! Source: SPEC B. A filter is configured by [`SpatialConfig`] and run by [`SpatialFilter`], which keeps the rows of the
-//! window, so that a frame allocates nothing and can be filtered row by row, straight into a threshold.
-//! Rounding: integer results round to the nearest (a mean over an odd number of pixels has no ties, so this is what
-//! OpenCV's `blur` gives); f32 means are summed in f64. Median of f32: by the total order of IEEE 754.
+//! Source: `docs/theory/image.md`. A filter is configured by [`SpatialConfig`] and run by [`SpatialFilter`], which
+//! keeps the rows of the window, so that a frame allocates nothing and can be filtered row by row, straight into a
+//! threshold. Rounding: integer results round to the nearest (a mean over an odd number of pixels has no ties, so this
+//! is what OpenCV's `blur` gives); f32 means are summed in f64. Median of f32: by the total order of IEEE 754.
 //! Limits: odd sizes 1 to 255 px (a size above the image's is fine), sigma up to 50 px.
 
 mod border;
@@ -128,7 +128,7 @@ fn check_sigma(sigma_px: f64, at: &str) -> Result<()> {
 /// let mut filter = SpatialFilter::new(SpatialConfig::Median(WindowConfig::default()))?;
 /// let mut out = Image::default();
 /// filter.apply(&frame, &mut out);
-/// assert_eq!(out.as_slice(), [20, 30, 30, 40, 50, 60, 70, 70, 80]); // SPEC W9: median, replicate
+/// assert_eq!(out.as_slice(), [20, 30, 30, 40, 50, 60, 70, 70, 80]); // docs/theory/image.md: median, replicate
 /// # Ok::<(), boresight::Error>(())
 /// ```
 #[derive(Clone, Debug)]

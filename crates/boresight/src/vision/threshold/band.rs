@@ -1,4 +1,4 @@
-//! Band threshold: pixel is target iff low <= I <= high (SPEC C.1, eq. 4.13); a fixed level is a band with one open end.
+//! Band threshold: pixel is target iff low <= I <= high (thesis eq. 4.13); a fixed level is a band with one open end.
 //!
 //! Bits, not bytes, leave this file: bit `x % 64` of word `x / 64` is pixel `x`; bits past the width are 0.
 

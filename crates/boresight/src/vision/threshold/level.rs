@@ -1,4 +1,5 @@
-//! A band or a fixed level over a whole frame: every row's bits go to the clusterer as they come (SPEC C.1, I.2).
+//! A band or a fixed level over a whole frame: every row's bits go to the clusterer as they come
+//! (`docs/theory/segmentation.md`).
 
 use super::band::band_bits;
 use super::{LevelConfig, Side};

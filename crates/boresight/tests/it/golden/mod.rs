@@ -32,11 +32,7 @@ pub fn load(name: &str) -> Golden {
     let v: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let cases = v["cases"].as_array().expect("cases").clone();
     assert!(!cases.is_empty(), "{name}: no cases");
-    Golden {
-        rel_tol: v["rel_tol"].as_f64().expect("rel_tol"),
-        abs_tol: v["abs_tol"].as_f64().expect("abs_tol"),
-        cases,
-    }
+    Golden { rel_tol: v["rel_tol"].as_f64().expect("rel_tol"), abs_tol: v["abs_tol"].as_f64().expect("abs_tol"), cases }
 }
 
 /// All Rust text of a folder of tests.
