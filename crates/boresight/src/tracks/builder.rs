@@ -1,6 +1,9 @@
 //! Builds a [`TrackTable`] from rows in any order: by frame, identities ascending.
 
-use super::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable};
+use super::column::Column;
+use super::row::{PixelOrigin, TrackRow};
+use super::state::{RowState, StateColumns};
+use super::table::TrackTable;
 use crate::{Error, ErrorKind, Result};
 use std::collections::HashMap;
 
@@ -192,5 +195,22 @@ impl TrackTableBuilder {
         }
         t.starts = starts;
         Ok(self.table)
+    }
+}
+
+impl TrackTable {
+    /// Builds a table from rows in any order (rows of one frame keep theirs).
+    /// # Errors
+    /// A number that is not finite; more rows than 2³² − 1.
+    pub fn from_rows(
+        label: impl Into<String>,
+        origin: PixelOrigin,
+        rows: impl IntoIterator<Item = TrackRow>,
+    ) -> Result<Self> {
+        let mut b = TrackTableBuilder::new(label, origin);
+        for row in rows {
+            b.push(&row)?;
+        }
+        b.finish(0)
     }
 }
