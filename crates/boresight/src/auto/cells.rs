@@ -4,6 +4,7 @@
 //! above its median, over the whole frame. Cells are there if most of what is cut out lies in pieces of one size that fill their boxes as
 //! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
 
+use super::digits::round;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
@@ -90,7 +91,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Cells>> {
 /// Writes detector and tracker.
 pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
     let side = cells.area_px.sqrt();
-    let least = super::round((0.1 * cells.area_px).max(60.0)) as u32;
+    let least = round((0.1 * cells.area_px).max(60.0)) as u32;
     reasons.push(format!(
         "Some {:.0} bright compact pieces a frame on an even dark ground, about {side:.0} px across: cells. So what lies 5 robust deviations above the \
          smoothed frame's median is detected, in pieces of {least} px or more.",
@@ -99,10 +100,10 @@ pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut
     config.detector = detector(info, least);
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
-    tracker.extra_noise_px = super::round((0.03 * side).max(0.5));
-    tracker.acceleration_std_px_per_s2 = super::round(0.06 * side / (interval_s * interval_s));
-    tracker.max_speed_px_per_s = super::round(0.4 * side / interval_s);
-    tracker.coast_s = super::round(3.0 * interval_s);
+    tracker.extra_noise_px = round((0.03 * side).max(0.5));
+    tracker.acceleration_std_px_per_s2 = round(0.06 * side / (interval_s * interval_s));
+    tracker.max_speed_px_per_s = round(0.4 * side / interval_s);
+    tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     reasons.push(format!(

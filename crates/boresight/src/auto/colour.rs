@@ -1,5 +1,6 @@
 //! A single target told by its colour: a ball, a marker; the colour is chosen from the frames looked at.
 
+use super::digits::round;
 use super::scene::{Camera, Scene};
 use crate::camera::CameraConfig;
 use crate::io::Colour;
@@ -55,16 +56,16 @@ pub fn configure(
         max_detections: Some(100),
         ..DetectorConfig::default()
     };
-    config.detector.cluster.min_area_px = Some(super::round((0.15 * reference.area_px).max(6.0)) as u32);
-    config.detector.cluster.distance_px = super::round((0.15 * side).clamp(2.0, 12.0));
+    config.detector.cluster.min_area_px = Some(round((0.15 * reference.area_px).max(6.0)) as u32);
+    config.detector.cluster.distance_px = round((0.15 * side).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
     super::moving::tracker(side, info, interval_s, &mut config.tracker);
     let tracker = &mut config.tracker;
     // A thrown thing: 1 g is 245 times the side of a ball of 4 cm a second squared, and a hand jerks as much.
-    tracker.acceleration_std_px_per_s2 = super::round((300.0 * side).max(0.2 / (interval_s * interval_s)));
-    tracker.max_speed_px_per_s = super::round(2.0 * info.width.max(info.height) as f64);
+    tracker.acceleration_std_px_per_s2 = round((300.0 * side).max(0.2 / (interval_s * interval_s)));
+    tracker.max_speed_px_per_s = round(2.0 * info.width.max(info.height) as f64);
     // It comes into view at any speed up to that, and may be gone after ten frames.
-    let velocity_std_px_per_s = super::round(tracker.max_speed_px_per_s / 3.0);
+    let velocity_std_px_per_s = round(tracker.max_speed_px_per_s / 3.0);
     tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
     tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
 }

@@ -1,5 +1,6 @@
 //! Things that move before a fixed camera: people, cars, animals; detector and tracker from the size of what moves.
 
+use super::digits::round;
 use super::scene::{Camera, Scene};
 use crate::camera::CameraConfig;
 use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, SharingConfig, TrackerConfig};
@@ -48,7 +49,7 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
         scene.regions,
         100.0 * scene.explained
     ));
-    let least = super::round((0.35 * scene.area_px).max(9.0)) as u32;
+    let least = round((0.35 * scene.area_px).max(9.0)) as u32;
     // Measured on vtest.avi: dark clothes are darker than 0.6 of the ground, shadows are not.
     let background = BackgroundConfig {
         threshold_sd: 6.0,
@@ -62,7 +63,7 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
     };
     config.detector.cluster.min_area_px = Some(least);
     // Parts of one thing lie nearer than a fifth of its shorter side.
-    config.detector.cluster.distance_px = super::round((0.2 * w.min(h)).clamp(2.0, 12.0));
+    config.detector.cluster.distance_px = round((0.2 * w.min(h)).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
     tracker(w.max(h), info, interval_s, &mut config.tracker);
     if let Some(sharing) = &mut config.tracker.sharing {
@@ -79,15 +80,14 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
 /// The tracker for things whose outline changes: the noise grows with their size.
 pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker: &mut TrackerConfig) {
     *tracker = TrackerConfig::default();
-    tracker.acceleration_std_px_per_s2 = super::round((1.0 * side_px).max(0.02 / (interval_s * interval_s)));
-    tracker.extra_noise_px = super::round((0.05 * side_px).max(0.5));
+    tracker.acceleration_std_px_per_s2 = round((1.0 * side_px).max(0.02 / (interval_s * interval_s)));
+    tracker.extra_noise_px = round((0.05 * side_px).max(0.5));
     tracker.extra_noise_of_size = 0.03;
-    tracker.max_speed_px_per_s = super::round(0.5 * info.width.max(info.height) as f64);
-    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: super::round(2.0 * side_px) });
+    tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
+    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(2.0 * side_px) });
     tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });
     // Arms and legs swing the edges of a box more than its middle.
-    tracker.sharing =
-        Some(SharingConfig { edge_std_px: super::round((0.1 * side_px).max(0.7)), ..SharingConfig::default() });
+    tracker.sharing = Some(SharingConfig { edge_std_px: round((0.1 * side_px).max(0.7)), ..SharingConfig::default() });
     tracker.coast_s = 0.7;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
 }

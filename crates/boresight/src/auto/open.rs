@@ -1,6 +1,14 @@
-//! Opens an input and settles everything in one call: what the command `boresight track INPUT` does, for programs.
+//! From an input's name to what runs it, in the order of the steps:
+//!
+//! 1. open the input and read its first frames ahead ([`Replay`] hands them out again: a stream is read once, and no frame is lost);
+//! 2. look at them as a whole; a file whose camera stands still is read a second time, further on and in colour ([`super::second_look`]);
+//! 3. choose detector and tracker;
+//! 4. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
-use super::open_and_choose;
+use super::choose::{Choice, choose_seen};
+use super::replay::Replay;
+use super::scene::{self, Camera};
+use super::second_look;
 use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Config, FrameSource, Result};
@@ -24,7 +32,26 @@ pub struct Opened {
 
 opaque_debug!(Opened);
 
-/// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also further on.
+/// Opens an input and proposes its configuration; the source hands out every frame from the first on.
+/// # Errors
+/// An input that cannot be opened, or whose first frames differ in size or pixel type.
+pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
+    let read = |config: &Config| -> Result<Replay> {
+        Ok(Replay::new(crate::io::open(input, &config.input.open_options())?, PROBE_FRAMES))
+    };
+    let mut frames = read(base)?;
+    let info = frames.info().clone();
+    let scene = scene::look(frames.ahead(), &info)?;
+    let look_again = scene.camera == Camera::Fixed && second_look::can_be_opened_twice(input);
+    let second = if look_again { second_look::frames(input, base, PROBE_FRAMES) } else { Vec::new() };
+    let choice = choose_seen(frames.ahead(), scene, &second, &info, base)?;
+    if choice.config.input.colour != base.input.colour {
+        frames = read(&choice.config)?;
+    }
+    Ok((frames, choice))
+}
+
+/// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.
 ///
 /// `base` says how the input is read; its other parts are where the choice starts from.
 /// ```

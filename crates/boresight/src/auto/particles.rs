@@ -3,6 +3,7 @@
 //! Source: our own. Particles that move each their own way leave nothing that moves as one, so the camera's motion is not known; a
 //! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.45 times as wide.
 
+use super::digits::round;
 use super::scene::{Camera, Scene};
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
@@ -89,7 +90,7 @@ pub fn configure(
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) {
-    let size_px = super::round((DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0));
+    let size_px = round((DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0));
     let dark = particles.polarity == Polarity::Dark;
     reasons.push(format!(
         "Some {:.0} {} blobs a frame all over it, {:.1} px wide at half their height, nothing that moves as one: particles. So spots of {size_px} px are \
@@ -104,7 +105,7 @@ pub fn configure(
         polarity: particles.polarity,
         min_contrast: 1.0,
         surround: 1.0,
-        smooth_px: Some(super::round((0.27 * size_px).max(1.0))),
+        smooth_px: Some(round((0.27 * size_px).max(1.0))),
     };
     config.detector = DetectorConfig {
         threshold: ThresholdConfig::Spot(spot),
@@ -115,9 +116,9 @@ pub fn configure(
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
     let step_px = 0.1 * size_px;
-    tracker.acceleration_std_px_per_s2 = super::round(step_px / (interval_s * interval_s));
-    tracker.max_speed_px_per_s = super::round(0.5 * size_px / interval_s);
-    tracker.coast_s = super::round(3.0 * interval_s);
+    tracker.acceleration_std_px_per_s2 = round(step_px / (interval_s * interval_s));
+    tracker.max_speed_px_per_s = round(0.5 * size_px / interval_s);
+    tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     reasons.push(format!(

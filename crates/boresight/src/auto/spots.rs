@@ -1,5 +1,6 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
+use super::digits::round;
 use crate::camera::CameraConfig;
 use crate::track::{SharingConfig, TrackerConfig};
 use crate::vision::config::DetectorConfig;
@@ -114,11 +115,11 @@ pub fn configure(
     config.detector.camera = CameraConfig::Moving;
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
-    tracker.max_speed_px_per_s = super::round(0.5 * info.width.max(info.height) as f64);
+    tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
     // Large targets change their outline: their middle wanders and jerks with them (a mouse of 41 px lost its track 11 times in 20 s).
     let large_px = (seen.side_px[0] - LARGE_PX).max(0.0);
-    tracker.extra_noise_px += super::round(0.03 * large_px);
-    tracker.acceleration_std_px_per_s2 = super::round((0.1 + 0.03 * large_px) / (interval_s * interval_s));
+    tracker.extra_noise_px += round(0.03 * large_px);
+    tracker.acceleration_std_px_per_s2 = round((0.1 + 0.03 * large_px) / (interval_s * interval_s));
     tracker.coast_s = 0.7;
     // An aircraft that falls in pieces for some frames is one track soon after.
     tracker.sharing = Some(SharingConfig { longest_s: tracker.coast_s, ..SharingConfig::default() });

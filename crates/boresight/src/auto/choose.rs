@@ -1,0 +1,72 @@
+//! The choice: which kind of scene the first frames show, and the configuration that follows, with reasons.
+//!
+//! Source: our own. Tried in this order, the first that fits: a target told by its colour, things that move before a fixed camera, particles,
+//! cells, isolated targets.
+
+use super::interval::interval_s;
+use super::scene::{self, Scene};
+use super::{cells, colour, moving, particles, spots};
+use crate::io::Colour;
+use crate::{Config, Frame, Result, SourceInfo};
+
+/// A proposed configuration and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// The configuration.
+    pub config: Config,
+    /// What was seen and chosen, a sentence each.
+    pub reasons: Vec<String>,
+}
+
+/// Proposes a configuration from the first frames of a sequence; [`super::open_and_choose`] also takes a second look at files.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
+    choose_seen(frames, scene::look(frames, info)?, &[], info, base)
+}
+
+/// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
+pub(super) fn choose_seen(
+    frames: &[Frame],
+    mut scene: Scene,
+    second: &[Frame],
+    info: &SourceInfo,
+    base: &Config,
+) -> Result<Choice> {
+    let mut reasons = Vec::new();
+    let mut config = base.clone();
+    let interval_s = interval_s(frames, info);
+    let n_looked = frames.len().max(second.len());
+    let looked = if second.is_empty() { frames } else { second };
+    let over_s = match (frames.first(), looked.last()) {
+        (Some(first), Some(last)) => last.time.seconds_since(first.time),
+        _ => 0.0,
+    };
+    reasons.push(format!(
+        "{} x {} {:?}, {:.4} frames/s ({}), from {n_looked} {} of the first {over_s:.1} s.",
+        info.width,
+        info.height,
+        info.kind,
+        1.0 / interval_s,
+        if info.true_times { "the file's times" } else { "no times in the input: the given rate" },
+        if n_looked == 1 { "frame" } else { "frames" },
+    ));
+    if let Some(frame) = second.first() {
+        scene = scene::look(second, &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
+    }
+    // Who asks for grey gets grey.
+    let coloured = base.input.colour != Colour::Gray;
+    if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
+        colour::configure(&reference, &scene, info, interval_s, &mut config, &mut reasons);
+    } else if moving::fits(&scene, info) {
+        moving::configure(&scene, info, interval_s, &mut config, &mut reasons);
+    } else if let Some(seen) = particles::look(frames, &scene, info)? {
+        particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+    } else if let Some(seen) = cells::look(frames, info)? {
+        cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
+    } else {
+        let evidence = spots::look(frames, info)?;
+        spots::configure(&evidence, info, interval_s, &mut config, &mut reasons);
+    }
+    Ok(Choice { config, reasons })
+}
