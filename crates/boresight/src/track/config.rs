@@ -1,15 +1,15 @@
 //! The tracker's configuration: every choice is an enum, every number has a unit and a range.
 
-use super::birth::BirthConfig;
+use super::association_cost::TermsConfig;
 use super::clutter::ClutterConfig;
-use super::cue::CueConfig;
+use super::confirm::config::LifeConfig;
+use super::confirm::confirmation_gate::ProofConfig;
 use super::filter::Belief;
 use super::filter::FilterConfig;
-use super::life_config::LifeConfig;
+use super::initial_tracks::CueConfig;
+use super::initiation::BirthConfig;
+use super::merged_measurements::SharingConfig;
 use super::mht::MhtConfig;
-use super::proof::ProofConfig;
-use super::sharing::SharingConfig;
-use super::terms::TermsConfig;
 use crate::Result;
 use crate::associate::AssociatorConfig;
 use crate::validate::{at_least_one, check, not_negative, positive, probability};
@@ -178,7 +178,7 @@ impl TrackerConfig {
         }
         self.life.validate(&format!("{at}.life"))?;
         self.birth.validate(&format!("{at}.birth"))?;
-        super::cue::validate(self, at)?;
+        super::initial_tracks::validate(self, at)?;
         self.proof.validate(&format!("{at}.proof"))?;
         self.clutter.validate(&format!("{at}.clutter"))?;
         self.terms.validate(&format!("{at}.terms"))?;

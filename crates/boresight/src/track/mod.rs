@@ -2,41 +2,36 @@
 //!
 //! [`build`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the living tracks come out.
 
-pub mod birth;
+pub mod association_cost;
 pub mod clutter;
 pub mod config;
-mod correct;
-pub mod cue;
+pub mod confirm;
 pub mod filter;
-pub mod gating;
+pub mod initial_tracks;
+pub mod initiation;
 pub mod join;
-pub mod life;
-pub mod life_config;
-mod living;
+pub mod merged_measurements;
 pub mod mht;
-mod pace;
-mod proof;
-pub mod sharing;
+mod scan_interval;
+mod single_track;
 pub mod smooth;
 pub mod stabilised;
-mod stage;
-mod starts;
+pub mod step;
 pub mod stitch;
-pub mod terms;
 pub mod tracker;
 
-pub use birth::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
+pub use association_cost::{OverlapConfig, OverlapKind, TermsConfig};
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};
-pub use cue::CueConfig;
+pub use confirm::config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+pub use confirm::confirmation_gate::ProofConfig;
 pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, TrackFilter};
+pub use initial_tracks::CueConfig;
+pub use initiation::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
 pub use join::{Joined, join};
-pub use life_config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+pub use merged_measurements::SharingConfig;
 pub use mht::{Mht, MhtConfig};
-pub use proof::ProofConfig;
-pub use sharing::SharingConfig;
 pub use stitch::StitchConfig;
-pub use terms::{OverlapConfig, OverlapKind, TermsConfig};
 pub use tracker::Tracker;
 
 use crate::{Result, Scan, TrackState};

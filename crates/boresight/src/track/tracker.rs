@@ -10,17 +10,17 @@
 //! Limits: detections of a scan share its time; `max_tracks` tracks.
 
 use super::Tracking;
+use super::association_cost::Terms;
 use super::clutter::Clutter;
 use super::config::TrackerConfig;
-use super::correct::{Scratch, shared};
-use super::gating::{Noise, Predicted, ScanTable};
-use super::life::{Evidence, Verdict};
-use super::living::{Outcome, Track};
-use super::pace::Pace;
-use super::sharing::Sharing;
-use super::stage::Stage;
-use super::starts::LeftOver;
-use super::terms::Terms;
+use super::confirm::rule::{Evidence, Verdict};
+use super::merged_measurements::Sharing;
+use super::scan_interval::Pace;
+use super::single_track::{Outcome, Track};
+use super::step::associate::Stage;
+use super::step::gate::{Noise, Predicted, ScanTable};
+use super::step::initiate::LeftOver;
+use super::step::update::{Scratch, shared};
 use crate::associate::AssociatorConfig;
 use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackState};
 use boresight_filters::Filter;

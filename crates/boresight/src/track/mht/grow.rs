@@ -3,12 +3,12 @@
 //! A leaf whose life ends (score, existence, coasting budget) is cut at once. New targets start from one point with
 //! unknown velocity; those that the next scans do not bear out die by their score.
 
-use super::super::birth::from_one_point;
-use super::super::gating::{Noise, Predicted, innovation_cov, normalised_square};
-use super::super::life::{Evidence, Verdict};
-use super::super::living::Outcome;
-use super::super::proof::Proof;
-use super::super::terms::Look;
+use super::super::association_cost::Look;
+use super::super::confirm::confirmation_gate::Proof;
+use super::super::confirm::rule::{Evidence, Verdict};
+use super::super::initiation::from_one_point;
+use super::super::single_track::Outcome;
+use super::super::step::gate::{Noise, Predicted, innovation_cov, normalised_square};
 use super::{Leaf, Mht, NONE, Tree, WINDOW};
 use crate::associate::{Pair, Prior};
 use crate::record::Innovation;

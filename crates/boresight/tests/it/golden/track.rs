@@ -3,7 +3,7 @@
 use super::{load, number, numbers, rows};
 use boresight::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior};
 use boresight::track::{
-    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocity, gating,
+    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocity, step::gate as gating,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};

@@ -6,10 +6,10 @@
 //! Symbols: state `[x, vx, y, vy]` px, px/s. Limits: the plain tracker only, not multiple hypotheses; errors of a cue are taken as
 //! independent between axes, position and velocity.
 
+use super::association_cost::Look;
 use super::config::TrackerConfig;
-use super::living::Track;
-use super::proof::Proof;
-use super::terms::Look;
+use super::confirm::confirmation_gate::Proof;
+use super::single_track::Track;
 use super::tracker::Tracker;
 use crate::validate::{not_negative, positive};
 use crate::{Error, ErrorKind, Result, Timestamp};

@@ -5,30 +5,30 @@
 //! start instead, and its likelihood under that start says how much likelier a target is than clutter.
 //! Limits: at most `max_tracks` tracks; at most 4096 candidates are looked at for each left-over.
 
-use super::birth::{BirthConfig, from_one_point, from_two_points};
-use super::config::TrackerConfig;
-use super::gating::{MOST_LOOKED_AT, Noise, normalised_square};
-use super::living::{Outcome, Track};
-use super::proof::Proof;
-use super::terms::Look;
-use super::tracker::{BATCH, Tracker};
+use super::super::association_cost::Look;
+use super::super::config::TrackerConfig;
+use super::super::confirm::confirmation_gate::Proof;
+use super::super::initiation::{BirthConfig, from_one_point, from_two_points};
+use super::super::single_track::{Outcome, Track};
+use super::super::tracker::{BATCH, Tracker};
+use super::gate::{MOST_LOOKED_AT, Noise, normalised_square};
 use crate::Scan;
 use boresight_filters::{Filter, Measurement, Weighted};
 use nalgebra::Vector2;
 
 /// A detection that no track took, kept for the next scan.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LeftOver {
+pub(in crate::track) struct LeftOver {
     position: Vector2<f64>,
     noise: Noise,
 }
 
 /// Mean and variance of a new target's velocity (px/s, px²/s²), if anything is known of it.
-pub(super) type VelocityPrior = Option<(Vector2<f64>, Vector2<f64>)>;
+pub(in crate::track) type VelocityPrior = Option<(Vector2<f64>, Vector2<f64>)>;
 
 impl BirthConfig {
     /// What is known of a new target's velocity.
-    pub(super) fn velocity_prior(&self) -> VelocityPrior {
+    pub(in crate::track) fn velocity_prior(&self) -> VelocityPrior {
         match self {
             Self::OnePoint(c) => Some((Vector2::zeros(), Vector2::repeat(c.velocity_std_px_per_s.powi(2)))),
             Self::TwoPoint(c) => c.velocity_std_px_per_s.map(|std| (Vector2::zeros(), Vector2::repeat(std * std))),
@@ -43,7 +43,7 @@ impl BirthConfig {
 
 impl Tracker {
     /// Starts tracks from what is left over, and keeps the rest for the next scan.
-    pub(super) fn start(&mut self, scan: &Scan) {
+    pub(in crate::track) fn start(&mut self, scan: &Scan) {
         let prior = self.config.birth.velocity_prior();
         if let BirthConfig::OnePoint(_) = self.config.birth {
             for j in 0..scan.detections.len() {

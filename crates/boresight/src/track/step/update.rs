@@ -5,11 +5,11 @@
 //! that no detection is the target's: ψ ← β₀ ψ (1 − P_D P_G) / (1 − ψ P_D P_G) + (1 − β₀), weights given existence
 //! β_j / ψ.
 
-use super::config::TrackerConfig;
-use super::gating::{Predicted, ScanTable, innovation_cov, normalised_square};
-use super::life_config::LifeConfig;
-use super::living::{Outcome, Track};
-use super::sharing::Part;
+use super::super::config::TrackerConfig;
+use super::super::confirm::config::LifeConfig;
+use super::super::merged_measurements::Part;
+use super::super::single_track::{Outcome, Track};
+use super::gate::{Predicted, ScanTable, innovation_cov, normalised_square};
 use crate::Scan;
 use crate::associate::{Gates, Share};
 use crate::record::Innovation;
@@ -18,7 +18,7 @@ use nalgebra::{Matrix2, Vector2};
 
 /// Scratch memory of corrections.
 #[derive(Default)]
-pub(super) struct Scratch {
+pub(in crate::track) struct Scratch {
     weighted: Vec<Weighted>,
 }
 
@@ -126,7 +126,7 @@ impl Scratch {
 }
 
 /// Corrects a track by its part of a shared detection; says nothing of its existence.
-pub(super) fn shared(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
+pub(in crate::track) fn shared(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
     let position = Vector2::from(part.position);
     let measurement = Measurement { position, cov: part.noise.matrix() };
     if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {

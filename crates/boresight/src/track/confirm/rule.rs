@@ -7,7 +7,7 @@
 //! Symbols: Λ likelihood ratio of this scan, target against none (no unit); ψ existence probability.
 //! Limits: M-of-N windows of at most 64 scans. A confirmed track also ends when its coasting budget (s) is over.
 
-use super::life_config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
+use super::config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
 
 /// Where a track stands in its life.
 #[derive(Clone, Copy, Debug, PartialEq)]

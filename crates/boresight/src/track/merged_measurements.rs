@@ -7,8 +7,8 @@
 //! budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
-use super::gating::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
-use super::terms::Look;
+use super::association_cost::Look;
+use super::step::gate::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
 use crate::validate::not_negative;
 use crate::{Result, Scan};
 use schemars::JsonSchema;

@@ -1,11 +1,11 @@
 //! One living track: what it carries from scan to scan, and what is said of it after each.
 
+use super::association_cost::Look;
 use super::config::TrackerConfig;
+use super::confirm::confirmation_gate::Proof;
+use super::confirm::rule::Life;
 use super::filter::Belief;
-use super::gating::Noise;
-use super::life::Life;
-use super::proof::Proof;
-use super::terms::Look;
+use super::step::gate::Noise;
 use crate::camera::CameraPath;
 use crate::record::Innovation;
 use crate::{Detection, Extent, Timestamp, TrackId, TrackState, TrackStatus};

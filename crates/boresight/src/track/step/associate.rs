@@ -3,16 +3,16 @@
 //! Source: `docs/theory/track-management.md`, steps 2 and 3. Rows are tracks in ascending order; detections taken by an
 //! earlier stage are not seen. In soft stages (PDA and its kin) all gated detections count as used.
 
-use super::clutter::Clutter;
-use super::config::TrackerConfig;
-use super::correct::Scratch;
-use super::gating::{Predicted, ScanTable};
-use super::living::{Outcome, Track};
+use super::super::clutter::Clutter;
+use super::super::config::TrackerConfig;
+use super::super::single_track::{Outcome, Track};
+use super::gate::{Predicted, ScanTable};
+use super::update::Scratch;
 use crate::Scan;
 use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior, Share};
 
 /// An associator with its tables and the rows of this scan.
-pub(super) struct Stage {
+pub(in crate::track) struct Stage {
     associator: Box<dyn Associator>,
     pub soft: bool,
     likelihood: bool,
