@@ -2,7 +2,7 @@
 #![no_main]
 
 use boresight::io::tracks::{Format, ReadOptions, read, write};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use boresight_fuzz::with_file;
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
@@ -10,7 +10,7 @@ libfuzzer_sys::fuzz_target!(|data: &[u8]| {
         for skip_bad_rows in [false, true] {
             let options = ReadOptions { skip_bad_rows, keep_extra: true, ..ReadOptions::default() };
             let Ok(file) = read(path, None, options, true) else { continue };
-            let _ = evaluate(&file.table, &file.table, &MatchOptions::default());
+            let _ = mot_scores(&file.table, &file.table, &MatchOptions::default());
             for to in Format::ALL {
                 let _ = write(&file.table, to, &mut Vec::new());
             }

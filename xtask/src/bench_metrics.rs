@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use boresight::io::tracks::{ReadOptions, mot};
 use boresight::metrics::hota::mean;
 use boresight::metrics::set::{SetDistance, SetOptions};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::io::Write;
@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> Result<()> {
         let begin = Instant::now();
         let (t, _) = mot::read(&truth, ReadOptions::default())?;
         let (r, _) = mot::read(&result, ReadOptions::default())?;
-        let s = evaluate(&t, &r, &MatchOptions::default())?;
+        let s = mot_scores(&t, &r, &MatchOptions::default())?;
         best = best.min(begin.elapsed().as_secs_f64());
         row = format!("{:.6} | {:.6} | {:.6}", s.clear.mota(), s.identity.idf1(), mean(&s.hota.hota()));
     }

@@ -9,7 +9,7 @@ use anyhow::Result;
 use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
 use boresight::metrics::overlap::Similarity;
 use boresight::metrics::set::{SetDistance, SetOptions};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::track::{self, BirthConfig, ExistenceConfig, LifeConfig, TrackerConfig, TwoPointConfig};
 use boresight::{Detection, Extent, FrameIndex, PixelOrigin, Scan, Timestamp, TrackRow, TrackStatus, TrackTable};
 use nalgebra::{Matrix2, Vector2};
@@ -228,7 +228,7 @@ fn quality(scene: &Scene, config: &TrackerConfig, with_idf1: bool) -> Result<Qua
     let idf1 = if with_idf1 {
         let table = |rows| TrackTable::from_rows("bench", PixelOrigin::Centre0, rows);
         let options = MatchOptions { similarity: Similarity::Centre { zero_distance_px: 10.0 }, threshold: 0.5 };
-        Some(evaluate(&table(truth_rows)?, &table(result_rows)?, &options)?.identity.idf1())
+        Some(mot_scores(&table(truth_rows)?, &table(result_rows)?, &options)?.identity.idf1())
     } else {
         None
     };

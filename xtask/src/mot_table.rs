@@ -7,7 +7,7 @@
 use anyhow::{Context, Result};
 use boresight::io::tables::{TableOptions, mot_box_of_extent, read_detections};
 use boresight::io::tracks::{ReadOptions, mot};
-use boresight::metrics::{MatchOptions, Rules, Scores, evaluate, hota, preprocess};
+use boresight::metrics::{MatchOptions, MotScores, Rules, hota, mot_scores, preprocess};
 use boresight::track::{self, TrackerConfig, TwoStageConfig};
 use boresight::{PixelOrigin, TrackRow, TrackStatus, TrackTable};
 use std::fmt::Write as _;
@@ -73,9 +73,9 @@ pub fn run(args: &Args) -> Result<()> {
                 print_row(&format!("{:16} SORT", ""), &peers[peers.len() - 1]);
             }
         }
-        print_row(&format!("{:16} boresight", "all"), &Scores::combined(&ours));
+        print_row(&format!("{:16} boresight", "all"), &MotScores::combined(&ours));
         if !peers.is_empty() {
-            print_row(&format!("{:16} SORT", ""), &Scores::combined(&peers));
+            print_row(&format!("{:16} SORT", ""), &MotScores::combined(&peers));
         }
     }
     Ok(())
@@ -95,12 +95,12 @@ fn tracked(config: &TrackerConfig, detections: &Path) -> Result<TrackTable> {
     Ok(TrackTable::from_rows("boresight", PixelOrigin::Pixel1, rows)?)
 }
 
-fn judged(truth: &TrackTable, result: &TrackTable, rules: Rules) -> Result<Scores> {
+fn judged(truth: &TrackTable, result: &TrackTable, rules: Rules) -> Result<MotScores> {
     let (truth, result) = preprocess(truth, result, rules)?;
-    Ok(evaluate(&truth, &result, &MatchOptions::default())?)
+    Ok(mot_scores(&truth, &result, &MatchOptions::default())?)
 }
 
-fn print_row(name: &str, s: &Scores) {
+fn print_row(name: &str, s: &MotScores) {
     println!(
         "{name:32} {:6.2} {:6.2} {:6.2} {:6} {:6} {:6}",
         100.0 * hota::mean(&s.hota.hota()),

@@ -6,7 +6,7 @@
 //! `error` is the mean distance of the matched pairs.
 
 use anyhow::{Context, Result};
-use boresight::metrics::{MatchOptions, Rules, Scores, Similarity, evaluate, preprocess};
+use boresight::metrics::{MatchOptions, MotScores, Rules, Similarity, mot_scores, preprocess};
 use boresight::pipeline::{Input, run as run_pipeline};
 use boresight::{Config, FrameSource, PixelOrigin, Sink, TrackRow, TrackStatus, TrackTable, View, auto, track, vision};
 use std::ops::ControlFlow;
@@ -147,7 +147,7 @@ fn tracked(input: &str, sets: &[String]) -> Result<(Vec<TrackRow>, String, f64)>
     Ok((rows, choice.reasons.get(1).cloned().unwrap_or_default(), per_s))
 }
 
-fn scores(clip: &Clip, truth: Vec<TrackRow>, result: Vec<TrackRow>) -> Result<Scores> {
+fn scores(clip: &Clip, truth: Vec<TrackRow>, result: Vec<TrackRow>) -> Result<MotScores> {
     let last = truth.iter().map(|r| r.frame).max().unwrap_or(0);
     // Beyond the last frame of the truth nothing is known.
     let result = result.into_iter().filter(|r| r.frame <= last);
@@ -155,7 +155,7 @@ fn scores(clip: &Clip, truth: Vec<TrackRow>, result: Vec<TrackRow>) -> Result<Sc
     let result = TrackTable::from_rows("boresight", PixelOrigin::Centre0, result)?;
     let (truth, result) = preprocess(&truth, &result, Rules::None)?;
     let similarity = Similarity::Centre { zero_distance_px: 2.0 * clip.distance_px };
-    Ok(evaluate(&truth, &result, &MatchOptions { similarity, threshold: 0.5 })?)
+    Ok(mot_scores(&truth, &result, &MatchOptions { similarity, threshold: 0.5 })?)
 }
 
 /// Runs the exam and prints the table.

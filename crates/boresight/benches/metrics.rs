@@ -1,7 +1,7 @@
 //! Time of the evaluation: CLEAR + identity + HOTA of 500 frames x 100 tracks, and GOSPA of 1000 targets.
 
 use boresight::metrics::set::{SetDistance, SetOptions};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::{PixelOrigin, TrackRow, TrackTable};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +37,7 @@ fn tables(frames: u32, n: usize) -> (TrackTable, TrackTable) {
 #[divan::bench]
 fn clear_identity_hota_500_frames_x_100_tracks(b: divan::Bencher<'_, '_>) {
     let (t, r) = tables(500, 100);
-    b.bench_local(|| evaluate(&t, &r, &MatchOptions::default()));
+    b.bench_local(|| mot_scores(&t, &r, &MatchOptions::default()));
 }
 
 #[divan::bench]

@@ -86,6 +86,7 @@ pub mod sim;
 pub mod time;
 pub mod track;
 pub mod tracks;
+mod union_find;
 mod validate;
 pub mod view;
 pub mod vision;

@@ -5,12 +5,12 @@
 
 use boresight::metrics::hota::mean;
 use boresight::metrics::set::{SetDistance, SetOptions};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::{PixelOrigin, TrackRow, TrackTable};
 use peers::{Fault, Job};
 
 enum What {
-    Scores,
+    MotScores,
     Gospa,
     Ospa,
 }
@@ -45,7 +45,7 @@ impl Job for W6 {
         self.row = match self.what {
             What::Gospa => self.set_distance(true),
             What::Ospa => self.set_distance(false),
-            What::Scores => match evaluate(&self.truth, &self.result, &MatchOptions::default()) {
+            What::MotScores => match mot_scores(&self.truth, &self.result, &MatchOptions::default()) {
                 Ok(s) => vec![s.clear.mota(), s.identity.idf1(), mean(&s.hota.hota()), s.clear.idsw as f64],
                 Err(_) => vec![f64::NAN; 4],
             },
@@ -82,7 +82,7 @@ fn main() -> Result<(), Fault> {
         let what = match word.as_str() {
             "gospa" => What::Gospa,
             "ospa" => What::Ospa,
-            _ => What::Scores,
+            _ => What::MotScores,
         };
         Ok(Box::new(W6 { truth: table(input("gt")?)?, result: table(input("tr")?)?, what, row: Vec::new() }))
     })

@@ -4,6 +4,7 @@
 //! Groups come in the order of their first row, rows within a group ascend: the answer does not depend on anything else.
 
 use super::Gates;
+use crate::union_find::{join, root};
 
 /// No row yet.
 const NONE: u32 = u32::MAX;
@@ -34,10 +35,7 @@ impl Groups {
                 if *claim == NONE {
                     *claim = i as u32;
                 } else {
-                    let (a, b) = (root(&mut self.parent, *claim), root(&mut self.parent, i as u32));
-                    // The smaller number stays the root: groups are named by their first row.
-                    let (low, high) = (a.min(b), a.max(b));
-                    self.parent[high as usize] = low;
+                    join(&mut self.parent, *claim, i as u32);
                 }
             }
         }
@@ -70,13 +68,4 @@ impl Groups {
     pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).filter(|w| w[1] > w[0]).map(|w| &self.rows[w[0] as usize..w[1] as usize])
     }
-}
-
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        let up = parent[parent[i as usize] as usize];
-        parent[i as usize] = up;
-        i = up;
-    }
-    i
 }

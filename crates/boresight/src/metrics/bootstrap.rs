@@ -6,7 +6,7 @@
 //! Limits: a track that crosses a border of pieces counts in each of them, so scores of pieces are a little higher than of
 //! the whole; intervals are moved to stand around the whole's score.
 
-use super::multi_object::Scores;
+use super::multi_object::MotScores;
 use crate::{Error, ErrorKind, Result};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,9 +39,9 @@ pub struct Compared {
 /// # Errors
 /// Fewer than two units; results of different numbers of units; a level outside (0, 1); no draws.
 pub fn compare(
-    units: &[Vec<Scores>],
-    whole: &[Scores],
-    measure: impl Fn(&Scores) -> f64,
+    units: &[Vec<MotScores>],
+    whole: &[MotScores],
+    measure: impl Fn(&MotScores) -> f64,
     level: f64,
     n_draws: usize,
     seed: u64,
@@ -67,11 +67,11 @@ pub fn compare(
         picked.clear();
         picked.extend((0..n).map(|_| rng.random_range(0..n)));
         for (d, u) in draws.iter_mut().zip(units) {
-            let sample: Vec<Scores> = picked.iter().map(|&k| u[k].clone()).collect();
-            d.push(measure(&Scores::combined(&sample)));
+            let sample: Vec<MotScores> = picked.iter().map(|&k| u[k].clone()).collect();
+            d.push(measure(&MotScores::combined(&sample)));
         }
     }
-    let piecewise: Vec<f64> = units.iter().map(|u| measure(&Scores::combined(u))).collect();
+    let piecewise: Vec<f64> = units.iter().map(|u| measure(&MotScores::combined(u))).collect();
     let value: Vec<f64> = whole.iter().map(&measure).collect();
     let interval = |values: Vec<f64>, centre: f64, around: f64| {
         let mut v = values;
@@ -107,8 +107,8 @@ pub fn compare(
 mod tests {
     use super::*;
 
-    fn unit(tp: u64, fp: u64) -> Scores {
-        let mut s = Scores::default();
+    fn unit(tp: u64, fp: u64) -> MotScores {
+        let mut s = MotScores::default();
         s.clear.tp = tp;
         s.clear.fp = fp;
         s.clear.fn_ = 100 - tp;
@@ -117,9 +117,9 @@ mod tests {
 
     #[test]
     fn a_result_that_is_better_everywhere_is_above_in_every_draw() {
-        let a: Vec<Scores> = (0..20).map(|k| unit(60 + k, 5)).collect();
-        let b: Vec<Scores> = (0..20).map(|k| unit(70 + k, 5)).collect();
-        let whole = [Scores::combined(&a), Scores::combined(&b)];
+        let a: Vec<MotScores> = (0..20).map(|k| unit(60 + k, 5)).collect();
+        let b: Vec<MotScores> = (0..20).map(|k| unit(70 + k, 5)).collect();
+        let whole = [MotScores::combined(&a), MotScores::combined(&b)];
         let c = compare(&[a, b], &whole, |s| s.clear.mota(), 0.95, 500, 7).unwrap();
         assert_eq!((c[1].share_above, c[0].share_above), (1.0, 0.5));
         assert!((c[1].difference.value - 0.1).abs() < 1e-12 && c[1].difference.lower > 0.09);
@@ -128,10 +128,11 @@ mod tests {
 
     #[test]
     fn the_seed_fixes_the_interval_and_too_few_units_or_draws_are_refused() {
-        let a: Vec<Scores> = (0..5).map(|k| unit(60 + 7 * k, 5)).collect();
+        let a: Vec<MotScores> = (0..5).map(|k| unit(60 + 7 * k, 5)).collect();
         let run = |seed| {
-            compare(std::slice::from_ref(&a), &[Scores::combined(&a)], |s| s.clear.mota(), 0.9, 100, seed).unwrap()[0]
-                .score
+            compare(std::slice::from_ref(&a), &[MotScores::combined(&a)], |s| s.clear.mota(), 0.9, 100, seed).unwrap()
+                [0]
+            .score
         };
         assert_eq!(run(1), run(1));
         assert!(compare(&[vec![unit(1, 1)]], &[unit(1, 1)], |s| s.clear.mota(), 0.9, 10, 1).is_err());

@@ -7,7 +7,7 @@
 //! Symbols: links join the same label in following frames ("track") or a parent's last cell to a child's first ("parent").
 //! Limits: a track that pauses is linked over its pause.
 
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Image, Result};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,6 +23,16 @@ pub struct CellFrame {
 }
 
 impl CellFrame {
+    /// Compares the label images of a frame; a side without an image has no cells in it.
+    /// # Errors
+    /// As [`CellFrame::of`].
+    pub fn of_images(truth: Option<&Image<u16>>, result: Option<&Image<u16>>) -> Result<Self> {
+        let n = truth.or(result).map_or(0, |image| image.as_slice().len());
+        let background = vec![0; n];
+        let pixels = |image: Option<&'_ Image<u16>>| image.map_or(background.clone(), |i| i.as_slice().to_vec());
+        Self::of(&pixels(truth), &pixels(result))
+    }
+
     /// Compares two label images of the same size, row-major; 0 is the background.
     /// # Errors
     /// Images of different sizes.
@@ -44,6 +54,26 @@ impl CellFrame {
             }
         }
         Ok(f)
+    }
+}
+
+/// The label images of a truth and a result compared frame by frame, and who is whose parent.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CellSequence {
+    /// What the images of each frame have in common.
+    pub frames: Vec<CellFrame>,
+    /// (child, parent) labels of the truth.
+    pub truth_parents: Vec<(u32, u32)>,
+    /// (child, parent) labels of the result.
+    pub result_parents: Vec<(u32, u32)>,
+}
+
+impl CellSequence {
+    /// Compares the two graphs of cells.
+    /// # Errors
+    /// As [`cell_scores`].
+    pub fn scores(&self) -> Result<CellScores> {
+        cell_scores(&self.frames, &self.truth_parents, &self.result_parents)
     }
 }
 

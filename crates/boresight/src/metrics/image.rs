@@ -7,7 +7,8 @@
 //! Identical images: all errors 0, SNR and PSNR +inf. An all-zero truth with an error: PFE +inf, SNR -inf.
 //! Cost of `pfe_spectral`: the smaller side squared times the larger, and an eigenvalue problem of the smaller side.
 
-use crate::{Error, ErrorKind, Image, Result};
+use super::value::{Better, Value};
+use crate::{Error, ErrorKind, Image, Pixels, Result};
 use nalgebra::DMatrix;
 
 /// The measures of one image against the truth.
@@ -27,6 +28,23 @@ pub struct ImageMetrics {
     pub psnr: f64,
     /// Eq 4.12 as printed, without 1/n, dB.
     pub psnr_as_printed: f64,
+}
+
+const EMPTY: ImageMetrics =
+    ImageMetrics { mse: 0.0, rmse: 0.0, mae: 0.0, pfe: 0.0, snr: 0.0, psnr: 0.0, psnr_as_printed: 0.0 };
+
+impl ImageMetrics {
+    /// The measures by name.
+    pub fn values(&self) -> [Value; 6] {
+        [
+            Value::new("MSE", self.mse, "counts²", Better::Lower),
+            Value::new("RMSE", self.rmse, "counts", Better::Lower),
+            Value::new("MAE", self.mae, "counts", Better::Lower),
+            Value::new("PFE", self.pfe, "%", Better::Lower),
+            Value::new("SNR", self.snr, "dB", Better::Higher),
+            Value::new("PSNR", self.psnr, "dB", Better::Higher),
+        ]
+    }
 }
 
 /// Compares `filtered` with `truth`; `peak` is the largest value a pixel can have (255 for 8 bits), counts.
@@ -78,6 +96,32 @@ pub fn compare<T: Copy + Into<f64>>(truth: &Image<T>, filtered: &Image<T>, peak:
         psnr: ratio_db(peak * peak, mse),
         psnr_as_printed: ratio_db(peak * peak, d2),
     })
+}
+
+/// Compares two frames; RGB frames as three values a pixel. `peak` is 255 or 65535 by the type where it is not given.
+/// # Errors
+/// As [`compare`]; frames of different types; float pixels without a peak.
+pub fn compare_pixels(truth: &Pixels, filtered: &Pixels, peak: Option<f64>) -> Result<ImageMetrics> {
+    let flat = |i: &Image<[u8; 3]>| Image::from_vec(3 * i.width(), i.height(), i.as_slice().concat());
+    match (truth, filtered) {
+        (Pixels::Gray8(a), Pixels::Gray8(b)) => compare(a, b, peak.unwrap_or(255.0)),
+        (Pixels::Gray16(a), Pixels::Gray16(b)) => compare(a, b, peak.unwrap_or(65535.0)),
+        (Pixels::GrayF32(a), Pixels::GrayF32(b)) => match peak {
+            Some(peak) => compare(a, b, peak),
+            None => Err(Error::new(ErrorKind::Config, "float pixels have no largest value of their own")),
+        },
+        (Pixels::Rgb8(a), Pixels::Rgb8(b)) => {
+            compare(&flat(a).unwrap_or_default(), &flat(b).unwrap_or_default(), peak.unwrap_or(255.0))
+        }
+        _ => Err(Error::new(ErrorKind::Unsupported, "the pixels are of different types: expected the same in both")),
+    }
+}
+
+/// Mean of each of the measures' [`ImageMetrics::values`] over the frames; zeros without frames.
+pub fn mean_values(frames: &[ImageMetrics]) -> [Value; 6] {
+    let all: Vec<[Value; 6]> = frames.iter().map(ImageMetrics::values).collect();
+    let n = all.len().max(1) as f64;
+    std::array::from_fn(|k| Value { value: all.iter().map(|v| v[k].value).sum::<f64>() / n, ..EMPTY.values()[k] })
 }
 
 /// The percentage fit error with the largest singular value as the norm, %.

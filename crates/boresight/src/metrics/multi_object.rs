@@ -6,6 +6,7 @@
 use super::clear::{Clear, ClearCounter};
 use super::hota::{Alignment, Hota, HotaCounter};
 use super::identity::{Identity, identity};
+use super::near::rows_of_tracks;
 use super::overlap::{Overlap, OverlapFinder, Similarity, frame_boxes, frame_tracks};
 use super::pairs::PairIndex;
 use crate::{Error, ErrorKind, Result, TrackTable};
@@ -28,7 +29,7 @@ impl Default for MatchOptions {
 
 /// Scores of a result; those of several sequences can be combined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Scores {
+pub struct MotScores {
     /// CLEAR counts.
     pub clear: Clear,
     /// Identity counts.
@@ -47,7 +48,7 @@ pub struct Scores {
     pub n_results: u64,
 }
 
-impl Scores {
+impl MotScores {
     /// Several sequences together, as TrackEval combines them.
     pub fn combined(all: &[Self]) -> Self {
         Self {
@@ -61,14 +62,6 @@ impl Scores {
             n_results: all.iter().map(|s| s.n_results).sum(),
         }
     }
-}
-
-fn rows_of_tracks(table: &TrackTable) -> Vec<u32> {
-    let mut n = vec![0; table.n_tracks()];
-    for &t in &table.tracks {
-        n[t as usize] += 1;
-    }
-    n
 }
 
 /// Refuses tables in which a track stands twice in a frame.
@@ -89,19 +82,19 @@ pub fn refuse_doubles(table: &TrackTable) -> Result<()> {
 /// Computes CLEAR, identity and HOTA.
 ///
 /// ```
-/// use boresight::metrics::{MatchOptions, evaluate};
+/// use boresight::metrics::{MatchOptions, mot_scores};
 /// use boresight::{PixelOrigin, TrackRow, TrackTable};
 /// let row = |frame, id, left| TrackRow { frame, id, bbox: [left, 0.0, 10.0, 10.0], ..TrackRow::default() };
 /// let truth = TrackTable::from_rows("truth", PixelOrigin::Centre0, [row(0, 1, 0.0), row(1, 1, 1.0)])?;
 /// let result = TrackTable::from_rows("result", PixelOrigin::Centre0, [row(0, 7, 0.0), row(1, 8, 1.0)])?;
-/// let scores = evaluate(&truth, &result, &MatchOptions::default())?;
+/// let scores = mot_scores(&truth, &result, &MatchOptions::default())?;
 /// assert_eq!(scores.clear.idsw, 1);
 /// assert_eq!(scores.identity.idf1(), 0.5);
 /// # Ok::<(), boresight::Error>(())
 /// ```
 /// # Errors
 /// A threshold outside (0, 1]; an id twice in a frame.
-pub fn evaluate(truth: &TrackTable, result: &TrackTable, options: &MatchOptions) -> Result<Scores> {
+pub fn mot_scores(truth: &TrackTable, result: &TrackTable, options: &MatchOptions) -> Result<MotScores> {
     if !(options.threshold > 0.0 && options.threshold <= 1.0) {
         return Err(Error::new(ErrorKind::Config, "expected a similarity in (0, 1]")
             .at(format!("threshold = {}", options.threshold)));
@@ -114,7 +107,7 @@ pub fn evaluate(truth: &TrackTable, result: &TrackTable, options: &MatchOptions)
     refuse_doubles(truth)?;
     refuse_doubles(result)?;
     let n_frames = truth.n_frames().max(result.n_frames());
-    let (truth_rows, result_rows) = (rows_of_tracks(truth), rows_of_tracks(result));
+    let (truth_rows, result_rows) = (rows_of_tracks(truth, 0..n_frames), rows_of_tracks(result, 0..n_frames));
     let mut finder = OverlapFinder::default();
     let mut clear = ClearCounter::new(truth.n_tracks(), options.threshold);
     let mut index = PairIndex::default();
@@ -154,7 +147,7 @@ pub fn evaluate(truth: &TrackTable, result: &TrackTable, options: &MatchOptions)
         }
         hota.finish(index.pairs(), &truth_rows, &result_rows)
     };
-    Ok(Scores {
+    Ok(MotScores {
         clear: clear.finish(n_frames as u64),
         identity: identity(n_truth_rows, n_result_rows, result.n_tracks(), index.pairs(), &common),
         hota,

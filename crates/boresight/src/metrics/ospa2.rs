@@ -7,14 +7,10 @@
 //! Limits: weights over time are equal.
 
 use super::assignment::{Matcher, Pair};
+use super::near::{each_near_pair, rows_of_tracks, shared_frames};
 use super::pairs::PairIndex;
 use super::set::SetOptions;
 use crate::{Result, TrackTable};
-
-fn centre(table: &TrackTable, row: usize) -> [f64; 2] {
-    let e = table.extent(row);
-    [e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0]
-}
 
 /// OSPA(2) of two tables over frames `from..to`, px; 0 if neither has a track there. `time_order` is q.
 /// # Errors
@@ -29,36 +25,20 @@ pub fn ospa2(
 ) -> Result<f64> {
     options.validate("ospa2")?;
     let (c, p, q) = (options.cutoff_px, options.order, time_order);
-    let (mut n_t, mut n_r) = (vec![0_u32; truth.n_tracks()], vec![0_u32; result.n_tracks()]);
+    let frames = from..to.min(truth.n_frames().max(result.n_frames()));
+    let (n_t, n_r) = (rows_of_tracks(truth, frames.clone()), rows_of_tracks(result, frames.clone()));
     let mut index = PairIndex::default();
-    let (mut both, mut sum) = (Vec::<u32>::new(), Vec::<f64>::new());
+    let mut sum = Vec::<f64>::new();
     // First the pairs that are ever nearer than c, then for these the frames they share.
-    let mut near: Vec<(f64, u32, [f64; 2])> = Vec::new();
-    for frame in from..to.min(truth.n_frames().max(result.n_frames())) {
-        near.clear();
-        near.extend(result.rows(frame).map(|r| (centre(result, r)[0], result.tracks[r], centre(result, r))));
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.iter().for_each(|n| n_r[n.1 as usize] += 1);
-        for r in truth.rows(frame) {
-            let (t, a) = (truth.tracks[r], centre(truth, r));
-            n_t[t as usize] += 1;
-            let begin = near.partition_point(|n| n.0 <= a[0] - c);
-            for (_, k, b) in near[begin..].iter().take_while(|n| n.0 < a[0] + c) {
-                let d = (a[0] - b[0]).hypot(a[1] - b[1]);
-                if d < c {
-                    let i = index.number(t, *k) as usize;
-                    if i == sum.len() {
-                        sum.push(0.0);
-                        both.push(0);
-                    }
-                    // The gain over "only one exists": d instead of c, in a frame that would count for both.
-                    sum[i] += c.powf(q) - d.powf(q);
-                    both[i] += 1;
-                }
-            }
+    each_near_pair(truth, result, frames.clone(), c, |n| {
+        let i = index.number(n.truth, n.result) as usize;
+        if i == sum.len() {
+            sum.push(0.0);
         }
-    }
-    let shared = frames_shared(truth, result, from, to, &index);
+        // The gain over "only one exists": d instead of c, in a frame that would count for both.
+        sum[i] += c.powf(q) - n.distance_px.powf(q);
+    });
+    let shared = shared_frames(truth, result, frames, &index);
     let (n, m) = (n_t.iter().filter(|n| **n > 0).count(), n_r.iter().filter(|n| **n > 0).count());
     let most = n.max(m);
     if most == 0 {
@@ -78,26 +58,6 @@ pub fn ospa2(
     let matched: f64 = taken.iter().map(|&k| pairs[k as usize].1).sum();
     let rest = (most - taken.len()) as f64 * c.powf(p);
     Ok(((matched + rest) / most as f64).powf(1.0 / p))
-}
-
-/// In how many frames of the window both tracks of each pair exist.
-fn frames_shared(truth: &TrackTable, result: &TrackTable, from: usize, to: usize, index: &PairIndex) -> Vec<u32> {
-    let mut partners: Vec<Vec<(u32, u32)>> = vec![Vec::new(); truth.n_tracks()];
-    for (k, &(t, r)) in index.pairs().iter().enumerate() {
-        partners[t as usize].push((r, k as u32));
-    }
-    let mut here = vec![false; result.n_tracks()];
-    let mut shared = vec![0; index.pairs().len()];
-    for frame in from..to.min(truth.n_frames().max(result.n_frames())) {
-        result.rows(frame).for_each(|r| here[result.tracks[r] as usize] = true);
-        for r in truth.rows(frame) {
-            for &(p, k) in &partners[truth.tracks[r] as usize] {
-                shared[k as usize] += u32::from(here[p as usize]);
-            }
-        }
-        result.rows(frame).for_each(|r| here[result.tracks[r] as usize] = false);
-    }
-    shared
 }
 
 #[cfg(test)]

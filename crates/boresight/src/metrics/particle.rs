@@ -7,6 +7,7 @@
 //! Limits: two dimensions.
 
 use super::assignment::{Matcher, Pair};
+use super::near::{each_near_pair, rows_of_tracks, shared_frames};
 use super::pairs::PairIndex;
 use crate::{Error, ErrorKind, Result, TrackTable};
 use serde::Serialize;
@@ -26,11 +27,6 @@ pub struct ParticleScores {
     pub rmse_px: f64,
 }
 
-fn point(t: &TrackTable, r: usize) -> [f64; 2] {
-    let e = t.extent(r);
-    [e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0]
-}
-
 /// Computes the measures with the gate `gate_px` (the challenge: 5).
 /// # Errors
 /// A gate not above 0; a truth without rows.
@@ -41,15 +37,10 @@ pub fn particle_scores(truth: &TrackTable, result: &TrackTable, gate_px: f64) ->
     if truth.n_rows() == 0 {
         return Err(Error::new(ErrorKind::Damaged, "has no rows: alpha is not defined").at(&truth.label));
     }
-    let rows_of = |t: &TrackTable| {
-        let mut n = vec![0_u32; t.n_tracks()];
-        t.tracks.iter().for_each(|&k| n[k as usize] += 1);
-        n
-    };
-    let n_r = rows_of(result);
+    let n_r = rows_of_tracks(result, 0..result.n_frames());
     let (index, gain, hits) = gains(truth, result, gate_px);
     // A frame that both share is no loss for the result track; frames it has alone cost the gate.
-    let both = shared_frames(truth, result, &index);
+    let both = shared_frames(truth, result, 0..truth.n_frames(), &index);
     let mut pairs: Vec<(Pair, u32)> = Vec::new();
     for (k, &(t, r)) in index.pairs().iter().enumerate() {
         let weight = gain[k] - gate_px * f64::from(n_r[r as usize] - both[k]);
@@ -87,49 +78,17 @@ type Hits = Vec<(u32, f64)>;
 /// For every pair ever nearer than the gate: Σ (ε − d), and how many such frames with the sum of d².
 fn gains(truth: &TrackTable, result: &TrackTable, gate: f64) -> (PairIndex, Vec<f64>, Hits) {
     let (mut index, mut gain, mut hits) = (PairIndex::default(), Vec::new(), Vec::new());
-    let mut near: Vec<([f64; 2], u32)> = Vec::new();
-    for frame in 0..truth.n_frames().min(result.n_frames()) {
-        near.clear();
-        near.extend(result.rows(frame).map(|r| (point(result, r), result.tracks[r])));
-        near.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-        for r in truth.rows(frame) {
-            let a = point(truth, r);
-            let begin = near.partition_point(|n| n.0[0] <= a[0] - gate);
-            for (b, track) in near[begin..].iter().take_while(|n| n.0[0] < a[0] + gate) {
-                let d = (a[0] - b[0]).hypot(a[1] - b[1]);
-                if d < gate {
-                    let k = index.number(truth.tracks[r], *track) as usize;
-                    if k == gain.len() {
-                        gain.push(0.0);
-                        hits.push((0, 0.0));
-                    }
-                    gain[k] += gate - d;
-                    hits[k].0 += 1;
-                    hits[k].1 += d * d;
-                }
-            }
+    each_near_pair(truth, result, 0..truth.n_frames(), gate, |n| {
+        let k = index.number(n.truth, n.result) as usize;
+        if k == gain.len() {
+            gain.push(0.0);
+            hits.push((0, 0.0));
         }
-    }
+        gain[k] += gate - n.distance_px;
+        hits[k].0 += 1;
+        hits[k].1 += n.distance_px * n.distance_px;
+    });
     (index, gain, hits)
-}
-
-fn shared_frames(truth: &TrackTable, result: &TrackTable, index: &PairIndex) -> Vec<u32> {
-    let mut partners: Vec<Vec<(u32, u32)>> = vec![Vec::new(); truth.n_tracks()];
-    for (k, &(t, r)) in index.pairs().iter().enumerate() {
-        partners[t as usize].push((r, k as u32));
-    }
-    let mut here = vec![false; result.n_tracks()];
-    let mut shared = vec![0; index.pairs().len()];
-    for frame in 0..truth.n_frames().min(result.n_frames()) {
-        result.rows(frame).for_each(|r| here[result.tracks[r] as usize] = true);
-        for r in truth.rows(frame) {
-            for &(p, k) in &partners[truth.tracks[r] as usize] {
-                shared[k as usize] += u32::from(here[p as usize]);
-            }
-        }
-        result.rows(frame).for_each(|r| here[result.tracks[r] as usize] = false);
-    }
-    shared
 }
 
 #[cfg(test)]

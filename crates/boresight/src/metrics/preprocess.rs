@@ -27,6 +27,20 @@ pub enum Rules {
     Kitti(KittiClass),
 }
 
+impl Rules {
+    /// The rules of a MOTChallenge truth by its look: MOT15's without classes, MOT20's where its name says so, else MOT17's.
+    pub fn of_mot_challenge(truth: &TrackTable) -> Self {
+        let has_classes = (0..truth.n_rows()).any(|r| truth.class.get(r) != 1);
+        if !has_classes {
+            Self::Mot15
+        } else if truth.label.to_ascii_uppercase().contains("MOT20") {
+            Self::Mot20
+        } else {
+            Self::Mot17
+        }
+    }
+}
+
 /// The classes that KITTI evaluates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KittiClass {

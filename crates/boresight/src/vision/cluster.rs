@@ -13,6 +13,7 @@ use super::region::Region;
 use super::runs::{RowRuns, RunWord, find_runs};
 use super::threshold::band::{band_bits, words};
 use crate::Image;
+use crate::union_find::root;
 use fearless_simd::Level;
 
 /// Joins rows of bits to regions.
@@ -177,16 +178,8 @@ impl Clusterer {
     }
 
     #[inline(always)]
-    fn root(&mut self, mut label: u32) -> u32 {
-        loop {
-            let parent = self.regions[label as usize].parent;
-            if parent == label {
-                return label;
-            }
-            let above = self.regions[parent as usize].parent;
-            self.regions[label as usize].parent = above;
-            label = above;
-        }
+    fn root(&mut self, label: u32) -> u32 {
+        root(&mut self.regions, label)
     }
 
     /// Joins two regions and returns the one that stays, the earlier.

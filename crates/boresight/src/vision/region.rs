@@ -1,6 +1,7 @@
 //! A region: what is kept of a cluster of pixels while rows go by, enough for its centroid and that centroid's covariance.
 
 use super::pixel::{Pixel, RunSums};
+use crate::union_find::Node;
 
 /// Moments of a cluster of pixels. Coordinates are whole pixels; sums of whole-number pixels are exact.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +52,15 @@ fn column_sums(start: u32, end: u32) -> (f64, f64) {
     let x = n as f64 * middle;
     // Σ (x - middle)² = n (n² - 1) / 12; the product is divisible by 6.
     (x, x * middle + 0.5 * (n * (n * n - 1) / 6) as f64)
+}
+
+impl Node for Region {
+    fn parent(&self) -> u32 {
+        self.parent
+    }
+    fn set_parent(&mut self, parent: u32) {
+        self.parent = parent;
+    }
 }
 
 impl Region {

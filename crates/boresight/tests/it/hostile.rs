@@ -6,7 +6,7 @@
 use super::memory::peak_of;
 use boresight::io::tracks::{Format, ReadOptions, read, write};
 use boresight::io::{OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_tracks};
-use boresight::metrics::{MatchOptions, evaluate};
+use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::sim::{SceneConfig, Seed, named};
 use boresight::{Config, Error};
 use rand::{Rng, RngExt, SeedableRng};
@@ -189,7 +189,7 @@ fn damaged_tables_of_tracks_are_survived_read_judged_and_written() {
                 // With bad rows left out, only headers and doubled rows are refused: damage to rows counts as well.
                 n_refused += u32::from(read.is_err() || read.as_ref().is_ok_and(|f| f.bad.count > 0));
                 let file = read?;
-                let _ = evaluate(&truth, &file.table, &MatchOptions::default());
+                let _ = mot_scores(&truth, &file.table, &MatchOptions::default());
                 for to in Format::ALL {
                     let _ = write(&file.table, to, &mut Vec::new());
                 }

@@ -1,41 +1,45 @@
 //! The report: one HTML file with tables and plots, readable without a network.
 
-use super::compare::{self, Row};
-use super::measures::Judged;
-use super::plot::{Line, escaped, label, plot};
-use super::state::over_runs;
-use super::values::mot_values;
+use super::Judged;
+use super::plot::{Line, label, plot};
+use super::table::{comparison as comparison_table, state};
+use boresight::metrics::consistency::Consistency;
+use boresight::metrics::detection::OperatingPoint;
+use boresight::metrics::evaluation::{Comparison, Evaluation, ResultEvaluation, Value, nees_over_runs};
 use boresight::metrics::hota::alphas;
-use std::fmt::Write;
+use boresight::metrics::set::Gospa;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-fn table(judged: &Judged) -> String {
-    let all = judged.combined_values();
-    let mut out = String::from("<div class=\"w\"><table><tr><th>sequence</th>");
-    for (name, _) in &all {
-        let _ = write!(out, "<th>{name}</th>");
-    }
-    out.push_str("</tr>");
-    let mut row = |name: &str, values: &[(&'static str, f64)]| {
-        let _ = write!(out, "<tr><td>{}</td>", escaped(name));
-        for (k, _) in &all {
-            let cell =
-                values.iter().find(|v| v.0 == *k).filter(|v| v.1.is_finite()).map_or("–".to_string(), |v| label(v.1));
-            let _ = write!(out, "<td>{cell}</td>");
-        }
-        out.push_str("</tr>");
+/// Sequences whose curves stand in one plot, and those that have a plot of their own.
+const CURVES: usize = 7;
+const PLOTS: usize = 12;
+
+fn table(e: &ResultEvaluation) -> Markup {
+    let all = e.values();
+    let cell = |values: &[Value], name: &str| {
+        let value = values.iter().find(|v| v.name == name).filter(|v| v.value.is_finite());
+        value.map_or("–".to_string(), |v| label(v.value))
     };
-    for r in &judged.rows {
-        let mut v = mot_values(&r.scores, r.classic.as_ref());
-        if !judged.mot_only {
-            v.extend(r.more_values());
+    let row = |name: &str, values: &[Value]| {
+        html! {
+            tr {
+                td { (name) }
+                @for v in &all { td { (cell(values, v.name)) } }
+            }
         }
-        row(&r.name, &v);
+    };
+    html! {
+        div class="w" {
+            table {
+                tr {
+                    th { "sequence" }
+                    @for v in &all { th { (v.name) } }
+                }
+                @for s in &e.sequences { (row(&s.name, &s.values())) }
+                @if e.sequences.len() > 1 { (row("COMBINED", &all)) }
+            }
+        }
     }
-    if judged.rows.len() > 1 {
-        row("COMBINED", &all);
-    }
-    out.push_str("</table></div>");
-    out
 }
 
 /// At most about 200 points of a long curve: each the mean of a run of frames.
@@ -45,71 +49,79 @@ fn thinned(values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     v.chunks(step).enumerate().map(|(k, c)| ((k * step) as f64, c.iter().sum::<f64>() / c.len() as f64)).collect()
 }
 
-fn plots(judged: &Judged) -> String {
-    let h = &judged.combined.hota;
+/// A line of each of the first sequences.
+fn by_sequence(e: &ResultEvaluation, points: impl Fn(&Evaluation) -> Vec<(f64, f64)>) -> Vec<Line> {
+    e.sequences.iter().take(CURVES).map(|s| Line { name: s.name.clone(), points: points(s) }).collect()
+}
+
+fn plots(e: &ResultEvaluation) -> Markup {
+    let h = &e.combined.hota;
     let curve = |name: &str, c: [f64; 19]| Line { name: name.into(), points: alphas().into_iter().zip(c).collect() };
     let lines = [curve("HOTA", h.hota()), curve("DetA", h.det_a()), curve("AssA", h.ass_a), curve("LocA", h.loc_a)];
-    let mut out = plot("HOTA and its parts", "threshold α", "score", &lines, Some(1.0));
-    if judged.mot_only {
-        return out;
+    html! {
+        (plot("HOTA and its parts", "threshold α", "score", &lines, Some(1.0)))
+        @if e.sequences.iter().any(|s| s.further.is_some()) { (further_plots(e)) }
     }
-    let of_all = |f: &dyn Fn(&super::measures::Row) -> Vec<(f64, f64)>| -> Vec<Line> {
-        judged.rows.iter().take(7).map(|r| Line { name: r.name.clone(), points: f(r) }).collect()
-    };
-    let curve = |r: &super::measures::Row| r.curve.iter().map(|p| (p.recall, p.precision)).collect();
-    out.push_str(&plot("Operating curve over the score", "recall", "precision", &of_all(&curve), Some(1.0)));
-    let curve = |r: &super::measures::Row| r.curve.iter().map(|p| (p.fp_per_frame, p.recall)).collect();
-    out.push_str(&plot("Recall against false alarms", "false alarms per frame", "recall", &of_all(&curve), Some(1.0)));
-    let errors = |r: &super::measures::Row| {
-        r.state.as_ref().map_or(Vec::new(), |s| s.rsspe.iter().map(|&(f, v)| (f64::from(f), v)).collect())
-    };
-    out.push_str(&plot("Position error of the matched rows", "frame", "root mean square, px", &of_all(&errors), None));
-    let runs = over_runs(judged.rows.iter().filter_map(|r| r.state.as_ref()));
-    let line = |name: &str, f: fn(&boresight::metrics::consistency::Consistency) -> f64| Line {
+}
+
+fn further_plots(e: &ResultEvaluation) -> Markup {
+    let operating = by_sequence(e, |s| curve(s).iter().map(|p| (p.recall, p.precision)).collect());
+    let alarms = by_sequence(e, |s| curve(s).iter().map(|p| (p.fp_per_frame, p.recall)).collect());
+    let errors =
+        by_sequence(e, |s| state(s).map_or(Vec::new(), |s| s.rsspe.iter().map(|&(f, v)| (f64::from(f), v)).collect()));
+    let runs = nees_over_runs(e.sequences.iter().filter_map(state));
+    let nees = |name: &str, f: fn(&Consistency) -> f64| Line {
         name: name.into(),
         points: runs.frames.iter().map(|(frame, c)| (f64::from(*frame), f(c))).collect(),
     };
-    let lines = [line("average", |c| c.average), line("lower bound", |c| c.lower), line("upper bound", |c| c.upper)];
-    out.push_str(&plot("Position NEES over the runs", "frame", "average", &lines, None));
-    for r in judged.rows.iter().take(12) {
-        let part = |name: &str, f: fn(&boresight::metrics::set::Gospa) -> f64| Line {
-            name: name.into(),
-            points: thinned(r.gospa.iter().map(f)),
-        };
-        let lines =
-            [part("localisation", |g| g.localisation), part("missed", |g| g.missed), part("false", |g| g.false_)];
-        out.push_str(&plot(&format!("GOSPA by parts: {}", r.name), "frame", "cost, px^p", &lines, None));
+    let nees = [nees("average", |c| c.average), nees("lower bound", |c| c.lower), nees("upper bound", |c| c.upper)];
+    html! {
+        (plot("Operating curve over the score", "recall", "precision", &operating, Some(1.0)))
+        (plot("Recall against false alarms", "false alarms per frame", "recall", &alarms, Some(1.0)))
+        (plot("Position error of the matched rows", "frame", "root mean square, px", &errors, None))
+        (plot("Position NEES over the runs", "frame", "average", &nees, None))
+        @for s in e.sequences.iter().take(PLOTS) {
+            (plot(&format!("GOSPA by parts: {}", s.name), "frame", "cost, px^p", &gospa_parts(s), None))
+        }
     }
-    out
+}
+
+fn curve(s: &Evaluation) -> &[OperatingPoint] {
+    s.further.as_ref().map_or(&[], |f| &f.curve)
+}
+
+fn gospa_parts(s: &Evaluation) -> [Line; 3] {
+    let gospa = s.further.as_ref().map_or(&[][..], |f| &f.gospa);
+    let part = |name: &str, f: fn(&Gospa) -> f64| Line { name: name.into(), points: thinned(gospa.iter().map(f)) };
+    [part("localisation", |g| g.localisation), part("missed", |g| g.missed), part("false", |g| g.false_)]
 }
 
 /// The whole report.
-pub fn report(results: &[Judged], comparison: &[Row]) -> String {
-    let mut out = String::from(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
-<title>boresight evaluate</title><style>\
-body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:1180px;padding:0 1rem;color:#222}\
-h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem;word-break:break-all}\
-.w{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
-th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
-th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:#fff}\
-.f{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:0;flex:1 1 480px;max-width:580px}svg{width:100%}\
-.t{font-size:14px;font-weight:600}.n{font-size:11px;fill:#555}.e{text-anchor:end}.m{text-anchor:middle}.g{stroke:#e4e4e4}\
-.l{margin:0 0 .5rem 3.5rem;font-size:13px}.l span{margin-right:1rem}.l i{display:inline-block;width:.8em;height:.8em;margin-right:.35em}\
-pre{overflow-x:auto;background:#f6f6f6;padding:.8rem}.note{color:#8a4b00}\
-</style><h1>Evaluation</h1>",
-    );
-    if !comparison.is_empty() {
-        let _ = write!(out, "<h2>Comparison</h2><pre>{}</pre>", escaped(&compare::table(results, comparison)));
-    }
-    for judged in results {
-        let _ = write!(out, "<h2>{}</h2>", escaped(&judged.label));
-        for note in &judged.notes {
-            let _ = write!(out, "<p class=\"note\">{}</p>", escaped(note));
+pub fn report(results: &[Judged], comparison: &[Comparison]) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "boresight evaluate" }
+                style { (PreEscaped(include_str!("report.css"))) }
+            }
+            body {
+                h1 { "Evaluation" }
+                @if !comparison.is_empty() {
+                    h2 { "Comparison" }
+                    pre { (comparison_table(results, comparison)) }
+                }
+                @for judged in results {
+                    h2 { (judged.evaluation.label) }
+                    @for note in &judged.notes { p class="note" { (note) } }
+                    (table(&judged.evaluation))
+                    div class="f" { (plots(&judged.evaluation)) }
+                }
+                p { "boresight " (env!("CARGO_PKG_VERSION")) }
+            }
         }
-        out.push_str(&table(judged));
-        let _ = write!(out, "<div class=\"f\">{}</div>", plots(judged));
-    }
-    let _ = writeln!(out, "<p>boresight {}</p></html>", env!("CARGO_PKG_VERSION"));
-    out
+    };
+    page.into_string()
 }

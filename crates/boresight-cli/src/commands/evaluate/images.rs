@@ -4,8 +4,9 @@ use super::Args;
 use super::table::aligned;
 use anyhow::bail;
 use boresight::io::{OpenOptions, is_table, open};
-use boresight::metrics::image::{ImageMetrics, compare};
-use boresight::{Error, ErrorKind, Image, Pixels};
+use boresight::metrics::evaluation::Value;
+use boresight::metrics::image::{ImageMetrics, compare_pixels, mean_values};
+use boresight::{Error, ErrorKind, Pixels};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -20,29 +21,12 @@ pub fn are_frames(input: &str) -> bool {
     !no_bytes && open(input, &OpenOptions::default()).is_ok()
 }
 
-const NAMES: [&str; 6] = ["MSE", "RMSE", "MAE", "PFE", "SNR", "PSNR"];
-
-fn values(m: &ImageMetrics) -> [f64; 6] {
-    [m.mse, m.rmse, m.mae, m.pfe, m.snr, m.psnr]
-}
-
-fn of_colour(image: &Image<[u8; 3]>) -> Image<u8> {
-    Image::from_vec(3 * image.width(), image.height(), image.as_slice().concat()).unwrap_or_default()
-}
-
-/// Compares two frames; RGB frames as three values a pixel.
+/// Compares two frames.
 fn frame(truth: &Pixels, result: &Pixels, peak: Option<f64>) -> boresight::Result<ImageMetrics> {
-    let no_peak = || {
-        Error::new(ErrorKind::Config, "float pixels have no largest value of their own")
-            .hint("--peak gives it, for instance --peak 1")
-    };
-    match (truth, result) {
-        (Pixels::Gray8(a), Pixels::Gray8(b)) => compare(a, b, peak.unwrap_or(255.0)),
-        (Pixels::Gray16(a), Pixels::Gray16(b)) => compare(a, b, peak.unwrap_or(65535.0)),
-        (Pixels::GrayF32(a), Pixels::GrayF32(b)) => compare(a, b, peak.ok_or_else(no_peak)?),
-        (Pixels::Rgb8(a), Pixels::Rgb8(b)) => compare(&of_colour(a), &of_colour(b), peak.unwrap_or(255.0)),
-        _ => Err(Error::new(ErrorKind::Unsupported, "the pixels are of different types: expected the same in both")),
-    }
+    compare_pixels(truth, result, peak).map_err(|e| match (truth, result) {
+        (Pixels::GrayF32(_), Pixels::GrayF32(_)) if peak.is_none() => e.hint("--peak gives it, for instance --peak 1"),
+        _ => e,
+    })
 }
 
 /// Runs the comparison.
@@ -57,7 +41,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let options = OpenOptions::default();
     let (mut truth, mut result) = (open(&args.truth, &options)?, open(&args.result, &options)?);
-    let mut frames: Vec<[f64; 6]> = Vec::new();
+    let mut frames: Vec<ImageMetrics> = Vec::new();
     loop {
         let (a, b) = match (truth.next_frame()?, result.next_frame()?) {
             (None, None) => break,
@@ -69,37 +53,36 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
         };
         let at = format!("{} and {}, frame {}", args.truth, args.result, frames.len());
-        frames.push(values(&frame(&a.pixels, &b.pixels, args.peak).map_err(|e| e.at(at))?));
+        frames.push(frame(&a.pixels, &b.pixels, args.peak).map_err(|e| e.at(at))?);
     }
     for warning in truth.warnings().iter().chain(result.warnings()) {
         eprintln!("warning: {warning}");
     }
-    let n = frames.len().max(1) as f64;
-    let mean: Vec<f64> = (0..NAMES.len()).map(|k| frames.iter().map(|f| f[k]).sum::<f64>() / n).collect();
-    let shown = |v: &[f64]| v.iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>();
-    let head: Vec<String> = std::iter::once("frame").chain(NAMES).map(String::from).collect();
+    let mean = mean_values(&frames);
+    let shown = |v: &[Value; 6]| v.map(|v| format!("{:.4}", v.value)).to_vec();
+    let head: Vec<String> = std::iter::once("frame").chain(mean.map(|v| v.name)).map(String::from).collect();
     let mut rows: Vec<Vec<String>> = Vec::new();
     // Long sequences are summed up on the terminal; the files have every frame.
     if frames.len() <= 20 {
-        rows = frames.iter().enumerate().map(|(k, f)| [vec![k.to_string()], shown(f)].concat()).collect();
+        rows = frames.iter().enumerate().map(|(k, f)| [vec![k.to_string()], shown(&f.values())].concat()).collect();
     }
     if frames.len() != 1 {
         rows.push([vec![format!("mean of {}", frames.len())], shown(&mean)].concat());
     }
     super::super::print(aligned(&head, &rows).as_bytes())?;
-    let mut csv = format!("frame,{}\n", NAMES.join(","));
+    let mut csv = format!("frame,{}\n", mean.map(|v| v.name).join(","));
     for (k, f) in frames.iter().enumerate() {
-        let _ = writeln!(csv, "{k},{}", f.map(|v| v.to_string()).join(","));
+        let _ = writeln!(csv, "{k},{}", f.values().map(|v| v.value.to_string()).join(","));
     }
     if let Some(path) = &args.csv {
         super::put(path, &csv)?;
     }
-    let combined: Vec<(&'static str, f64)> = NAMES.into_iter().zip(mean).collect();
     if let Some(path) = &args.json {
         let named: serde_json::Map<String, serde_json::Value> =
-            combined.iter().map(|(k, v)| ((*k).to_string(), (*v).into())).collect();
-        let all = serde_json::json!({"mean": named, "names": NAMES, "frames": frames});
+            mean.iter().map(|v| (v.name.to_string(), v.value.into())).collect();
+        let numbers: Vec<[f64; 6]> = frames.iter().map(|f| f.values().map(|v| v.value)).collect();
+        let all = serde_json::json!({"mean": named, "names": mean.map(|v| v.name), "frames": numbers});
         super::put(path, &serde_json::to_string_pretty(&all)?)?;
     }
-    super::met(args, &combined)
+    super::met(args, &mean)
 }

@@ -1,14 +1,9 @@
 //! Line plots as SVG, for the report.
 
-use std::fmt::Write;
+use maud::{Markup, html};
 
 /// Colours that stay apart for colour-blind readers (M. Okabe, K. Ito, 2008).
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
-
-/// Text as it may stand in HTML.
-pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
 
 /// A line of a plot.
 pub struct Line {
@@ -33,80 +28,96 @@ pub fn label(v: f64) -> String {
     if text == "-0" { "0".into() } else { text.to_string() }
 }
 
-/// A plot with its legend; `y_max` fixes the top of the axis, which begins at 0. Nothing where there is no point.
-pub fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f64>) -> String {
-    let points = || lines.iter().flat_map(|l| &l.points).filter(|p| p.0.is_finite() && p.1.is_finite());
-    if points().next().is_none() {
-        return String::new();
-    }
-    let fold =
-        |f: &dyn Fn(&(f64, f64)) -> f64, start: f64, pick: fn(f64, f64) -> f64| points().map(f).fold(start, pick);
-    let (x0, mut x1) = (fold(&|p| p.0, f64::INFINITY, f64::min), fold(&|p| p.0, f64::NEG_INFINITY, f64::max));
-    let mut y1 = y_max.unwrap_or(1.05 * fold(&|p| p.1, 0.0, f64::max));
-    if x1 <= x0 {
-        x1 = x0 + 1.0;
-    }
-    if y1 <= 0.0 {
-        y1 = 1.0;
-    }
-    let (w, h, left, top, right, bottom) = (560.0, 320.0, 58.0, 30.0, 12.0, 44.0);
-    let px = |x: f64| left + (x - x0) / (x1 - x0) * (w - left - right);
-    let py = |y: f64| h - bottom - (y / y1).clamp(0.0, 1.0) * (h - top - bottom);
-    let mut s = format!(
-        "<svg viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"{0}\"><text x=\"{left}\" y=\"18\" class=\"t\">{0}</text>",
-        escaped(title)
-    );
-    for t in ticks(0.0, y1) {
-        let y = py(t);
-        let _ = write!(s, "<line x1=\"{left}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" class=\"g\"/>", w - right);
-        let _ = write!(s, "<text x=\"{}\" y=\"{:.1}\" class=\"n e\">{}</text>", left - 6.0, y + 4.0, label(t));
-    }
-    for t in ticks(x0, x1) {
-        let x = px(t);
-        let _ = write!(s, "<text x=\"{x:.1}\" y=\"{}\" class=\"n m\">{}</text>", h - bottom + 16.0, label(t));
-    }
-    let _ = write!(
-        s,
-        "<text x=\"{}\" y=\"{}\" class=\"n m\">{}</text>",
-        (left + w - right) / 2.0,
-        h - 8.0,
-        escaped(x_name)
-    );
-    let _ = write!(
-        s,
-        "<text transform=\"translate(14 {}) rotate(-90)\" class=\"n m\">{}</text>",
-        (top + h - bottom) / 2.0,
-        escaped(y_name)
-    );
-    for (k, line) in lines.iter().enumerate() {
-        let colour = COLOURS[k % COLOURS.len()];
-        if let [p] = line.points[..] {
-            // A single point has no line: a result whose scores are all the same.
-            let _ = write!(s, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"4\" fill=\"{colour}\"/>", px(p.0), py(p.1));
+/// Size of a plot and its margins, px.
+const WIDTH: f64 = 560.0;
+const HEIGHT: f64 = 320.0;
+const LEFT: f64 = 58.0;
+const TOP: f64 = 30.0;
+const RIGHT: f64 = 12.0;
+const BOTTOM: f64 = 44.0;
+
+/// From values to places in the plot.
+struct Axes {
+    x: (f64, f64),
+    /// Top of the y axis, which begins at 0.
+    y_max: f64,
+}
+
+impl Axes {
+    /// The axes that hold all points; `None` without any.
+    fn around(lines: &[Line], y_max: Option<f64>) -> Option<Self> {
+        let points = || lines.iter().flat_map(Line::finite);
+        points().next()?;
+        let (x0, mut x1) =
+            points().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.0), high.max(p.0)));
+        let mut y1 = y_max.unwrap_or(1.05 * points().map(|p| p.1).fold(0.0, f64::max));
+        if x1 <= x0 {
+            x1 = x0 + 1.0;
         }
-        let path: Vec<String> = line
-            .points
-            .iter()
-            .filter(|p| p.0.is_finite() && p.1.is_finite())
-            .map(|p| format!("{:.1},{:.1}", px(p.0), py(p.1)))
-            .collect();
-        let _ = write!(
-            s,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"/>",
-            path.join(" ")
-        );
+        if y1 <= 0.0 {
+            y1 = 1.0;
+        }
+        Some(Self { x: (x0, x1), y_max: y1 })
     }
-    s.push_str("</svg><p class=\"l\">");
-    for (k, line) in lines.iter().enumerate() {
-        let _ = write!(
-            s,
-            "<span><i style=\"background:{}\"></i>{}</span>",
-            COLOURS[k % COLOURS.len()],
-            escaped(&line.name)
-        );
+
+    fn px(&self, x: f64) -> f64 {
+        LEFT + (x - self.x.0) / (self.x.1 - self.x.0) * (WIDTH - LEFT - RIGHT)
     }
-    s.push_str("</p>");
-    format!("<figure>{s}</figure>")
+
+    fn py(&self, y: f64) -> f64 {
+        HEIGHT - BOTTOM - (y / self.y_max).clamp(0.0, 1.0) * (HEIGHT - TOP - BOTTOM)
+    }
+}
+
+impl Line {
+    fn finite(&self) -> impl Iterator<Item = &(f64, f64)> {
+        self.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite())
+    }
+}
+
+/// One decimal: a tenth of a pixel.
+fn at(v: f64) -> String {
+    format!("{v:.1}")
+}
+
+/// A plot with its legend; `y_max` fixes the top of the axis, which begins at 0. Nothing where there is no point.
+pub fn plot(title: &str, x_name: &str, y_name: &str, lines: &[Line], y_max: Option<f64>) -> Markup {
+    let Some(axes) = Axes::around(lines, y_max) else { return Markup::default() };
+    let coloured = || lines.iter().zip(COLOURS.iter().cycle());
+    let middle_y = (TOP + HEIGHT - BOTTOM) / 2.0;
+    html! {
+        figure {
+            svg viewBox=(format!("0 0 {WIDTH} {HEIGHT}")) role="img" aria-label=(title) {
+                text x=(LEFT) y="18" class="t" { (title) }
+                @for (t, y) in ticks(0.0, axes.y_max).into_iter().map(|t| (t, axes.py(t))) {
+                    line x1=(LEFT) x2=(WIDTH - RIGHT) y1=(at(y)) y2=(at(y)) class="g" {}
+                    text x=(LEFT - 6.0) y=(at(y + 4.0)) class="n e" { (label(t)) }
+                }
+                @for t in ticks(axes.x.0, axes.x.1) {
+                    text x=(at(axes.px(t))) y=(HEIGHT - BOTTOM + 16.0) class="n m" { (label(t)) }
+                }
+                text x=((LEFT + WIDTH - RIGHT) / 2.0) y=(HEIGHT - 8.0) class="n m" { (x_name) }
+                text transform=(format!("translate(14 {middle_y}) rotate(-90)")) class="n m" { (y_name) }
+                @for (line, colour) in coloured() {
+                    // A single point has no line: a result whose scores are all the same.
+                    @if let [p] = line.points[..] {
+                        circle cx=(at(axes.px(p.0))) cy=(at(axes.py(p.1))) r="4" fill=(colour) {}
+                    }
+                    polyline points=(path(&axes, line)) fill="none" stroke=(colour) stroke-width="1.8" {}
+                }
+            }
+            p class="l" {
+                @for (line, colour) in coloured() {
+                    span { i style=(format!("background:{colour}")) {} (line.name) }
+                }
+            }
+        }
+    }
+}
+
+fn path(axes: &Axes, line: &Line) -> String {
+    let points: Vec<String> = line.finite().map(|p| format!("{:.1},{:.1}", axes.px(p.0), axes.py(p.1))).collect();
+    points.join(" ")
 }
 
 #[cfg(test)]
@@ -121,7 +132,10 @@ mod tests {
     }
 
     #[test]
-    fn names_are_escaped() {
-        assert_eq!(escaped("<b>&\""), "&lt;b&gt;&amp;&quot;");
+    fn names_are_escaped_and_a_plot_without_points_is_left_out() {
+        let line = |points| [Line { name: "<b>&\"".into(), points }];
+        let shown = plot("t", "x", "y", &line(vec![(0.0, 1.0)]), None).into_string();
+        assert!(shown.contains("&lt;b&gt;&amp;&quot;") && shown.contains("<circle"), "{shown}");
+        assert!(plot("t", "x", "y", &line(vec![(0.0, f64::NAN)]), None).into_string().is_empty());
     }
 }

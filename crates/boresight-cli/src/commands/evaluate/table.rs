@@ -1,8 +1,10 @@
 //! The scores as tables: for the terminal and as CSV.
 
-use super::measures::Judged;
-use super::state;
-use super::values::mot_values;
+use super::Judged;
+use boresight::metrics::consistency::Consistency;
+use boresight::metrics::evaluation::{
+    Comparison, Evaluation, NeesOverRuns, ResultEvaluation, StateMeasures, Value, nees_over_runs,
+};
 use std::fmt::Write;
 
 const COUNTS: [&str; 7] = ["FP", "FN", "IDSW", "Frag", "MT", "PT", "ML"];
@@ -39,86 +41,138 @@ pub fn aligned(head: &[String], rows: &[Vec<String>]) -> String {
     out
 }
 
-fn block(
-    judged: &Judged,
-    values: &dyn Fn(usize) -> Vec<(&'static str, f64)>,
-    combined: &[(&'static str, f64)],
-) -> String {
+fn block(e: &ResultEvaluation, values: fn(&Evaluation) -> Vec<Value>, combined: &[Value]) -> String {
     let mut head = vec!["sequence".to_string()];
-    head.extend(combined.iter().map(|c| c.0.to_string()));
+    head.extend(combined.iter().map(|c| c.name.to_string()));
     let mut rows = Vec::new();
-    for (k, row) in judged.rows.iter().enumerate() {
-        let own = values(k);
-        let mut cells = vec![row.name.clone()];
-        cells.extend(combined.iter().map(|c| own.iter().find(|o| o.0 == c.0).map_or("-".into(), |o| number(o.0, o.1))));
+    for sequence in &e.sequences {
+        let own = values(sequence);
+        let mut cells = vec![sequence.name.clone()];
+        let cell = |c: &Value| own.iter().find(|o| o.name == c.name).map_or("-".into(), |o| number(o.name, o.value));
+        cells.extend(combined.iter().map(cell));
         rows.push(cells);
     }
-    if judged.rows.len() > 1 {
+    if e.sequences.len() > 1 {
         let mut cells = vec!["COMBINED".to_string()];
-        cells.extend(combined.iter().map(|c| number(c.0, c.1)));
+        cells.extend(combined.iter().map(|c| number(c.name, c.value)));
         rows.push(cells);
     }
     aligned(&head, &rows)
 }
 
 /// The tables of one result.
-pub fn sequences(judged: &Judged, mot_only: bool) -> String {
-    let mut out = format!("{}\n\n", judged.label);
-    let all = judged.combined_values();
-    let n_mot = mot_values(&judged.combined, None).len();
-    let mot = |k: usize| mot_values(&judged.rows[k].scores, judged.rows[k].classic.as_ref());
-    out.push_str(&block(judged, &mot, &all[..n_mot]));
+pub fn sequences(e: &ResultEvaluation) -> String {
+    let mut out = format!("{}\n\n", e.label);
+    out.push_str(&block(e, Evaluation::mot_values, &e.mot_values()));
     out.push('\n');
-    if !mot_only {
-        let more = |k: usize| judged.rows[k].more_values();
-        for part in all[n_mot..].chunks(12) {
-            out.push_str(&block(judged, &more, part));
-            out.push('\n');
+    for part in e.further_values().chunks(12) {
+        out.push_str(&block(e, Evaluation::further_values, part));
+        out.push('\n');
+    }
+    for sequence in &e.sequences {
+        for line in state(sequence).into_iter().flat_map(sentences) {
+            let _ = writeln!(out, "{}: {line}", sequence.name);
         }
     }
-    for row in &judged.rows {
-        for line in row.state.iter().flat_map(state::StateScores::sentences) {
-            let _ = writeln!(out, "{}: {line}", row.name);
-        }
-    }
-    if let Some(line) = state::over_runs(judged.rows.iter().filter_map(|r| r.state.as_ref())).sentence() {
+    if let Some(line) = over_runs(&nees_over_runs(e.sequences.iter().filter_map(state))) {
         let _ = writeln!(out, "{line}");
     }
     out
 }
 
+/// The state measures of a sequence, if it has any.
+pub fn state(sequence: &Evaluation) -> Option<&StateMeasures> {
+    sequence.further.as_ref()?.state.as_ref()
+}
+
+/// What the consistency tests say.
+fn sentences(state: &StateMeasures) -> Vec<String> {
+    let tests = [("position NEES", &state.nees), ("state NEES", &state.nees4), ("NIS", &state.nis)];
+    tests.into_iter().filter_map(|(name, c)| c.as_ref().map(|c| sentence(name, c))).collect()
+}
+
+fn sentence(what: &str, c: &Consistency) -> String {
+    format!(
+        "{what} {:.3} over {} values, expected {} within {:.3} to {:.3} (95 %): {}",
+        c.average,
+        c.n,
+        c.expected,
+        c.lower,
+        c.upper,
+        c.verdict()
+    )
+}
+
+/// What the averages over runs say, if there are any.
+fn over_runs(runs: &NeesOverRuns) -> Option<String> {
+    if runs.frames.is_empty() {
+        return None;
+    }
+    let inside = runs.frames.iter().filter(|(_, c)| c.is_credible()).count();
+    let share = 100.0 * inside as f64 / runs.frames.len() as f64;
+    Some(format!(
+        "position NEES over {} runs: {inside} of {} frames ({share:.1} %) within their 95 % bounds",
+        runs.n_runs,
+        runs.frames.len()
+    ))
+}
+
+/// The comparison of several results; nothing for one.
+pub fn comparison(results: &[Judged], rows: &[Comparison]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let head = ["measure", "result", "score", "95 % interval", "minus first", "95 % interval", "above first in"];
+    let head: Vec<String> = head.map(String::from).to_vec();
+    let mut cells = Vec::new();
+    for row in rows {
+        for (k, (c, judged)) in row.results.iter().zip(results).enumerate() {
+            let mut line = vec![
+                row.measure.to_string(),
+                judged.evaluation.label.clone(),
+                format!("{:.4}", c.score.value),
+                format!("{:.4} .. {:.4}", c.score.lower, c.score.upper),
+            ];
+            if k > 0 {
+                line.push(format!("{:+.4}", c.difference.value));
+                line.push(format!("{:+.4} .. {:+.4}", c.difference.lower, c.difference.upper));
+                line.push(format!("{:.1} % of draws", 100.0 * c.share_above));
+            }
+            cells.push(line);
+        }
+    }
+    aligned(&head, &cells)
+}
+
 /// All results and sequences as CSV.
 pub fn csv(results: &[Judged]) -> String {
     let mut out = String::from("result,sequence");
-    let names: Vec<&str> = results.first().map_or(Vec::new(), |j| j.combined_values().iter().map(|c| c.0).collect());
+    let names: Vec<&str> =
+        results.first().map_or(Vec::new(), |j| j.evaluation.values().iter().map(|v| v.name).collect());
     for n in &names {
         let _ = write!(out, ",{n}");
     }
     out.push('\n');
     let quoted =
         |s: &str| if s.contains([',', '"']) { format!("\"{}\"", s.replace('"', "\"\"")) } else { s.to_string() };
-    for judged in results {
-        let mut line = |name: &str, values: Vec<(&'static str, f64)>| {
-            let _ = write!(out, "{},{}", quoted(&judged.label), quoted(name));
+    for e in results.iter().map(|j| &j.evaluation) {
+        let mut line = |name: &str, values: Vec<Value>| {
+            let _ = write!(out, "{},{}", quoted(&e.label), quoted(name));
             for n in &names {
-                match values.iter().find(|v| v.0 == *n) {
-                    Some(v) if v.1.is_finite() => {
-                        let _ = write!(out, ",{}", v.1);
+                match values.iter().find(|v| v.name == *n) {
+                    Some(v) if v.value.is_finite() => {
+                        let _ = write!(out, ",{}", v.value);
                     }
                     _ => out.push(','),
                 }
             }
             out.push('\n');
         };
-        for row in &judged.rows {
-            let mut v = mot_values(&row.scores, row.classic.as_ref());
-            if !judged.mot_only {
-                v.extend(row.more_values());
-            }
-            line(&row.name, v);
+        for sequence in &e.sequences {
+            line(&sequence.name, sequence.values());
         }
-        if judged.rows.len() > 1 {
-            line("COMBINED", judged.combined_values());
+        if e.sequences.len() > 1 {
+            line("COMBINED", e.values());
         }
     }
     out

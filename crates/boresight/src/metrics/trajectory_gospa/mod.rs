@@ -14,9 +14,12 @@
 //! Limits: at most [`TrajectoryOptions::max_unknowns`] shares in all.
 
 mod programme;
+mod solver;
 
+use super::near::each_near_pair;
 use super::pairs::PairIndex;
 use super::set::SetOptions;
+use crate::union_find::{join, root};
 use crate::{Error, ErrorKind, Result, TrackTable};
 use programme::{Group, Share};
 use serde::Serialize;
@@ -58,11 +61,6 @@ pub struct TrajectoryGospa {
     pub n_unknowns: usize,
 }
 
-fn centre(table: &TrackTable, row: usize) -> [f64; 2] {
-    let e = table.extent(row);
-    [e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0]
-}
-
 /// What a pair gains in a frame by being assigned, in units of c^p.
 #[derive(Clone, Copy, Debug)]
 struct Near {
@@ -74,41 +72,18 @@ struct Near {
 /// All pairs nearer than c, by frame.
 fn near_pairs(truth: &TrackTable, result: &TrackTable, c: f64, p: f64) -> (PairIndex, Vec<Near>) {
     let (mut index, mut near) = (PairIndex::default(), Vec::new());
-    let mut line: Vec<([f64; 2], u32)> = Vec::new();
-    for frame in 0..truth.n_frames().min(result.n_frames()) {
-        line.clear();
-        line.extend(result.rows(frame).map(|r| (centre(result, r), result.tracks[r])));
-        line.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-        for r in truth.rows(frame) {
-            let a = centre(truth, r);
-            let begin = line.partition_point(|n| n.0[0] <= a[0] - c);
-            for (b, track) in line[begin..].iter().take_while(|n| n.0[0] < a[0] + c) {
-                let d = (a[0] - b[0]).hypot(a[1] - b[1]);
-                if d < c {
-                    let pair = index.number(truth.tracks[r], *track);
-                    near.push(Near { frame: frame as u32, pair, gain: 1.0 - (d / c).powf(p) });
-                }
-            }
-        }
-    }
+    each_near_pair(truth, result, 0..truth.n_frames(), c, |n| {
+        let pair = index.number(n.truth, n.result);
+        near.push(Near { frame: n.frame as u32, pair, gain: 1.0 - (n.distance_px / c).powf(p) });
+    });
     (index, near)
-}
-
-/// Root of a node in a forest of groups, halving the path on the way.
-fn root(parent: &mut [u32], mut n: u32) -> u32 {
-    while parent[n as usize] != n {
-        parent[n as usize] = parent[parent[n as usize] as usize];
-        n = parent[n as usize];
-    }
-    n
 }
 
 /// The group of each pair: pairs that share a truth or a result are in one. Numbers go by first pair.
 fn groups(index: &PairIndex, n_truths: usize, n_results: usize) -> (Vec<u32>, usize) {
     let mut parent: Vec<u32> = (0..(n_truths + n_results) as u32).collect();
     for &(t, r) in index.pairs() {
-        let (a, b) = (root(&mut parent, t), root(&mut parent, n_truths as u32 + r));
-        parent[a.max(b) as usize] = a.min(b);
+        join(&mut parent, t, n_truths as u32 + r);
     }
     let mut number = vec![u32::MAX; parent.len()];
     let mut n = 0;

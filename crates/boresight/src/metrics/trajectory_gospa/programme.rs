@@ -1,13 +1,12 @@
 //! The linear programme of a group of pairs in trajectory GOSPA.
 //!
 //! Maximise Σ gain w − λ Σ |w(k) − w(k − 1)| over shares w ≥ 0 of each pair in each block of frames, where the shares of
-//! a truth, and those of a result, sum to at most 1. Solved by the interior point method of the crate `clarabel`; a solution
+//! a truth, and those of a result, sum to at most 1. A solution
 //! that lies within 1e-6 of multiples of 1/6 is moved onto them, so that the usual sums are exact to the last digits.
 //! Symbols: gain and λ in units of c^p.
 
-use crate::{Error, ErrorKind, Result};
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
+use super::solver::{LinearProgramme, solve};
+use crate::Result;
 
 /// A pair in a block of frames.
 #[derive(Clone, Copy, Debug)]
@@ -157,32 +156,9 @@ impl Group {
         cost.resize(n_w + n_u, lambda);
         let mut bound = vec![0.0; n_rows];
         bound[row_sum..row_change].fill(1.0);
-        let constraints = CscMatrix::new(n_rows, n_w + n_u, starts, rows, values);
-        let mut x = solve(&cost, &constraints, &bound)?;
+        let mut x = solve(LinearProgramme { cost, starts, rows, values, bound })?;
         x.truncate(n_w);
         Ok(x)
-    }
-}
-
-fn solve(cost: &[f64], constraints: &CscMatrix<f64>, bound: &[f64]) -> Result<Vec<f64>> {
-    let settings = DefaultSettings {
-        verbose: false,
-        max_threads: 1,
-        tol_gap_abs: 1e-11,
-        tol_gap_rel: 1e-12,
-        tol_feas: 1e-11,
-        ..DefaultSettings::default()
-    };
-    let failed = |why: String| Error::new(ErrorKind::Numeric, format!("trajectory GOSPA: {why}"));
-    let quadratic = CscMatrix::zeros((cost.len(), cost.len()));
-    let cones = [NonnegativeConeT(bound.len())];
-    let mut solver = DefaultSolver::new(&quadratic, cost, constraints, bound, &cones, settings)
-        .map_err(|e| failed(format!("the linear programme is refused: {e}")))?;
-    solver.solve();
-    match solver.solution.status {
-        // The solver stops where the last digits no longer improve; 1e-8 of a gap is then guaranteed.
-        SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(std::mem::take(&mut solver.solution.x)),
-        other => Err(failed(format!("the linear programme ends as {other:?}"))),
     }
 }
 

@@ -7,6 +7,7 @@
 //! so an answer is always there).
 
 use super::{NONE, Tree, WINDOW};
+use crate::union_find::{join, root};
 
 /// Largest cluster that is searched (the search is as deep as the cluster is large).
 const DEEPEST: usize = 500;
@@ -43,8 +44,7 @@ impl Select {
         self.parent.extend(0..trees.len() as u32);
         for pair in self.claims.windows(2) {
             if (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1) {
-                let (a, b) = (root(&mut self.parent, pair[0].2), root(&mut self.parent, pair[1].2));
-                self.parent[a.max(b) as usize] = a.min(b);
+                join(&mut self.parent, pair[0].2, pair[1].2);
             }
         }
         self.used.resize(WINDOW, Vec::new());
@@ -150,13 +150,4 @@ impl Select {
         self.descend(trees, order, score);
         self.picks.pop();
     }
-}
-
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        let up = parent[parent[i as usize] as usize];
-        parent[i as usize] = up;
-        i = up;
-    }
-    i
 }

@@ -3,6 +3,7 @@
 //! The full moments of a cluster are taken later and only for the few that count.
 
 use crate::Image;
+use crate::union_find::{Node, root};
 use crate::vision::pixel::Pixel;
 use crate::vision::runs::runs;
 use crate::vision::threshold::Side;
@@ -119,13 +120,13 @@ impl Sweep {
     }
 }
 
-fn root(blobs: &mut [Blob], mut label: u32) -> u32 {
-    while blobs[label as usize].parent != label {
-        let parent = blobs[label as usize].parent;
-        blobs[label as usize].parent = blobs[parent as usize].parent;
-        label = parent;
+impl Node for Blob {
+    fn parent(&self) -> u32 {
+        self.parent
     }
-    label
+    fn set_parent(&mut self, parent: u32) {
+        self.parent = parent;
+    }
 }
 
 fn join(blobs: &mut [Blob], a: u32, b: u32) -> u32 {

@@ -5,7 +5,7 @@ use super::real_sequences::data;
 use super::scenes::Lcg;
 use boresight::io::tracks::{ReadOptions, kitti};
 use boresight::metrics::hota::mean;
-use boresight::metrics::{KittiClass, MatchOptions, Rules, evaluate, preprocess};
+use boresight::metrics::{KittiClass, MatchOptions, Rules, mot_scores, preprocess};
 use std::collections::HashMap;
 use std::fmt::Write;
 
@@ -57,7 +57,7 @@ fn kitti_results_score_as_in_trackeval() {
         let (result, _) = kitti::read(&r, ReadOptions::default()).unwrap();
         let class = if class == "car" { KittiClass::Car } else { KittiClass::Pedestrian };
         let (truth, result) = preprocess(&truth, &result, Rules::Kitti(class)).unwrap();
-        let s = evaluate(&truth, &result, &MatchOptions::default()).unwrap();
+        let s = mot_scores(&truth, &result, &MatchOptions::default()).unwrap();
         let ours = [
             s.clear.tp as f64,
             s.clear.fn_ as f64,

@@ -8,12 +8,12 @@ use boresight::metrics::hota::mean;
 use boresight::metrics::set::{OspaAssignment, SetDistance, SetOptions};
 use boresight::metrics::siap::{nearest_associations, siap};
 use boresight::metrics::trajectory_gospa::{TrajectoryOptions, trajectory_gospa};
-use boresight::metrics::{MatchOptions, Similarity, clear_classic, evaluate};
+use boresight::metrics::{MatchOptions, Similarity, clear_classic, mot_scores};
 
 #[test]
 fn a_thousand_scenes_score_as_in_trackeval() {
     compare("trackeval", |truth, result| {
-        let s = evaluate(truth, result, &MatchOptions::default()).unwrap();
+        let s = mot_scores(truth, result, &MatchOptions::default()).unwrap();
         let (c, i, h) = (&s.clear, &s.identity, &s.hota);
         vec![
             ("CLR_TP", c.tp as f64),
@@ -52,7 +52,7 @@ fn a_thousand_scenes_score_as_in_trackeval() {
 fn a_thousand_scenes_score_as_in_py_motmetrics() {
     compare("motmetrics", |truth, result| {
         let c = clear_classic(truth, result, &MatchOptions::default()).unwrap();
-        let i = evaluate(truth, result, &MatchOptions::default()).unwrap().identity;
+        let i = mot_scores(truth, result, &MatchOptions::default()).unwrap().identity;
         // py-motmetrics divides without a floor: nothing at all is NaN there and 0 in TrackEval.
         let nothing = truth.n_rows() + result.n_rows() == 0;
         vec![
@@ -131,7 +131,7 @@ fn a_thousand_scenes_are_as_far_apart_as_in_stone_soup() {
 fn a_thousand_scenes_matched_by_centres_score_as_in_trackeval() {
     let options = MatchOptions { similarity: Similarity::Centre { zero_distance_px: 40.0 }, threshold: 0.5 };
     compare("centre", |truth, result| {
-        let s = evaluate(truth, result, &options).unwrap();
+        let s = mot_scores(truth, result, &options).unwrap();
         vec![
             ("CLR_TP", s.clear.tp as f64),
             ("IDSW", s.clear.idsw as f64),

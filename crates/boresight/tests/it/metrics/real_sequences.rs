@@ -4,7 +4,7 @@
 
 use boresight::io::tracks::{ReadOptions, mot};
 use boresight::metrics::hota::{N_ALPHA, mean};
-use boresight::metrics::{MatchOptions, Rules, Scores, clear_classic, evaluate, preprocess};
+use boresight::metrics::{MatchOptions, MotScores, Rules, clear_classic, mot_scores, preprocess};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub fn data() -> Option<PathBuf> {
 }
 
 /// Every number of TrackEval's detailed table by its column's name.
-fn detailed(s: &Scores) -> Vec<(String, f64)> {
+fn detailed(s: &MotScores) -> Vec<(String, f64)> {
     let (h, c, i) = (&s.hota, &s.clear, &s.identity);
     let mut out = Vec::new();
     let curves = [
@@ -104,16 +104,16 @@ fn sequence_length(folder: &Path) -> usize {
     line.trim().parse().unwrap()
 }
 
-fn score(folder: &Path, result: &str, rules: Rules) -> Scores {
+fn score(folder: &Path, result: &str, rules: Rules) -> MotScores {
     let (mut truth, _) = mot::read(&folder.join("gt.txt"), ReadOptions::default()).unwrap();
     truth.extend_to(sequence_length(folder));
     let (result, _) = mot::read(&folder.join(result), ReadOptions::default()).unwrap();
     let (truth, result) = preprocess(&truth, &result, rules).unwrap();
-    evaluate(&truth, &result, &MatchOptions::default()).unwrap()
+    mot_scores(&truth, &result, &MatchOptions::default()).unwrap()
 }
 
 #[track_caller]
-fn compare(ours: &Scores, reference: &HashMap<String, f64>, what: &str) {
+fn compare(ours: &MotScores, reference: &HashMap<String, f64>, what: &str) {
     let mut n = 0;
     for (name, v) in detailed(ours) {
         if let Some(&r) = reference.get(&name) {
@@ -184,7 +184,7 @@ fn mot15_with_the_cem_tracker_scores_as_in_py_motmetrics() {
         let (result, _) = mot::read(&data.join(seq).join("result_cem.txt"), ReadOptions::default()).unwrap();
         let (truth, result) = preprocess(&truth, &result, Rules::Mot15).unwrap();
         let c = clear_classic(&truth, &result, &MatchOptions::default()).unwrap();
-        let s = evaluate(&truth, &result, &MatchOptions::default()).unwrap();
+        let s = mot_scores(&truth, &result, &MatchOptions::default()).unwrap();
         let row = &reference[seq];
         let ours = [
             ("idf1", s.identity.idf1()),
