@@ -1,7 +1,8 @@
 //! Two hundred small scenes of dividing, merging, splitting and missing cells score as in py-ctcmetrics.
 //! References: `scripts/metrics_reference.py cells`.
 
-use super::scenes::{Lcg, reference};
+use super::lcg::Lcg;
+use super::scenes::reference;
 use boresight::metrics::cells::{CellFrame, cell_scores};
 
 const SIDE: usize = 24;

@@ -1,23 +1,7 @@
 //! The random scenes of `scripts/metrics_reference.py`, drawn again number by number.
 
+use super::lcg::Lcg;
 use boresight::{PixelOrigin, TrackRow, TrackTable};
-
-/// The generator of the scripts: a draw below n is the state shifted right by 33, modulo n.
-pub struct Lcg(u64);
-
-impl Lcg {
-    pub fn new(seed: u64) -> Self {
-        let mut l = Self(seed.wrapping_mul(2654435761).wrapping_add(1));
-        for _ in 0..3 {
-            l.next(2);
-        }
-        l
-    }
-    pub fn next(&mut self, n: u64) -> i64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) % n) as i64
-    }
-}
 
 /// A scene's truth and result.
 pub fn scene(seed: u64) -> (TrackTable, TrackTable) {

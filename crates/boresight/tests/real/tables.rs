@@ -1,21 +1,20 @@
 //! Tables of other programs, as they really come: counts and numbers taken from the files with other tools.
 
+use crate::needs::{data, real_tests};
 use boresight::io::{TableOptions, read_detections, read_tracks};
-use std::path::PathBuf;
 
-/// The folder of real data, or `None` (said on the terminal) where it is missing.
-fn data(file: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("BORESIGHT_TEST_DATA")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")), PathBuf::from);
-    let path = root.join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is missing (set BORESIGHT_TEST_DATA)", path.display());
-    None
+real_tests! {
+    trackpy_btrack_and_mot_tables_are_read_whole
+        needs [
+            "trackpy_bulk_water/trackpy_link_first60.csv",
+            "btrack_examples/objects.csv",
+            "mot15_text/PETS09-S2L1/det_frcnn_sort.txt",
+            "ir_drone_svanstrom/IR_BIRD_027.gt.csv",
+        ];
+    the_rate_of_a_mot_sequence_is_found_beside_its_table needs ["pets09_vtest/det_acf.txt"];
+    btrack_tracks_keep_their_identities needs ["btrack_examples/tracks.csv"];
 }
 
-#[test]
 fn trackpy_btrack_and_mot_tables_are_read_whole() {
     // Rows counted with wc -l, frames from the first and last rows, values from the first row.
     let cases = [
@@ -30,7 +29,7 @@ fn trackpy_btrack_and_mot_tables_are_read_whole() {
         ("ir_drone_svanstrom/IR_BIRD_027.gt.csv", None, 0, (142.0 - 0.5 + 20.1245 / 2.0, 29.0 - 0.5 + 17.1654 / 2.0)),
     ];
     for (file, rows, frames, (x, y)) in cases {
-        let Some(path) = data(file) else { continue };
+        let path = data(file);
         let table = read_detections(&path, &TableOptions::default()).unwrap();
         let n: usize = table.scans.iter().map(|s| s.detections.len()).sum();
         assert_eq!(n as u64, table.n_rows, "{file}");
@@ -46,18 +45,16 @@ fn trackpy_btrack_and_mot_tables_are_read_whole() {
     }
 }
 
-#[test]
 fn the_rate_of_a_mot_sequence_is_found_beside_its_table() {
-    let Some(path) = data("pets09_vtest/det_acf.txt") else { return };
+    let path = data("pets09_vtest/det_acf.txt");
     let table = read_detections(&path, &TableOptions::default()).unwrap();
     let ini = std::fs::read_to_string(path.with_file_name("seqinfo.ini")).unwrap();
     let rate: f64 = ini.lines().find_map(|l| l.strip_prefix("frameRate=")).unwrap().trim().parse().unwrap();
     assert_eq!(table.rate_hz, rate);
 }
 
-#[test]
 fn btrack_tracks_keep_their_identities() {
-    let Some(path) = data("btrack_examples/tracks.csv") else { return };
+    let path = data("btrack_examples/tracks.csv");
     let table = read_tracks(&path, &TableOptions::default()).unwrap();
     let rows: usize = table.frames.iter().map(|f| f.tracks.len()).sum();
     assert_eq!(rows, 52678); // SOURCE.md

@@ -2,20 +2,19 @@
 //!
 //! The data are non-commercial and stay outside the repository; the reference files beside them were made by these tools.
 
+use crate::needs::{data, real_tests};
 use boresight::io::tracks::{ReadOptions, mot};
 use boresight::metrics::hota::{N_ALPHA, mean};
 use boresight::metrics::{MatchOptions, MotScores, Rules, clear_classic, mot_scores, preprocess};
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-pub fn data() -> Option<PathBuf> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: test data {} are not here (set BORESIGHT_TEST_DATA)", folder.display());
-    None
+real_tests! {
+    mot15_with_the_cem_tracker_scores_as_in_trackeval needs ["mot15_text"];
+    mot15_with_sort_scores_as_in_trackeval needs ["mot15_text"];
+    mot17_with_distractors_scores_as_in_trackeval needs ["mot17_text"];
+    the_surveillance_clip_scores_as_in_trackeval_for_both_results needs ["pets09_vtest"];
+    mot15_with_the_cem_tracker_scores_as_in_py_motmetrics needs ["mot15_text"];
 }
 
 /// Every number of TrackEval's detailed table by its column's name.
@@ -125,7 +124,7 @@ fn compare(ours: &MotScores, reference: &HashMap<String, f64>, what: &str) {
 }
 
 fn check(set: &str, sequences: &[&str], result: &str, expected: &str, rules: Rules) {
-    let Some(data) = data() else { return };
+    let data = data("");
     let reference = reference(&data.join(set).join(expected));
     for seq in sequences {
         let scores = score(&data.join(set).join(seq), result, rules);
@@ -140,23 +139,19 @@ fn check(set: &str, sequences: &[&str], result: &str, expected: &str, rules: Rul
 
 const MOT15: [&str; 6] = ["ADL-Rundle-6", "ETH-Sunnyday", "KITTI-17", "PETS09-S2L1", "TUD-Campus", "TUD-Stadtmitte"];
 
-#[test]
 fn mot15_with_the_cem_tracker_scores_as_in_trackeval() {
     check("mot15_text", &MOT15, "result_cem.txt", "expected_cem_trackeval_detailed.csv", Rules::Mot15);
 }
 
-#[test]
 fn mot15_with_sort_scores_as_in_trackeval() {
     check("mot15_text", &MOT15, "result_sort.txt", "expected_sort_trackeval_detailed.csv", Rules::Mot15);
 }
 
-#[test]
 fn mot17_with_distractors_scores_as_in_trackeval() {
     let sequences = ["MOT17-02", "MOT17-05", "MOT17-09"];
     check("mot17_text", &sequences, "result_mott.txt", "expected_pedestrian_detailed.csv", Rules::Mot17);
 }
 
-#[test]
 fn the_surveillance_clip_scores_as_in_trackeval_for_both_results() {
     check(
         "pets09_vtest/..",
@@ -174,9 +169,8 @@ fn the_surveillance_clip_scores_as_in_trackeval_for_both_results() {
     );
 }
 
-#[test]
 fn mot15_with_the_cem_tracker_scores_as_in_py_motmetrics() {
-    let Some(data) = data().map(|d| d.join("mot15_text")) else { return };
+    let data = data("mot15_text");
     let reference = reference(&data.join("expected_cem_motmetrics.csv"));
     for seq in MOT15 {
         let (mut truth, _) = mot::read(&data.join(seq).join("gt.txt"), ReadOptions::default()).unwrap();

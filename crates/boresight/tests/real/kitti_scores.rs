@@ -1,13 +1,17 @@
 //! Results on KITTI labels score as in TrackEval's KITTI kit, with neighbour classes and DontCare regions.
 //! References: `scripts/metrics_reference.py kitti`; the labels are non-commercial and stay outside the repository.
 
-use super::real_sequences::data;
-use super::scenes::Lcg;
+use crate::lcg::Lcg;
+use crate::needs::{data, real_tests};
 use boresight::io::tracks::{ReadOptions, kitti};
 use boresight::metrics::hota::mean;
 use boresight::metrics::{KittiClass, MatchOptions, Rules, mot_scores, preprocess};
 use std::collections::HashMap;
 use std::fmt::Write;
+
+real_tests! {
+    kitti_results_score_as_in_trackeval needs ["kitti_ab3dmot"];
+}
 
 /// A result for KITTI labels: shaken truths, some lost or renamed, and the detections as tracks of 20 frames.
 fn result(labels: &str, detections: &str, seed: u64) -> String {
@@ -36,9 +40,8 @@ fn result(labels: &str, detections: &str, seed: u64) -> String {
     out
 }
 
-#[test]
 fn kitti_results_score_as_in_trackeval() {
-    let Some(data) = data().map(|d| d.join("kitti_ab3dmot")) else { return };
+    let data = data("kitti_ab3dmot");
     let path = format!("{}/tests/data/metrics_kitti.csv", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

@@ -1,25 +1,17 @@
 //! Detection on real frames: trackpy's bulk-water microscopy, against trackpy's own numbers.
 
+use crate::needs::{data, real_tests};
 use boresight::vision::build;
 use boresight::vision::config::{DetectorConfig, NoiseConfig};
 use boresight::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use boresight::{PixelKind, Scan};
-use std::path::PathBuf;
 
-fn data(name: &str) -> Option<PathBuf> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let path = folder.join(name);
-    if !path.exists() {
-        println!("skipped: {} is not here (set BORESIGHT_TEST_DATA)", path.display());
-        return None;
-    }
-    Some(path)
+real_tests! {
+    spots_in_the_bulk_water_frames_lie_where_trackpy_finds_them needs ["trackpy_bulk_water"];
 }
 
-#[test]
 fn spots_in_the_bulk_water_frames_lie_where_trackpy_finds_them() {
-    let Some(root) = data("trackpy_bulk_water") else { return };
+    let root = data("trackpy_bulk_water");
     let pattern = root.join("frames").display().to_string();
     let mut source = boresight::io::open(&pattern, &Default::default()).unwrap();
     assert_eq!(source.info().kind, PixelKind::Gray8);

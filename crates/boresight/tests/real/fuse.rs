@@ -1,7 +1,8 @@
 //! Fusion on real data: a ship's radar against AIS, and simulated radars on real aircraft.
 //!
-//! Data: MarCE trials, Solent (private test data) and OpenSky states (MIT), in the folder of `BORESIGHT_TEST_DATA`; skipped without it.
+//! Data: MarCE trials, Solent (private test data) and OpenSky states (MIT).
 
+use crate::needs::{data, real_tests};
 use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables, timelines};
 use boresight::sim::radar_config::{Measures, PolarErrors};
 use boresight::sim::{Radar, RadarConfig, Seed};
@@ -11,17 +12,10 @@ use boresight_filters::Gaussian;
 use boresight_filters::converted::{Polar, converted};
 use nalgebra::{Matrix4, Vector2, Vector4};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-fn data(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("BORESIGHT_TEST_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let path = root.join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+real_tests! {
+    the_solent_radars_azimuth_bias_is_found_from_ais_and_taken_away needs ["radar_maritime_solent/run_01_004"];
+    two_simulated_radars_on_real_aircraft_are_better_fused_than_alone needs ["adsb_ais_stonesoup/OpenSky_Plane_States.csv"];
 }
 
 /// Columns of a CSV file by name, rows that have all of them as numbers.
@@ -58,9 +52,8 @@ fn run(config: &TrackerConfig, scans: &[Scan]) -> Vec<Timeline> {
     timelines(states.iter().map(|(t, s)| (*t, s.as_slice())))
 }
 
-#[test]
 fn the_solent_radars_azimuth_bias_is_found_from_ais_and_taken_away() {
-    let Some(dir) = data("radar_maritime_solent/run_01_004") else { return };
+    let dir = data("radar_maritime_solent/run_01_004");
     let own: Vec<[f64; 3]> = columns(&dir.join("ownship.csv"), ["t", "x", "y"]).to_vec();
     let plots = columns(&dir.join("plots.csv"), ["t", "azimuth_rad", "range_m", "var_az", "var_r"]);
     // Everything relative to the own ship, x east, y north: a heading error is a turn about the origin.
@@ -173,9 +166,8 @@ fn aircraft(path: &std::path::Path) -> Vec<(f64, Vec<TrackState>)> {
     frames.into_iter().map(|(t, s)| (t as f64, s)).collect()
 }
 
-#[test]
 fn two_simulated_radars_on_real_aircraft_are_better_fused_than_alone() {
-    let Some(path) = data("adsb_ais_stonesoup/OpenSky_Plane_States.csv") else { return };
+    let path = data("adsb_ais_stonesoup/OpenSky_Plane_States.csv");
     let truth = aircraft(&path);
     assert!(truth.len() > 100, "{}", truth.len());
     let radar = |name: &str, position: [f64; 2], first: f64| RadarConfig {

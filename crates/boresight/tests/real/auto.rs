@@ -1,54 +1,46 @@
 //! The automatic choice on real clips: each kind of input gets its detector, and says why; infrared keeps what it had.
 
+use crate::needs::{FFMPEG, data, real_tests};
 use boresight::vision::threshold::{Polarity, ThresholdConfig};
 use boresight::{Config, Scan, TrackStatus, auto};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-/// The detector chosen and all reasons as one text; `None` (said so) where the data are missing.
-fn chosen(name: &str) -> Option<(ThresholdConfig, String)> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let path = folder.join(name);
-    if !path.exists() {
-        println!("skipped: {} is not here (set BORESIGHT_TEST_DATA)", path.display());
-        return None;
-    }
-    match auto::open_and_choose(&path.display().to_string(), &Config::default()) {
-        Ok((_, choice)) => Some((choice.config.detector.threshold, choice.reasons.join(" "))),
-        Err(e) => {
-            // AVI and 4:2:2 need ffmpeg.
-            println!("skipped: {e}");
-            None
-        }
-    }
+real_tests! {
+    a_street_seen_by_a_fixed_camera_is_searched_for_what_moves
+        needs ["traffic_bgslibrary/video02.avi", "traffic_bgslibrary/demo.avi", FFMPEG];
+    a_green_ball_is_told_by_its_colour needs ["ball_green_trflorian/ball.mp4"];
+    a_thrown_ball_is_followed_on_its_whole_way needs ["ball_green_trflorian/ball.mp4"];
+    particles_are_spots_and_nuclei_are_compact_pieces
+        needs ["trackpy_bulk_water/frames", "cells_ctc_gowt1/01/frames", "cells_hela_16bit/frames"];
+    infrared_clips_of_still_and_moving_cameras_keep_isolated_bright_targets needs ["ir_drone_svanstrom"];
 }
 
-#[test]
+/// The detector chosen and all reasons as one text.
+fn chosen(name: &str) -> (ThresholdConfig, String) {
+    let (_, choice) = auto::open_and_choose(&data(name).display().to_string(), &Config::default()).unwrap();
+    (choice.config.detector.threshold, choice.reasons.join(" "))
+}
+
 fn a_street_seen_by_a_fixed_camera_is_searched_for_what_moves() {
     for name in ["traffic_bgslibrary/video02.avi", "traffic_bgslibrary/demo.avi"] {
-        let Some((threshold, why)) = chosen(name) else { continue };
+        let (threshold, why) = chosen(name);
         assert!(matches!(threshold, ThresholdConfig::Moving(_)), "{name}: {threshold:?}");
         assert!(why.contains("Fixed camera") && why.contains("moving pixels"), "{why}");
     }
 }
 
-#[test]
 fn a_green_ball_is_told_by_its_colour() {
-    let Some((threshold, why)) = chosen("ball_green_trflorian/ball.mp4") else { return };
+    let (threshold, why) = chosen("ball_green_trflorian/ball.mp4");
     let ThresholdConfig::Colour(c) = threshold else { panic!("{threshold:?}") };
     let [r, g, b] = c.reference;
     assert!(g > r && g > b, "{:?}", c.reference);
     assert!(why.contains("one moving piece of a colour of its own"), "{why}");
 }
 
-#[test]
 fn a_thrown_ball_is_followed_on_its_whole_way() {
-    let Some((threshold, _)) = chosen("ball_green_trflorian/ball.mp4") else { return };
+    let (threshold, _) = chosen("ball_green_trflorian/ball.mp4");
     assert!(matches!(threshold, ThresholdConfig::Colour(_)), "{threshold:?}");
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let path = folder.join("ball_green_trflorian/ball.mp4").display().to_string();
+    let path = data("ball_green_trflorian/ball.mp4").display().to_string();
     let mut run = auto::open(&path, &Config::default()).unwrap();
     let (mut scan, mut n_seen) = (Scan::default(), 0);
     // Frames in which each track took a detection, and those of them in which it was confirmed.
@@ -68,26 +60,25 @@ fn a_thrown_ball_is_followed_on_its_whole_way() {
     assert!(best[0] >= n_seen - 1 && best[1] >= n_seen - 3, "{taken:?}");
 }
 
-#[test]
 fn particles_are_spots_and_nuclei_are_compact_pieces() {
-    if let Some((threshold, why)) = chosen("trackpy_bulk_water/frames") {
+    {
+        let (threshold, why) = chosen("trackpy_bulk_water/frames");
         let ThresholdConfig::Spot(c) = threshold else { panic!("{threshold:?}") };
         // trackpy's walkthrough uses a diameter of 11 px for these frames.
         assert!(c.polarity == Polarity::Dark && (9.0..13.0).contains(&c.size_px), "{c:?}");
         assert!(why.contains("particles"), "{why}");
     }
     for name in ["cells_ctc_gowt1/01/frames", "cells_hela_16bit/frames"] {
-        let Some((threshold, why)) = chosen(name) else { continue };
+        let (threshold, why) = chosen(name);
         assert!(matches!(threshold, ThresholdConfig::Local(_)), "{name}: {threshold:?}");
         assert!(why.contains("cells"), "{why}");
     }
 }
 
-#[test]
 fn infrared_clips_of_still_and_moving_cameras_keep_isolated_bright_targets() {
     // The hard ones of the 31: birds before trees, a shaking camera, a slow pan.
     for name in ["IR_BIRD_027", "IR_BIRD_038", "IR_HELICOPTER_042", "IR_DRONE_046"] {
-        let Some((threshold, _)) = chosen(&format!("ir_drone_svanstrom/{name}.mp4")) else { continue };
+        let (threshold, _) = chosen(&format!("ir_drone_svanstrom/{name}.mp4"));
         let ThresholdConfig::Isolated(c) = threshold else { panic!("{name}: {threshold:?}") };
         assert_eq!(c.polarity, Polarity::Bright, "{name}");
     }
