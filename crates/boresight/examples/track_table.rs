@@ -29,22 +29,12 @@ fn run() -> Result<()> {
     let mut source = frames.first().map(|f| io::open(f, &OpenOptions::default())).transpose()?;
     let config = TrackerConfig::default();
     let mut tracker = track::build(&config)?;
-    let report = HtmlReport::create(
-        out.join("report.html"),
-        Notes {
-            input: table.clone(),
-            facts: vec![("Read as".into(), detections.format.clone())],
-            settings: vec![format!("tracker: {config:#?}")],
-            warnings: detections.warnings.clone(),
-            ..Notes::default()
-        },
-    )?;
-    let notes = report.notes();
-    let mut sinks: Vec<Box<dyn Sink>> = vec![
+    let mut report = HtmlReport::create(out.join("report.html"))?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = vec![
         Box::new(TracksCsv::create(out.join("tracks.csv"))?),
         Box::new(DetectionsCsv::create(out.join("detections.csv"))?),
         Box::new(MotWriter::create(out.join("mot.txt"))?),
-        Box::new(report),
+        Box::new(report.sink()),
     ];
     let (mut tracking_s, mut writing_s) = (0.0, 0.0);
     for scan in &detections.scans {
@@ -61,8 +51,13 @@ fn run() -> Result<()> {
         }
         writing_s += begin.elapsed().as_secs_f64();
     }
-    notes.edit(|n| {
-        n.stages = vec![("read".into(), reading_s), ("track".into(), tracking_s), ("write".into(), writing_s)]
-    });
-    sinks.into_iter().try_for_each(Sink::finish)
+    sinks.into_iter().try_for_each(Sink::finish)?;
+    report.write(&Notes {
+        input: table.clone(),
+        facts: vec![("Read as".into(), detections.format.clone())],
+        settings: vec![format!("tracker: {config:#?}")],
+        warnings: detections.warnings.clone(),
+        stages: vec![("read".into(), reading_s), ("track".into(), tracking_s), ("write".into(), writing_s)],
+        ..Notes::default()
+    })
 }

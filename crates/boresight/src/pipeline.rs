@@ -64,7 +64,7 @@ pub struct Summary {
 pub fn run(
     input: Input,
     mut tracking: Option<Box<dyn Tracking>>,
-    mut sinks: Vec<Box<dyn Sink>>,
+    mut sinks: Vec<Box<dyn Sink + '_>>,
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
 ) -> Result<(Summary, Option<Error>)> {
     let mut summary = Summary::default();
@@ -104,7 +104,7 @@ impl Counts {
 fn drive(
     input: Input,
     tracking: &mut Option<Box<dyn Tracking>>,
-    sinks: &mut [Box<dyn Sink>],
+    sinks: &mut [Box<dyn Sink + '_>],
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
     summary: &mut Summary,
     counts: &mut Counts,

@@ -5,7 +5,7 @@ use crate::progress;
 use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Summary};
-use boresight::report::{HtmlReport, LateReport, Notes};
+use boresight::report::{HtmlReport, Notes};
 use boresight::{Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -55,8 +55,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
     run_options::make_folder(&dir)?;
     let tracking = track::build(&plan.config.tracker)?;
-    let mut sinks = sinks(&args, &plan, &dir)?;
-    let report = if args.no_report { None } else { Some(report(&args, &plan, &dir, &mut sinks)?) };
+    let mut report = (!args.no_report).then(|| HtmlReport::create(dir.join("report.html"))).transpose()?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&args, &plan, &dir)?;
+    if let Some(report) = &mut report {
+        sinks.push(Box::new(report.sink()));
+    }
+    let mut notes = notes(&args, &plan)?;
     run_options::write_config(&dir, &plan)?;
     let quiet = args.input.quiet;
     if !quiet {
@@ -73,7 +77,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })?;
     bar.finish_and_clear();
     if let Some(report) = report {
-        report.write(|notes| late_notes(notes, &summary, broken.as_ref()))?;
+        add_outcome(&mut notes, &summary, broken.as_ref());
+        report.write(&notes)?;
     }
     if !quiet {
         print_summary(&summary, started.elapsed().as_secs_f64(), &dir);
@@ -102,30 +107,25 @@ fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<V
     Ok(sinks)
 }
 
-/// Adds the report to the sinks; its page is written when the times of all stages are known.
-fn report(
-    args: &Args,
-    plan: &Plan,
-    dir: &std::path::Path,
-    sinks: &mut Vec<Box<dyn Sink>>,
-) -> anyhow::Result<LateReport> {
+/// What the report says of the input and the settings.
+fn notes(args: &Args, plan: &Plan) -> anyhow::Result<Notes> {
     let mut facts = Vec::new();
     if let Some(info) = &plan.info {
         facts.push(("Read as".to_string(), info.reader.clone()));
         let times = if info.true_times { "the input's own" } else { "made from the nominal rate" };
         facts.push(("Times".to_string(), times.to_string()));
     }
-    let mut settings = plan.reasons.clone();
-    settings.push(String::new());
-    settings.push(plan.config.to_toml()?);
-    let notes = Notes { input: args.input.input.clone(), facts, settings, ..Default::default() };
-    let (sink, late) = HtmlReport::late(dir.join("report.html"), notes)?;
-    sinks.push(Box::new(sink));
-    Ok(late)
+    Ok(Notes {
+        input: args.input.input.clone(),
+        facts,
+        settings: plan.reasons.clone(),
+        configuration: Some(plan.config.to_toml()?),
+        ..Default::default()
+    })
 }
 
-/// What the report says only at the end.
-fn late_notes(notes: &mut Notes, summary: &Summary, broken: Option<&boresight::Error>) {
+/// Adds what is known only at the end.
+fn add_outcome(notes: &mut Notes, summary: &Summary, broken: Option<&boresight::Error>) {
     let t = &summary.times;
     let stages = [("read", t.read), ("detect", t.detect), ("track", t.track), ("write", t.write)];
     notes.stages = stages.map(|(name, time)| (name.to_string(), time.as_secs_f64())).to_vec();

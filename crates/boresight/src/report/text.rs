@@ -2,22 +2,16 @@
 
 use std::fmt::Write;
 
-/// Escapes text for HTML content and attributes.
-pub(super) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            // Control characters have no place in HTML.
-            c if c.is_control() && c != '\n' && c != '\t' => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
+/// The text without control characters, which have no place in HTML; line ends and tabs stay.
+pub(super) fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() && c != '\n' && c != '\t' { '\u{fffd}' } else { c }).collect()
+}
+
+/// A number with about `digits` significant digits; what is not finite is `null`.
+pub(super) fn short(v: f64, digits: i32) -> String {
+    let mut text = String::new();
+    push_json(&mut text, v, digits);
+    text
 }
 
 /// Appends a number with about `digits` significant digits as JSON; what is not finite becomes `null`.
@@ -104,9 +98,9 @@ mod tests {
 
     #[test]
     fn markup_in_text_stays_text() {
-        assert_eq!(
-            escape("<img src='x' onerror=\"a&b\">\u{0}"),
-            "&lt;img src=&#39;x&#39; onerror=&quot;a&amp;b&quot;&gt;\u{fffd}"
-        );
+        let evil = printable("<img src='x' onerror=\"a&b\">\u{0}");
+        let shown = maud::html! { b title=(evil) { (evil) } }.into_string();
+        let safe = "&lt;img src='x' onerror=&quot;a&amp;b&quot;&gt;\u{fffd}";
+        assert_eq!(shown, format!("<b title=\"{safe}\">{safe}</b>"));
     }
 }

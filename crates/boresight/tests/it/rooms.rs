@@ -33,7 +33,6 @@ const KNOWN_CYCLES: &[&str] = &[
     "crates/boresight/src/associate/",
     "crates/boresight/src/config",
     "crates/boresight/src/metrics/",
-    "crates/boresight/src/report/",
     "crates/boresight/src/track/",
     "crates/boresight-filters/",
     "crates/boresight-cli/",
