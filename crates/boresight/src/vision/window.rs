@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(window, PixelRect { left: 8, top: 8, right: 14, bottom: 14 });
         let found = dark_box(&image, 150.0, false, window).unwrap();
         assert_eq!((found.centre(), found.semi_size()), (Vector2::new(11.5, 10.5), Vector2::new(0.5, 0.5)));
-        // the text's "less than 150" leaves the pixel on the level out.
+        // The paper's text, "less than 150", leaves the pixel on the level out; its program does not.
         assert_eq!(dark_box(&image, 150.0, true, window).unwrap().centre(), Vector2::new(11.0, 10.0));
         assert_eq!(dark_box(&image, 150.0, false, PixelRect::of_image(&image).unwrap()).unwrap().left, 0);
     }

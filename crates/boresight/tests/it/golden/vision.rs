@@ -142,6 +142,7 @@ fn the_track_before_detect_density_is_the_golden_one() {
 #[test]
 fn the_dark_box_and_the_search_window_are_the_golden_ones() {
     let golden = load("dark_bbox_window");
+    let (mut n_boxes, mut n_windows) = (0, 0);
     for case in &golden.cases {
         let (i, o) = (&case["inputs"], &case["outputs"]);
         let image = grey(&i["gray"]);
@@ -155,13 +156,16 @@ fn the_dark_box_and_the_search_window_are_the_golden_ones() {
         assert_eq!(sides, ["left", "right", "top", "bottom"].map(|k| number(&e[k])));
         golden.all_close(b.centre().as_slice(), &[number(&e["cx"]), number(&e["cy"])], "centre");
         golden.all_close(b.semi_size().as_slice(), &[number(&e["semi_w"]), number(&e["semi_h"])], "semi size");
+        n_boxes += 1;
         if o["window"].is_null() {
             continue;
         }
+        n_windows += 1;
         let pair = |a: &str, b: &str| Vector2::new(number(&i[a]), number(&i[b]));
         let size = (image.width(), image.height());
         let margin = number(&i["margin"]);
         let w = search_window(pair("pred_cx", "pred_cy"), b.semi_size(), pair("dx", "dy"), margin, size).unwrap();
         assert_eq!([w.left, w.top, w.right, w.bottom].map(|v| v as f64).to_vec(), numbers(&o["window"]));
     }
+    assert!(n_boxes > 0 && n_boxes < golden.cases.len() && n_windows > 0, "{n_boxes} boxes, {n_windows} windows");
 }
