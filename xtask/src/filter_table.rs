@@ -8,7 +8,7 @@
 use anyhow::{Context, Result};
 use boresight::auto::{self, Replay};
 use boresight::pipeline::{Input, run};
-use boresight::track::FilterConfig;
+use boresight::track::PRESETS;
 use boresight::{Config, FrameSource, Scan, Sink, TrackStatus, View};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -93,10 +93,9 @@ pub fn table(args: &Args) -> Result<()> {
     broken.map_or(Ok(()), Err)?;
     println!("| filter | held | rms error, px | mean NIS | confirmed tracks | µs a frame |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    for filter in FilterConfig::all() {
-        let name = serde_json::to_value(&filter)?.as_object().and_then(|o| o.keys().next().cloned());
+    for preset in PRESETS {
         let mut tracker = config.tracker.clone();
-        tracker.filter = filter;
+        tracker.filter = preset.filter();
         let all = scans.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let n_frames = all.len() as f64;
         let shown: Shared<Shown> = Shared::default();
@@ -109,7 +108,7 @@ pub fn table(args: &Args) -> Result<()> {
         let rms = (near.iter().map(|d| d * d).sum::<f64>() / near.len() as f64).sqrt();
         println!(
             "| {} | {:.1} % | {rms:.2} | {:.2} | {} | {:.0} |",
-            name.unwrap_or_default(),
+            preset.name,
             100.0 * near.len() as f64 / truth.len() as f64,
             shown.nis.iter().sum::<f64>() / shown.nis.len() as f64,
             shown.confirmed.len(),

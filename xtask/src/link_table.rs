@@ -7,7 +7,7 @@
 use anyhow::{Context, Result};
 use boresight::track::filter::model::RandomWalkConfig;
 use boresight::track::{
-    self, BirthConfig, FilterConfig, FormConfig, LifeConfig, MOfNConfig, ModelConfig, OnePointConfig, TrackerConfig,
+    self, BirthConfig, FilterConfig, LifeConfig, MOfNConfig, ModelConfig, OnePointConfig, TrackerConfig,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};
 use nalgebra::{Matrix2, Vector2};
@@ -46,7 +46,7 @@ fn read(path: &Path, columns: [&str; 4]) -> Result<Frames> {
 fn linker(diffusion_px2_per_s: f64, reach_px: f64, rate_hz: f64, memory: u32) -> TrackerConfig {
     let model = ModelConfig::RandomWalk(RandomWalkConfig { diffusion_px2_per_s });
     TrackerConfig {
-        filter: FilterConfig::Kf(FormConfig { model, ..FormConfig::default() }),
+        filter: FilterConfig { model, ..FilterConfig::default() },
         extra_noise_px: 0.0,
         gate_probability: 0.995,
         max_speed_px_per_s: reach_px * rate_hz,

@@ -71,7 +71,7 @@ fn tracks(input: &str, dir: &Path, more: &[&str]) -> String {
 
 #[test]
 fn every_filter_model_and_innovation_is_explained() {
-    for (what, least) in [("filters", 17), ("models", 7), ("innovations", 4)] {
+    for (what, least) in [("filters", 17), ("forms", 11), ("models", 7), ("innovations", 4)] {
         let all = listed(what);
         assert!(all.len() >= least, "{what}: {all:?}");
         for (name, meaning) in all {
@@ -79,7 +79,7 @@ fn every_filter_model_and_innovation_is_explained() {
         }
     }
     let wrong = boresight(&["config", "--list", "filtres"]);
-    assert!(!wrong.status.success() && text(&wrong.stderr).contains("lists: filters, models, innovations"));
+    assert!(!wrong.status.success() && text(&wrong.stderr).contains("lists: filters, forms, models, innovations"));
 }
 
 #[test]
@@ -106,18 +106,17 @@ fn every_model_innovation_and_option_of_a_filter_follows_the_target() {
     for (form, model) in
         ["kf", "ud", "srif", "information", "square-root", "ukf", "kf-short"].iter().zip(listed("models"))
     {
-        options.push(format!("tracker.filter.{form}.model.{}={{}}", model.0));
+        options.push(format!("tracker.filter={{form = \"{form}\", model.{} = {{}}}}", model.0));
     }
     for (name, _) in listed("innovations") {
-        options.push(format!("tracker.filter.ud.innovation.{name}={{}}"));
+        options.push(format!("tracker.filter={{form = \"ud\", innovation.{name} = {{}}}}"));
     }
-    options.push("tracker.filter.srif.adaptive={}".into());
-    options
-        .push("tracker.filter.kf.adaptive={process-noise = true, measurement-noise = false, windowed = true}".into());
-    options.push("tracker.filter.kf.model.constant-velocity.hold-s=0.04".into());
-    options.push("tracker.filter.imm.form=\"ud\"".into());
-    options.push("tracker.filter.lms={window = 4, rule = {as-printed = {step-factor = 0}}}".into());
-    options.push("tracker.filter.fuzzy-srif={correlator = {difference-scale = 24}}".into());
+    options.push("tracker.filter={form = \"srif\", adaptive = {}}".into());
+    options.push("tracker.filter.adaptive={process-noise = true, measurement-noise = false, windowed = true}".into());
+    options.push("tracker.filter.model.constant-velocity.hold-s=0.04".into());
+    options.push("tracker.filter.form.imm.form=\"ud\"".into());
+    options.push("tracker.filter.form.lms={window = 4, rule = {as-printed = {step-factor = 0}}}".into());
+    options.push("tracker.filter={form = \"srif\", innovation.fuzzy.difference-scale = 24}".into());
     for option in &options {
         let table = tracks(&input, &dir.path().join("run"), &["--set", option]);
         let (near, of) = covered(&table, &truth);
@@ -129,7 +128,7 @@ fn every_model_innovation_and_option_of_a_filter_follows_the_target() {
 fn a_filter_that_diverges_costs_its_track_not_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let input = detections(dir.path());
-    tracks(&input, dir.path(), &["--set", "tracker.filter.lms.rule.as-printed.step-factor=1"]);
+    tracks(&input, dir.path(), &["--set", "tracker.filter.form.lms.rule.as-printed.step-factor=1"]);
 }
 
 /// Frames, distance of each row from the target, and deviation of each row, of the longest track.
@@ -202,13 +201,13 @@ fn a_wrong_name_or_value_says_what_there_is() {
     let e = run(["--filter", "kalman"]);
     assert!(e.contains("there is no choice `kalman` here") && e.contains("square-root"), "{e}");
     for (option, key) in [
-        ("tracker.filter.lms.window=9", "tracker.filter.lms.window = 9: expected 2..=5"),
-        ("tracker.filter.kf.model.singer.manoeuvre-s=0", "tracker.filter.kf.model.singer.manoeuvre-s = 0"),
-        ("tracker.filter.ud.innovation.huber.threshold=-1", "tracker.filter.ud.innovation.huber.threshold = -1"),
-        ("tracker.filter.ukf.adaptive.memory-updates=1", "tracker.filter.ukf.adaptive.memory-updates = 1"),
+        ("tracker.filter.form.lms.window=9", "tracker.filter.form.lms.window = 9: expected 2..=5"),
+        ("tracker.filter.model.singer.manoeuvre-s=0", "tracker.filter.model.singer.manoeuvre-s = 0"),
+        ("tracker.filter.innovation.huber.threshold=-1", "tracker.filter.innovation.huber.threshold = -1"),
+        ("tracker.filter.adaptive.memory-updates=1", "tracker.filter.adaptive.memory-updates = 1"),
         (
-            "tracker.filter.fuzzy-srif.correlator.output-scale=0",
-            "correlator.output-scale = 0: expected a number above 0",
+            "tracker.filter.innovation.fuzzy.output-scale=0",
+            "innovation.fuzzy.output-scale = 0: expected a number above 0",
         ),
     ] {
         let e = run(["--set", option]);

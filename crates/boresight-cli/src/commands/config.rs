@@ -1,7 +1,7 @@
 //! `boresight config`: prints, checks and explains configurations.
 
+use boresight::track::PRESETS;
 use boresight::{Config, Error, ErrorKind};
-use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -22,7 +22,7 @@ pub struct Args {
     /// Explain a key or a table: `tracker.coast-s`, `detector.threshold`.
     #[arg(long, value_name = "KEY")]
     explain: Option<String>,
-    /// List what can be chosen: filters, models, innovations, thresholds, associators, lives, births.
+    /// List what can be chosen: filters, forms, models, innovations, thresholds, associators, lives, births.
     #[arg(long, value_name = "WHAT")]
     list: Option<String>,
     /// Print a JSON schema of the configuration.
@@ -49,10 +49,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// What `--list` knows, and the key that holds it.
-const LISTS: [(&str, &str); 11] = [
+const LISTS: [(&str, &str); 12] = [
     ("filters", "tracker.filter"),
-    ("models", "tracker.filter.kf.model"),
-    ("innovations", "tracker.filter.kf.innovation"),
+    ("forms", "tracker.filter.form"),
+    ("models", "tracker.filter.model"),
+    ("innovations", "tracker.filter.innovation"),
     ("associators", "tracker.associator"),
     ("lives", "tracker.life"),
     ("births", "tracker.birth"),
@@ -70,25 +71,36 @@ fn list(what: &str) -> anyhow::Result<String> {
             .at(format!("--list {what}"))
             .hint(format!("lists: {names}"))
     })?;
+    if what == "filters" {
+        return Ok(entries(
+            key,
+            "Whole filters by name: `filter = \"ud\"`, `--filter ud`.",
+            &PRESETS.map(|p| (p.name, p.meaning)),
+        ));
+    }
     let mut text = explain(key)?;
     if what == "associators" {
         // Its own tracker, so a table of its own; to the user one more way to associate.
         let mht = boresight::config::explain("tracker.mht")?;
         let meaning = mht.meaning.lines().next().unwrap_or_default();
-        writeln!(text, "  {:14}  {meaning} (a table of its own, tracker.mht)", "mht")?;
+        text += &format!("  {:14}  {meaning} (a table of its own, tracker.mht)\n", "mht");
     }
     Ok(text)
 }
 
 fn explain(key: &str) -> anyhow::Result<String> {
     let found = boresight::config::explain(key)?;
-    let mut text = format!("{key}\n  {}\n", found.meaning);
-    if let Some(default) = &found.default {
-        writeln!(text, "  default: {default}")?;
+    let default = found.default.as_ref().map_or(String::new(), |d| format!("\n  default: {d}"));
+    let own: Vec<_> = found.entries.iter().map(|(name, meaning)| (name.as_str(), meaning.as_str())).collect();
+    Ok(entries(key, &format!("{}{default}", found.meaning), &own))
+}
+
+/// A key, its meaning, and what there is below it, in columns.
+fn entries(key: &str, meaning: &str, below: &[(&str, &str)]) -> String {
+    let width = below.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let mut text = format!("{key}\n  {meaning}\n");
+    for (name, meaning) in below {
+        text += &format!("  {name:width$}  {meaning}\n");
     }
-    let width = found.entries.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    for (name, meaning) in &found.entries {
-        writeln!(text, "  {name:width$}  {meaning}")?;
-    }
-    Ok(text)
+    text
 }

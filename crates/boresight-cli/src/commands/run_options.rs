@@ -101,8 +101,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
 /// The configuration with what the command line changes.
 fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Config> {
     if let Some(filter) = &tracker.filter {
-        config =
-            config.with(&format!("tracker.filter.{filter}={{}}")).map_err(|e| e.at(format!("--filter {filter}")))?;
+        config = config.with(&format!("tracker.filter={filter}")).map_err(|e| e.at(format!("--filter {filter}")))?;
     }
     match tracker.associator.as_deref() {
         Some("mht") => config = config.with("tracker.mht={}")?,

@@ -167,7 +167,7 @@ fn one_parameter_can_be_changed_and_is_written_down() {
     command.arg("track").arg(clip()).arg("-o").arg(dir.path()).args(["--no-video", "--no-report", "-q"]);
     assert!(command.args(["--set", "tracker.coast-s=0.25", "--filter", "ud"]).status().unwrap().success());
     let config = std::fs::read_to_string(dir.path().join("config.toml")).unwrap();
-    assert!(config.contains("coast-s = 0.25") && config.contains("[tracker.filter.ud"), "{config}");
+    assert!(config.contains("coast-s = 0.25") && config.contains("[tracker.filter]\nform = \"ud\""), "{config}");
 }
 
 #[test]

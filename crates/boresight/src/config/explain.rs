@@ -19,7 +19,7 @@ pub struct Explanation {
     pub entries: Vec<(String, String)>,
 }
 
-/// Explains a key such as `tracker.gate-probability`, or a table or choice such as `tracker.filter`.
+/// Explains a key such as `tracker.gate-probability`, or a table or choice such as `tracker.filter.form`.
 /// # Errors
 /// A key that does not exist; the error lists what there is at that place.
 pub fn explain(key: &str) -> Result<Explanation> {
@@ -127,7 +127,7 @@ mod tests {
         ["input", "detector", "tracker"].iter().for_each(|table| walk(table, 0, &mut bare));
         assert!(bare.is_empty(), "keys without a meaning: {bare:?}");
         assert!(explain("tracker.gate-probability").unwrap().meaning.contains("χ²"));
-        assert!(explain("tracker.filter").unwrap().entries.iter().any(|(name, _)| name == "kf"));
+        assert!(explain("tracker.filter.form").unwrap().entries.iter().any(|(name, _)| name == "kf"));
         assert!(explain("tracker.nonsense").unwrap_err().to_string().contains("coast-s"));
     }
 }

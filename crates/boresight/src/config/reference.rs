@@ -16,7 +16,7 @@ pub fn reference() -> String {
     let mut out = String::from(
         "# Parameters\n\nEvery table and key of the configuration. Made by `cargo xtask docs` from the comments in the code; do not edit.\n\n\
          A key with *choices* takes one of the names below it: `clutter = \"given\"` where the name stands alone, or a table\n\
-         `[tracker.filter.imm]` where it has parameters of its own. *none* means that the key may be left out.\n",
+         `[tracker.filter.form.imm]` where it has parameters of its own. *none* means that the key may be left out.\n",
     );
     for (name, child) in children(&root, &root) {
         table(&mut out, &root, &name, &child);
@@ -118,6 +118,6 @@ mod tests {
         let text = reference();
         let row = text.lines().find(|l| l.starts_with("| `gate-probability`")).expect("a row");
         assert!(row.contains("`0.99`") && row.contains("gate"), "{row}");
-        assert!(text.contains("## `tracker.filter`") && text.contains("## `[tracker.filter.imm]`"));
+        assert!(text.contains("## `tracker.filter.form`") && text.contains("## `[tracker.filter.form.imm]`"));
     }
 }

@@ -8,7 +8,51 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Old dotted key, new dotted key. Where one old key begins like another the longer one counts.
-pub(super) const RENAMED: &[(&str, &str)] = &[];
+pub(super) const RENAMED: &[(&str, &str)] = &[
+    ("tracker.filter.kf", "tracker.filter.form.kf"),
+    ("tracker.filter.kf.model", "tracker.filter.model"),
+    ("tracker.filter.kf.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.kf.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.kf-short", "tracker.filter.form.kf-short"),
+    ("tracker.filter.kf-short.model", "tracker.filter.model"),
+    ("tracker.filter.kf-short.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.kf-short.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.ud", "tracker.filter.form.ud"),
+    ("tracker.filter.ud.model", "tracker.filter.model"),
+    ("tracker.filter.ud.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.ud.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.srif", "tracker.filter.form.srif"),
+    ("tracker.filter.srif.model", "tracker.filter.model"),
+    ("tracker.filter.srif.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.srif.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.information", "tracker.filter.form.information"),
+    ("tracker.filter.information.model", "tracker.filter.model"),
+    ("tracker.filter.information.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.information.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.square-root", "tracker.filter.form.square-root"),
+    ("tracker.filter.square-root.model", "tracker.filter.model"),
+    ("tracker.filter.square-root.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.square-root.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.ekf", "tracker.filter.model.nearly-constant-turn"),
+    ("tracker.filter.ekf.model", "tracker.filter.model"),
+    ("tracker.filter.ekf.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.ekf.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.ukf", "tracker.filter.form.ukf"),
+    ("tracker.filter.ukf.model", "tracker.filter.model"),
+    ("tracker.filter.ukf.innovation", "tracker.filter.innovation"),
+    ("tracker.filter.ukf.adaptive", "tracker.filter.adaptive"),
+    ("tracker.filter.fuzzy-srif", "tracker.filter.form.srif"),
+    ("tracker.filter.fuzzy-srif.model", "tracker.filter.model"),
+    ("tracker.filter.fuzzy-srif.correlator", "tracker.filter.innovation.fuzzy"),
+    ("tracker.filter.huber", "tracker.filter.innovation.huber"),
+    ("tracker.filter.student-t", "tracker.filter.innovation.student-t"),
+    ("tracker.filter.constant-acceleration", "tracker.filter.model.constant-acceleration"),
+    ("tracker.filter.singer", "tracker.filter.model.singer"),
+    ("tracker.filter.imm", "tracker.filter.form.imm"),
+    ("tracker.filter.lms", "tracker.filter.form.lms"),
+    ("tracker.filter.ar1", "tracker.filter.form.ar1"),
+    ("tracker.filter.displacement", "tracker.filter.form.displacement"),
+];
 
 /// The new name of a key, if a part of it has one.
 pub(super) fn new_name(key: &str) -> Option<String> {

@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn a_misspelt_choice_gets_the_nearest_one_without_a_line_of_ours() {
-        let e = Config::default().with("tracker.filter.fuzzy_srif={}").unwrap_err().to_string();
+        let e = Config::default().with("tracker.filter=fuzzy_srif").unwrap_err().to_string();
         assert!(e.contains("there is no choice `fuzzy_srif` here; did you mean `fuzzy-srif`?"), "{e}");
         assert!(!e.contains("line "), "{e}");
     }

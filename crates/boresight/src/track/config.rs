@@ -5,7 +5,7 @@ use super::clutter::ClutterConfig;
 use super::confirm::config::LifeConfig;
 use super::confirm::confirmation_gate::ProofConfig;
 use super::filter::Belief;
-use super::filter::FilterConfig;
+use super::filter::{FilterConfig, presets};
 use super::initial_tracks::CueConfig;
 use super::initiation::BirthConfig;
 use super::merged_measurements::SharingConfig;
@@ -21,7 +21,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct TrackerConfig {
-    /// The filter of each track.
+    /// The filter of each track: a name (`boresight config --list filters`), or a table of its parts.
+    #[serde(deserialize_with = "presets::name_or_parts")]
+    #[schemars(schema_with = "presets::schema")]
     pub filter: FilterConfig,
     /// Standard deviation of the target's acceleration, px/s², above 0; larger follows manoeuvres, smaller smooths more.
     /// 28 px/s² is 0.03 px per frame² at 30 frames/s.

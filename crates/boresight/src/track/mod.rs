@@ -25,7 +25,7 @@ pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};
 pub use confirm::config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
 pub use confirm::confirmation_gate::ProofConfig;
-pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, TrackFilter};
+pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, PRESETS, Preset, TrackFilter};
 pub use initial_tracks::CueConfig;
 pub use initiation::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
 pub use join::{Joined, join};

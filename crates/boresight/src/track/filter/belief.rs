@@ -1,8 +1,19 @@
 //! The filter of one track as the tracker stores it: in place for the constant-velocity Kalman filter, boxed for the rest.
 
-use super::config::TrackFilter;
 use super::constant_velocity::ConstantVelocity;
 use boresight_filters::{Filter, FilterError, Gaussian, Weighted};
+
+/// A filter that can be copied behind its trait: what the tracker holds when the filter is not kept in place.
+pub trait TrackFilter: Filter + Send + Sync {
+    /// Copies the filter.
+    fn boxed_clone(&self) -> Box<dyn TrackFilter>;
+}
+
+impl<F: Filter + Clone + Send + Sync + 'static> TrackFilter for F {
+    fn boxed_clone(&self) -> Box<dyn TrackFilter> {
+        Box::new(self.clone())
+    }
+}
 
 /// A filter in place, or behind its trait.
 pub enum Belief {

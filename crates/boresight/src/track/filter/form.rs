@@ -1,75 +1,92 @@
-//! From names to filters: every form around every model, and the options that stand around a form.
-//!
-//! The options need only the predicted position, so they are one wrapper around the boxed form, not a type for each
-//! combination. A plain form is boxed as it is.
+//! The form of a track's filter by name: how it keeps its covariance.
 
-use super::config::TrackFilter;
-use super::innovation::{FormConfig, InnovationConfig};
+use super::belief::TrackFilter;
+use super::conditioned::{ScaledFilter, conditioned};
+use super::innovation::InnovationConfig;
+use super::learning::LearningConfig;
 use super::model::ModelConfig;
+use super::own_model::{Ar1Config, DisplacementConfig, ImmConfig, LmsConfig};
+use crate::Result as Checked;
 use boresight_filters::model::{
     ConstantAcceleration, ConstantTurn, ConstantVelocity, NearlyConstantTurn, OrnsteinUhlenbeck, RandomWalk, Scaled,
     Singer,
 };
 use boresight_filters::{
-    CovarianceForm, Filter, FilterError, FuzzyInnovation, Gaussian, GaussianFilter, Information, Innovation, Kf,
-    NoiseLearner, ScaleNoise, SquareRoot, Srif, Start, Tracked, Ud, Ukf, Weighted,
+    CovarianceForm, FilterError, Gaussian, GaussianFilter, Information, Kf, ScaleNoise, SquareRoot, Srif, Start,
+    Tracked, Ud, Ukf,
 };
-use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// The forms of the filter that take any model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+/// How the filter keeps its belief. The first seven take any model, innovation and learning of the noise; the last four
+/// bring a model of their own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum FormConfig {
+    /// Covariance with the Joseph update (Kalman 1960). A nonlinear model makes it the extended filter (Jazwinski 1970).
+    #[default]
     Kf,
+    /// Covariance with the short update P - K H P: to compare with; loses digits first.
     KfShort,
+    /// Factors P = U D Uᵀ (Bierman 1977, Thornton 1976): the covariance cannot lose its sign.
     Ud,
+    /// Square root of the information by Householder reflections (Bierman 1977): works without process noise.
     Srif,
+    /// Information P⁻¹, P⁻¹x (Maybeck 1979): measurements add up; reading the state costs an inversion.
     Information,
+    /// Square root of the covariance (Potter 1963, in Bierman 1977): as robust as U-D, two roots more a step.
     SquareRoot,
+    /// Unscented transform (Julier, Uhlmann 2004): sigma points instead of Jacobians of a nonlinear model.
     Ukf,
+    /// Interacting multiple models (Blom, Bar-Shalom 1988): two constant-velocity filters weighed by likelihood.
+    Imm(ImmConfig),
+    /// Kalman filter with learnt acceleration weights (Obolensky, Erdogmus, Principe).
+    Lms(LmsConfig),
+    /// Scalar AR(1) recursion of each coordinate (Cai, Cui).
+    Ar1(Ar1Config),
+    /// Coordinate now and one frame before, [2 -1; 1 0] (Cai, Cui).
+    Displacement(DisplacementConfig),
 }
 
-/// A form whose process noise can be scaled.
-trait ScaledFilter: TrackFilter {
-    fn set_noise_scale(&mut self, scale: f64) -> Result<(), FilterError>;
-    fn scaled_clone(&self) -> Box<dyn ScaledFilter>;
-}
+impl FormConfig {
+    /// Whether it takes any model, innovation and learning of the noise.
+    pub fn takes_a_model(&self) -> bool {
+        !matches!(self, Self::Imm(_) | Self::Lms(_) | Self::Ar1(_) | Self::Displacement(_))
+    }
 
-impl<F, const N: usize> ScaledFilter for Tracked<F, N>
-where
-    F: GaussianFilter<N> + ScaleNoise<f64> + Send + Sync + 'static,
-{
-    fn set_noise_scale(&mut self, scale: f64) -> Result<(), FilterError> {
-        self.0.set_noise_scale(scale)
+    pub(super) fn validate(&self, at: &str) -> Checked<()> {
+        match self {
+            Self::Imm(c) => c.validate(&format!("{at}.imm")),
+            Self::Lms(c) => c.validate(&format!("{at}.lms")),
+            Self::Ar1(c) => c.validate(&format!("{at}.ar1")),
+            Self::Displacement(c) => c.validate(&format!("{at}.displacement")),
+            _ => Ok(()),
+        }
     }
-    fn scaled_clone(&self) -> Box<dyn ScaledFilter> {
-        Box::new(self.clone())
-    }
-}
 
-/// Builds a form with its options from a first belief; `acceleration_std` is σ (px/s²).
-pub(in crate::track) fn build(
-    form: Form,
-    config: &FormConfig,
-    start: &Gaussian<4>,
-    acceleration_std: f64,
-) -> Result<Box<dyn TrackFilter>, FilterError> {
-    let innovation = match &config.innovation {
-        InnovationConfig::Plain {} => Rule::Robust(Innovation::Plain),
-        InnovationConfig::Huber(c) => Rule::Robust(c.innovation()),
-        InnovationConfig::StudentT(c) => Rule::Robust(c.innovation()),
-        InnovationConfig::Fuzzy(c) => Rule::Fuzzy(Box::new(FuzzyInnovation::new(c.correlator())?)),
-    };
-    let learner = config.adaptive.as_ref().map(|c| NoiseLearner::new(c.config()).map(Box::new)).transpose()?;
-    let filter = around(form, &config.model, start, acceleration_std)?;
-    if learner.is_none() && innovation == Rule::Robust(Innovation::Plain) {
-        return Ok(filter);
+    /// Builds the filter of a new track from its first belief; `acceleration_std` is σ (px/s²).
+    pub(super) fn start(
+        &self,
+        model: &ModelConfig,
+        innovation: &InnovationConfig,
+        adaptive: Option<&LearningConfig>,
+        start: &Gaussian<4>,
+        acceleration_std: f64,
+    ) -> Result<Box<dyn TrackFilter>, FilterError> {
+        match self {
+            Self::Imm(c) => c.start(start, acceleration_std),
+            Self::Lms(c) => c.start(start, acceleration_std),
+            Self::Ar1(c) => c.start(start),
+            Self::Displacement(c) => c.start(start, acceleration_std),
+            _ => conditioned(around(self, model, start, acceleration_std)?, innovation, adaptive),
+        }
     }
-    Ok(Box::new(Optioned { filter, innovation, learner, scratch: Vec::new() }))
 }
 
 /// Builds a form around a model.
 fn around(
-    form: Form,
+    form: &FormConfig,
     model: &ModelConfig,
     start: &Gaussian<4>,
     std: f64,
@@ -78,13 +95,14 @@ fn around(
         ($n:literal, $model:expr) => {{
             let m = Scaled::new($model);
             match form {
-                Form::Kf => boxed(Kf::<_, $n>::from_kinematics(m, start)?),
-                Form::KfShort => boxed(Kf::<_, $n>::from_kinematics(m, start)?.with_form(CovarianceForm::Short)),
-                Form::Ud => boxed(Ud::<_, $n>::from_kinematics(m, start)?),
-                Form::Srif => boxed(Srif::<_, $n>::from_kinematics(m, start)?),
-                Form::Information => boxed(Information::<_, $n>::from_kinematics(m, start)?),
-                Form::SquareRoot => boxed(SquareRoot::<_, $n>::from_kinematics(m, start)?),
-                Form::Ukf => boxed(Ukf::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::Kf => boxed(Kf::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::KfShort => boxed(Kf::<_, $n>::from_kinematics(m, start)?.with_form(CovarianceForm::Short)),
+                FormConfig::Ud => boxed(Ud::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::Srif => boxed(Srif::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::Information => boxed(Information::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::SquareRoot => boxed(SquareRoot::<_, $n>::from_kinematics(m, start)?),
+                FormConfig::Ukf => boxed(Ukf::<_, $n>::from_kinematics(m, start)?),
+                _ => return Err(FilterError::OutOfRange("a form that takes a model")),
             }
         }};
     }
@@ -120,78 +138,4 @@ where
     F: GaussianFilter<N> + ScaleNoise<f64> + Send + Sync + 'static,
 {
     Box::new(Tracked(filter))
-}
-
-/// How innovations are held back.
-#[derive(Clone, Debug, PartialEq)]
-enum Rule {
-    Robust(Innovation),
-    Fuzzy(Box<FuzzyInnovation>),
-}
-
-/// A form with a rule for its innovations and, if wanted, a learner of its noise.
-struct Optioned {
-    filter: Box<dyn ScaledFilter>,
-    innovation: Rule,
-    /// The window of a windowed memory holds 64 updates.
-    learner: Option<Box<NoiseLearner<64>>>,
-    scratch: Vec<Weighted>,
-}
-
-impl Clone for Optioned {
-    fn clone(&self) -> Self {
-        Self {
-            filter: (*self.filter).scaled_clone(),
-            innovation: self.innovation.clone(),
-            learner: self.learner.clone(),
-            scratch: Vec::new(),
-        }
-    }
-}
-
-impl Filter for Optioned {
-    fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
-        self.filter.predict(dt_s)
-    }
-
-    fn predicted(&self) -> Gaussian<2> {
-        self.filter.predicted()
-    }
-
-    fn update(&mut self, hypotheses: &[Weighted]) -> Result<(), FilterError> {
-        let predicted = self.filter.predicted();
-        self.scratch.clear();
-        for h in hypotheses {
-            let mut m = h.measurement;
-            if let Some(learner) = &self.learner {
-                m = learner.with_learnt_noise(&m);
-            }
-            m = match &self.innovation {
-                Rule::Robust(rule) => rule.soften(&predicted, &m)?,
-                Rule::Fuzzy(f) => f.moved(&predicted, &m)?,
-            };
-            self.scratch.push(Weighted { measurement: m, weight: h.weight });
-        }
-        self.filter.update(&self.scratch)?;
-        let sum: f64 = hypotheses.iter().map(|h| h.weight).sum();
-        if let Rule::Fuzzy(f) = &mut self.innovation
-            && sum > 0.0
-        {
-            let add = |v: Vector2<f64>, h: &Weighted| v + (h.measurement.position - predicted.mean) * (h.weight / sum);
-            f.remember(hypotheses.iter().fold(Vector2::zeros(), add));
-        }
-        // Several hypotheses mix in clutter: only a sure one teaches.
-        if let (Some(learner), [only]) = (&mut self.learner, hypotheses)
-            && only.weight == 1.0
-        {
-            let used = learner.with_learnt_noise(&only.measurement);
-            learner.learn(&predicted, &used)?;
-            self.filter.set_noise_scale(learner.noise_scale())?;
-        }
-        Ok(())
-    }
-
-    fn kinematics(&self) -> Gaussian<4> {
-        self.filter.kinematics()
-    }
 }

@@ -123,7 +123,7 @@ impl Default for RandomWalkConfig {
 }
 
 impl ModelConfig {
-    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
+    pub(super) fn validate(&self, at: &str) -> Result<()> {
         let hold =
             |name: &str, s: f64| positive(&format!("{at}.{name}"), "hold-s", s, "the frame time, 0.04 s at 25 Hz");
         match self {

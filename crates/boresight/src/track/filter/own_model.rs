@@ -1,7 +1,6 @@
-//! Filters that bring a model of their own, by name: IMM, LMS weights, AR(1), displacement.
+//! Forms that bring a model of their own: IMM, LMS weights, AR(1), displacement.
 
-use super::belief::Belief;
-use super::config::TrackFilter;
+use super::belief::TrackFilter;
 use crate::Result;
 use crate::validate::{check, not_negative, positive};
 use boresight_filters::model::ConstantVelocity;
@@ -130,13 +129,17 @@ impl Default for DisplacementConfig {
 }
 
 impl ImmConfig {
-    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
+    pub(super) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "manoeuvre-factor", self.manoeuvre_factor, "10 is usual")?;
         positive(at, "quiet-s", self.quiet_s, "5 s is usual")?;
         positive(at, "manoeuvre-s", self.manoeuvre_s, "1 s is usual")
     }
 
-    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+    pub(super) fn start(
+        &self,
+        start: &Gaussian<4>,
+        acceleration_std: f64,
+    ) -> Result<Box<dyn TrackFilter>, FilterError> {
         let quiet = ConstantVelocity::discrete(acceleration_std)?;
         let fast = ConstantVelocity::discrete(acceleration_std * self.manoeuvre_factor)?;
         let stays = [self.quiet_s, self.manoeuvre_s];
@@ -158,7 +161,7 @@ impl ImmConfig {
 }
 
 impl LmsConfig {
-    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
+    pub(super) fn validate(&self, at: &str) -> Result<()> {
         check((2..=5).contains(&self.window), at, "window", self.window, "2..=5", "2 is the paper's")?;
         match &self.rule {
             LmsRuleConfig::Guarded {} => Ok(()),
@@ -168,7 +171,11 @@ impl LmsConfig {
         }
     }
 
-    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+    pub(super) fn start(
+        &self,
+        start: &Gaussian<4>,
+        acceleration_std: f64,
+    ) -> Result<Box<dyn TrackFilter>, FilterError> {
         let rule = match &self.rule {
             LmsRuleConfig::Guarded {} => LmsRule::Guarded,
             LmsRuleConfig::AsPrinted(c) => LmsRule::AsPrinted { alpha: c.step_factor },
@@ -184,11 +191,11 @@ impl LmsConfig {
 }
 
 impl Ar1Config {
-    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
+    pub(super) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "frame-s", self.frame_s, "the frame time, 0.04 s at 25 Hz")
     }
 
-    pub(in crate::track) fn start(&self, start: &Gaussian<4>) -> std::result::Result<Belief, FilterError> {
+    pub(super) fn start(&self, start: &Gaussian<4>) -> std::result::Result<Box<dyn TrackFilter>, FilterError> {
         let p = &start.cov;
         let cov = Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)]);
         let position = Vector2::new(start.mean[0], start.mean[2]);
@@ -197,21 +204,21 @@ impl Ar1Config {
 }
 
 impl DisplacementConfig {
-    pub(in crate::track) fn validate(&self, at: &str) -> Result<()> {
+    pub(super) fn validate(&self, at: &str) -> Result<()> {
         positive(at, "frame-s", self.frame_s, "the frame time, 0.04 s at 25 Hz")?;
         self.noise_px.map_or(Ok(()), |v| not_negative(at, "noise-px", v, "0.3 is usual"))
     }
 
-    pub(in crate::track) fn start(
+    pub(super) fn start(
         &self,
         start: &Gaussian<4>,
         acceleration_std: f64,
-    ) -> std::result::Result<Belief, FilterError> {
+    ) -> std::result::Result<Box<dyn TrackFilter>, FilterError> {
         let noise = self.noise_px.unwrap_or(acceleration_std * self.frame_s * self.frame_s);
         Ok(boxed(Tracked(Displacement::from_kinematics(start, noise * noise, self.frame_s)?)))
     }
 }
 
-fn boxed(filter: impl TrackFilter + 'static) -> Belief {
-    Belief::Boxed(Box::new(filter))
+fn boxed(filter: impl TrackFilter + 'static) -> Box<dyn TrackFilter> {
+    Box::new(filter)
 }
