@@ -7,7 +7,7 @@
 use boresight_filters::fuzzy::Correlator;
 use boresight_filters::model::{ConstantTurn, ConstantVelocity, NearlyConstantTurn, OrnsteinUhlenbeck, Singer};
 use boresight_filters::{
-    Ar1, Displacement, Filter, FilterError, Fuzzy, Gaussian, Imm, Information, Innovation, Kf, Lms, LmsRule,
+    Ar1, Displacement, Filter, FilterError, Fuzzy, Gaussian, Imm, Information, InnovationRule, Kf, Lms, LmsRule,
     Measurement, Robust, SquareRoot, Srif, Start, Tracked, Ud, Ukf, Weighted,
 };
 use nalgebra::{Matrix2, Vector2};
@@ -37,11 +37,11 @@ fn make(name: &str, first: &Gaussian<4>) -> Result<Option<Box<dyn Filter>>, Filt
         }
         "huber" => {
             let kf = Kf::<_, 4>::from_kinematics(cv, first)?;
-            Box::new(Tracked(Robust::new(kf, Innovation::Huber { threshold: 2.0 })?))
+            Box::new(Tracked(Robust::new(kf, InnovationRule::Huber { threshold: 2.0 })?))
         }
         "student-t" => {
             let kf = Kf::<_, 4>::from_kinematics(cv, first)?;
-            Box::new(Tracked(Robust::new(kf, Innovation::StudentT { degrees_of_freedom: 4.0 })?))
+            Box::new(Tracked(Robust::new(kf, InnovationRule::StudentT { degrees_of_freedom: 4.0 })?))
         }
         "kf stiff" => Box::new(Tracked(Kf::from_kinematics(ConstantVelocity::continuous(1.0)?, first)?)),
         "kf singer" => Box::new(Tracked(Kf::from_kinematics(Singer::new(30.0, 1.0)?, first)?)),

@@ -16,6 +16,7 @@ use nalgebra::Matrix2;
 
 /// How the past is weighed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Memory<T = f64> {
     /// Exponential, over about this many updates (above 1).
     Recursive(T),
@@ -25,6 +26,7 @@ pub enum Memory<T = f64> {
 
 /// What is learnt and how fast.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AdaptiveConfig<T = f64> {
     /// Learn R: the given covariance is replaced once there are enough innovations.
     pub measurement_noise: bool,
@@ -47,6 +49,18 @@ impl<T: Real> Default for AdaptiveConfig<T> {
             floor: T::of(0.1),
             scale_rate: T::of(0.1),
         }
+    }
+}
+
+impl<T: Real> AdaptiveConfig<T> {
+    /// Learns R; the rest as by default.
+    pub fn measurement_noise(memory: Memory<T>) -> Self {
+        Self { memory, ..Self::default() }
+    }
+
+    /// Learns the scale of Q; the rest as by default.
+    pub fn process_noise(memory: Memory<T>) -> Self {
+        Self { measurement_noise: false, process_noise: true, memory, ..Self::default() }
     }
 }
 
@@ -193,7 +207,7 @@ where
     }
 
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
-        crate::filter::check_measurement(m)?;
+        crate::check::check_measurement(m)?;
         let predicted = self.filter.predicted();
         let used = self.learner.with_learnt_noise(m);
         let mut next = self.clone();

@@ -12,13 +12,14 @@
 //! paper.
 //! Symbols: μ, z px; α, P no unit and px⁻². Cost: about 30 flops a coordinate.
 
-use crate::filter::{check_dt, check_measurement};
-use crate::mixture::check_weighted;
+use crate::check::check_weighted;
+use crate::check::{check_dt, check_measurement};
 use crate::{Filter, FilterError, Gaussian, Measurement, Real, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// The recursion of one coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Ar1Axis<T = f64> {
     /// Regression coefficient α.
     pub alpha: T,

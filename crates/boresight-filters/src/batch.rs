@@ -28,6 +28,7 @@ pub struct Lanes<const L: usize, T = f64> {
 
 /// Variances of the positions of one scan (px²).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Variance<'a, T = f64> {
     /// The same for every track and axis.
     Same(T),
@@ -50,7 +51,7 @@ impl<const L: usize, T: Real> Lanes<L, T> {
     /// [`FilterError`] if the lane does not exist, the belief is not finite or positive definite, or its axes are
     /// correlated.
     pub fn set(&mut self, lane: usize, belief: &Gaussian<4, T>) -> Result<(), FilterError> {
-        crate::filter::check_belief(belief)?;
+        crate::check::check_belief(belief)?;
         crate::linalg::ud_factorize(&belief.cov)?;
         let p = &belief.cov;
         if lane >= L || [(0, 2), (0, 3), (1, 2), (1, 3)].iter().any(|&at| p[at] != T::zero()) {
@@ -136,7 +137,7 @@ pub fn step_all<const L: usize, T: Real>(
     positions: &[[T; 2]],
     variance: Variance<'_, T>,
 ) -> Result<usize, FilterError> {
-    crate::filter::check_dt(dt_s)?;
+    crate::check::check_dt(dt_s)?;
     step_all_with(dt_s, model.noise_of_step(dt_s), packs, positions, variance)
 }
 
@@ -150,7 +151,7 @@ pub fn step_all_with<const L: usize, T: Real>(
     positions: &[[T; 2]],
     variance: Variance<'_, T>,
 ) -> Result<usize, FilterError> {
-    crate::filter::check_dt(dt_s)?;
+    crate::check::check_dt(dt_s)?;
     if L == 0 || positions.len().div_ceil(L) != packs.len() {
         return Err(FilterError::OutOfRange("as many positions as tracks in the packs"));
     }

@@ -75,7 +75,7 @@ mod tests {
             let azimuth_std_rad = libm::pow(10.0, -8.0 * f64::from(k) / 2000.0) as f32;
             let p = Polar { range: 5e4_f32, azimuth_rad: 0.01 * k as f32, range_std: 0.0, azimuth_std_rad };
             let m = converted(&p, &Vector2::zeros()).unwrap();
-            assert!(crate::filter::check_measurement(&m).is_ok(), "{p:?}: {}", m.cov);
+            assert!(crate::check::check_measurement(&m).is_ok(), "{p:?}: {}", m.cov);
             // E[(z - x)²] along the line of sight is r² 1.5 σ⁴ to leading order.
             let straight = converted(&Polar { azimuth_rad: 0.0, ..p }, &Vector2::zeros()).unwrap().cov[(0, 0)];
             if azimuth_std_rad < 0.01 {

@@ -8,10 +8,10 @@
 //! Limits: first step needs `frame_s`, the time between the two coordinates of the start.
 //! Cost: a dense step of 4 states, about 600 flops.
 
-use crate::filter::{check_belief, check_dt};
+use crate::check::check_strength;
+use crate::check::{check_belief, check_dt};
 use crate::linear::{correct_linear, predict_linear};
 use crate::mixture::mixture_update;
-use crate::model::check_strength;
 use crate::real::all_finite;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Weighted};
 use nalgebra::{SMatrix, SVector};
@@ -90,7 +90,7 @@ impl<T: Real> GaussianFilter<4> for Displacement<T> {
     }
 
     fn correct(&mut self, m: &Measurement<T>) -> Result<(), FilterError> {
-        crate::filter::check_measurement(m)?;
+        crate::check::check_measurement(m)?;
         let mut h = SMatrix::<T, 2, 4>::zeros();
         h[(0, 0)] = T::one();
         h[(1, 2)] = T::one();

@@ -2,12 +2,11 @@
 //!
 //! [`Tracked`] makes a [`Filter`] of every [`GaussianFilter`]; f32 filters are converted at this border.
 
-use crate::linalg::{invert_pair, is_symmetric};
-use crate::mixture::correct_by_mixture;
+use crate::check::{check_measurement, check_weighted};
+use crate::gaussian::{log_likelihood, position_of};
+use crate::mixture::mixture_update;
 use crate::model::{Model, kinematics_from_point};
-use crate::real::all_finite;
 use crate::{FilterError, Gaussian, Measurement, Real, Weighted};
-use nalgebra::{Matrix2, Vector2};
 
 /// A filter of one target as a tracker sees it.
 pub trait Filter {
@@ -191,70 +190,22 @@ fn cast_weighted<T: Real>(w: &Weighted) -> Weighted<T> {
     w.cast()
 }
 
-/// Returns the marginal of a belief at the two position states.
-#[inline(always)]
-pub(crate) fn position_of<T: Real, const N: usize>(b: &Gaussian<N, T>, at: [usize; 2]) -> Gaussian<2, T> {
-    let [i, j] = at;
-    Gaussian {
-        mean: Vector2::new(b.mean[i], b.mean[j]),
-        cov: Matrix2::new(b.cov[(i, i)], b.cov[(i, j)], b.cov[(j, i)], b.cov[(j, j)]),
-    }
-}
-
-/// Refuses a time step that is negative or not finite.
-#[inline(always)]
-pub(crate) fn check_dt<T: Real>(dt_s: T) -> Result<(), FilterError> {
-    if dt_s >= T::zero() && dt_s <= T::MAX {
-        Ok(())
-    } else if dt_s < T::zero() {
-        Err(FilterError::OutOfRange("a time step of at least 0 s"))
-    } else {
-        Err(FilterError::NotFinite("the time step"))
-    }
-}
-
-/// Refuses a measurement that is not finite or whose covariance is not symmetric positive semi-definite.
-#[inline(always)]
-pub(crate) fn check_measurement<T: Real>(m: &Measurement<T>) -> Result<(), FilterError> {
-    if !all_finite(&m.position) {
-        return Err(FilterError::NotFinite("the measured position"));
-    }
-    let (a, b, c) = (m.cov[(0, 0)], m.cov[(1, 0)], m.cov[(1, 1)]);
-    if a >= T::zero() && c >= T::zero() && a + c <= T::MAX && b == T::zero() && m.cov[(0, 1)] == T::zero() {
+/// The default of [`GaussianFilter::correct_weighted`].
+fn correct_by_mixture<F, const N: usize, I>(filter: &mut F, hypotheses: I) -> Result<(), FilterError>
+where
+    F: GaussianFilter<N>,
+    I: Iterator<Item = Weighted<F::Real>> + Clone,
+{
+    let (_, n) = check_weighted(hypotheses.clone())?;
+    if n == 0 {
         return Ok(());
     }
-    check_full_covariance(m)
-}
-
-#[cold]
-fn check_full_covariance<T: Real>(m: &Measurement<T>) -> Result<(), FilterError> {
-    if !all_finite(&m.cov) {
-        return Err(FilterError::NotFinite("the measurement covariance"));
+    if n == 1
+        && let Some(only) = hypotheses.clone().find(|h| h.weight > F::Real::ZERO)
+        && only.weight == F::Real::ONE
+    {
+        return filter.correct(&only.measurement);
     }
-    let (a, b, c) = (m.cov[(0, 0)], m.cov[(1, 0)], m.cov[(1, 1)]);
-    // One rounding error of slack: a covariance made of products may be singular by its own rounding.
-    let slack = T::one() + T::EPSILON * T::of(8.0);
-    if !is_symmetric(&m.cov) || a < T::zero() || c < T::zero() || b.abs() > (a.sqrt() * c.sqrt()) * slack {
-        return Err(FilterError::NotPositiveDefinite("the measurement covariance"));
-    }
-    Ok(())
-}
-
-/// Refuses a belief that is not finite, not symmetric or has a negative variance.
-pub(crate) fn check_belief<T: Real, const N: usize>(b: &Gaussian<N, T>) -> Result<(), FilterError> {
-    if !all_finite(&b.mean) {
-        return Err(FilterError::NotFinite("the state"));
-    }
-    if !all_finite(&b.cov) {
-        return Err(FilterError::NotFinite("the state covariance"));
-    }
-    if !is_symmetric(&b.cov) || (0..N).any(|i| b.cov[(i, i)] < T::zero()) {
-        return Err(FilterError::NotPositiveDefinite("the state covariance"));
-    }
-    Ok(())
-}
-
-pub(crate) fn log_likelihood<T: Real>(p: &Gaussian<2, T>, m: &Measurement<T>) -> Result<T, FilterError> {
-    let s = invert_pair(&(p.cov + m.cov), "the innovation covariance")?;
-    Ok(s.log_likelihood(&(m.position - p.mean)))
+    let posterior = mixture_update(&filter.belief(), filter.position_at(), hypotheses)?;
+    filter.set_belief(&posterior)
 }

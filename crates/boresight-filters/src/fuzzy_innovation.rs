@@ -6,9 +6,9 @@
 //! Symbols: ν = z - H x~ 2 x 1 (px); S = H P~ Hᵀ + R 2 x 2 (px²). Cost: two inferences, about 200 flops an update.
 //! Limits: the covariance does not widen, so a filter that is too stiff stays over-confident.
 
-use crate::filter::check_measurement;
+use crate::check::check_measurement;
+use crate::check::check_weighted;
 use crate::fuzzy::Correlator;
-use crate::mixture::check_weighted;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Weighted};
 use nalgebra::Vector2;
 

@@ -1,5 +1,7 @@
 //! The few values that cross a filter's border: beliefs, measurements, weighted measurements.
 
+use crate::linalg::invert_pair;
+use crate::{FilterError, Real};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// A Gaussian belief: mean N x 1 and covariance N x N.
@@ -29,15 +31,25 @@ pub struct Weighted<T = f64> {
     pub weight: T,
 }
 
-impl<const N: usize, T: crate::Real> Gaussian<N, T> {
+impl<const N: usize, T: Real> Gaussian<N, T> {
+    /// Returns the belief of a mean and its covariance.
+    pub fn new(mean: SVector<T, N>, cov: SMatrix<T, N, N>) -> Self {
+        Self { mean, cov }
+    }
+
     /// Returns the belief in another number type.
     #[inline(always)]
-    pub fn cast<U: crate::Real>(&self) -> Gaussian<N, U> {
+    pub fn cast<U: Real>(&self) -> Gaussian<N, U> {
         Gaussian { mean: self.mean.map(|v| U::of(v.as_f64())), cov: self.cov.map(|v| U::of(v.as_f64())) }
     }
 }
 
-impl<T: crate::Real> Measurement<T> {
+impl<T: Real> Measurement<T> {
+    /// Returns the measurement of a position and its covariance.
+    pub fn new(position: Vector2<T>, cov: Matrix2<T>) -> Self {
+        Self { position, cov }
+    }
+
     /// Returns a measurement with the same standard deviation (px) in both axes, uncorrelated.
     pub fn isotropic(x: T, y: T, std: T) -> Self {
         Self { position: Vector2::new(x, y), cov: Matrix2::identity() * (std * std) }
@@ -45,12 +57,12 @@ impl<T: crate::Real> Measurement<T> {
 
     /// Returns the measurement in another number type.
     #[inline(always)]
-    pub fn cast<U: crate::Real>(&self) -> Measurement<U> {
+    pub fn cast<U: Real>(&self) -> Measurement<U> {
         Measurement { position: self.position.map(|v| U::of(v.as_f64())), cov: self.cov.map(|v| U::of(v.as_f64())) }
     }
 }
 
-impl<T: crate::Real> Weighted<T> {
+impl<T: Real> Weighted<T> {
     /// Returns a measurement that is surely the target's own.
     pub fn sure(measurement: Measurement<T>) -> Self {
         Self { measurement, weight: T::one() }
@@ -58,7 +70,23 @@ impl<T: crate::Real> Weighted<T> {
 
     /// Returns the hypothesis in another number type.
     #[inline(always)]
-    pub fn cast<U: crate::Real>(&self) -> Weighted<U> {
+    pub fn cast<U: Real>(&self) -> Weighted<U> {
         Weighted { measurement: self.measurement.cast(), weight: U::of(self.weight.as_f64()) }
     }
+}
+
+/// Returns the marginal of a belief at the two position states.
+#[inline(always)]
+pub(crate) fn position_of<T: Real, const N: usize>(b: &Gaussian<N, T>, at: [usize; 2]) -> Gaussian<2, T> {
+    let [i, j] = at;
+    Gaussian {
+        mean: Vector2::new(b.mean[i], b.mean[j]),
+        cov: Matrix2::new(b.cov[(i, i)], b.cov[(i, j)], b.cov[(j, i)], b.cov[(j, j)]),
+    }
+}
+
+/// Returns the log-likelihood of a measurement (density per px²) under a predicted position.
+pub(crate) fn log_likelihood<T: Real>(p: &Gaussian<2, T>, m: &Measurement<T>) -> Result<T, FilterError> {
+    let s = invert_pair(&(p.cov + m.cov), "the innovation covariance")?;
+    Ok(s.log_likelihood(&(m.position - p.mean)))
 }

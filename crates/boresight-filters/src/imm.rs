@@ -10,8 +10,9 @@
 //! Cost: R filters, plus R² N² for the mixing and R factorisations for square-root forms.
 //! Limits: models that differ by less than their noise cannot be told apart; all must share one state layout.
 
-use crate::filter::{check_dt, check_measurement, log_likelihood};
-use crate::mixture::check_weighted;
+use crate::check::check_weighted;
+use crate::check::{check_dt, check_measurement};
+use crate::gaussian::log_likelihood;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Weighted};
 use nalgebra::{SMatrix, SVector};
 

@@ -7,7 +7,7 @@
 //! the digits. The measurement covariance must be positive definite. Cost: about 4 N³ flops per predict, 8 per correct,
 //! N³ to read the belief.
 
-use crate::filter::{check_belief, check_dt, check_measurement};
+use crate::check::{check_belief, check_dt, check_measurement};
 use crate::linalg::{Cholesky, invert_pair, mul, symmetrize};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;

@@ -8,8 +8,10 @@
 //! couples them. With a nonlinear model this is the extended Kalman filter: Phi is the Jacobian at the state.
 //! Cost: N = 4, constant velocity: about 60 flops to predict, 130 to correct (Joseph).
 
-use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{halves_apart, invert_pair, pack_axes, unpack_axes};
+use crate::axes::{halves_apart, pack_axes, unpack_axes};
+use crate::check::{check_belief, check_dt, check_measurement};
+use crate::gaussian::position_of;
+use crate::linalg::invert_pair;
 use crate::mixture::{joseph, mixture_update};
 use crate::model::Model;
 use crate::real::all_finite;
@@ -18,6 +20,7 @@ use nalgebra::{Matrix2, SMatrix, Vector2};
 
 /// Which form of the covariance update is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CovarianceForm {
     /// (I - K H) P (I - K H)ᵀ + K R Kᵀ: positive semi-definite for any gain.
     #[default]

@@ -6,41 +6,46 @@
 // `!(x > 0)` is meant: NaN must take the refusing branch.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
-pub mod adaptive;
+mod adaptive;
 pub mod ar1;
+mod axes;
 pub mod batch;
 pub mod bounds;
+mod check;
 pub mod consistency;
 pub mod converted;
-pub mod displacement;
+mod displacement;
 pub mod ekf;
 mod error;
 mod filter;
 pub mod fuzzy;
 mod fuzzy_innovation;
-pub mod fuzzy_srif;
+mod fuzzy_srif;
 mod gaussian;
-pub mod imm;
-pub mod information;
-pub mod kf;
+mod imm;
+mod information;
+mod information_pair;
+mod kf;
+/// The small dense mathematics inside; public only for this crate's own tests, may change at any time.
+#[doc(hidden)]
 pub mod linalg;
 pub mod linear;
 pub mod lms;
 mod lms_filter;
 pub mod mixture;
 pub mod model;
-pub mod out_of_sequence;
+mod out_of_sequence;
 pub mod pda;
 mod real;
-pub mod robust;
+mod robust;
 pub mod sensor;
 pub mod smooth;
-pub mod square_root;
+mod square_root;
 pub mod srif;
 mod srif_axes;
 pub mod ud;
 mod ud_axes;
-pub mod ukf;
+mod ukf;
 
 pub use adaptive::{Adaptive, AdaptiveConfig, Memory, NoiseLearner, ScaleNoise};
 pub use ar1::Ar1;
@@ -57,7 +62,7 @@ pub use lms::LmsRule;
 pub use lms_filter::Lms;
 pub use out_of_sequence::{Late, OutOfSequence};
 pub use real::Real;
-pub use robust::{Innovation, Robust};
+pub use robust::{InnovationRule, Robust};
 pub use square_root::SquareRoot;
 pub use srif::Srif;
 pub use ud::Ud;

@@ -11,6 +11,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// What one linear update found besides the new belief.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LinearUpdate<const N: usize, const M: usize, T = f64> {
     /// The belief after the measurement.
     pub belief: Gaussian<N, T>,

@@ -21,6 +21,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// How the weights learn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum LmsRule<T = f64> {
     /// The corrected printed equations with step factor α (1/(px/s²)², about): diverges for α that do anything.
     AsPrinted {
@@ -41,6 +42,7 @@ const WATCH: f64 = 20.0;
 
 /// One axis of the filter with S = N + 3 states; S >= 5.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LmsAxis<const S: usize, T: Real = f64> {
     /// State (p, v, a_1 …), px, px/s, px/s².
     pub state: SVector<T, S>,

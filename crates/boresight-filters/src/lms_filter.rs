@@ -7,9 +7,9 @@
 //! Limits: a missed scan leaves the second differences with a longer step, in real time.
 //! Symbols: per axis s = (p, v, a_1 …), px, px/s, px/s². Cost: two axes of [`crate::lms`], about 24 S³ flops.
 
-use crate::filter::{check_dt, check_measurement};
+use crate::check::check_weighted;
+use crate::check::{check_dt, check_measurement};
 use crate::lms::{LmsAxis, LmsRule};
-use crate::mixture::check_weighted;
 use crate::{Filter, FilterError, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
@@ -25,7 +25,7 @@ impl<const S: usize> Lms<S> {
     /// # Errors
     /// [`FilterError`] if a value is not finite or out of range, or S < 5.
     pub fn from_kinematics(k: &Gaussian<4>, acceleration_std: f64, rule: LmsRule) -> Result<Self, FilterError> {
-        crate::filter::check_belief(k)?;
+        crate::check::check_belief(k)?;
         let axis = |i: usize| {
             let var = [k.cov[(i, i)], k.cov[(i + 1, i + 1)]];
             let mut a = LmsAxis::new(k.mean[i], k.mean[i + 1], var, acceleration_std * acceleration_std, rule)?;
@@ -115,6 +115,6 @@ impl<const S: usize> Filter for Lms<S> {
 
     fn log_likelihood(&self, measurement: &Measurement) -> Result<f64, FilterError> {
         check_measurement(measurement)?;
-        crate::filter::log_likelihood(&self.predicted(), measurement)
+        crate::gaussian::log_likelihood(&self.predicted(), measurement)
     }
 }

@@ -7,36 +7,11 @@
 //! Symbols: p_i weights; p0 = 1 - Σ p_i; K_i N x 2; S_i 2 x 2 (px²). Cost: about 2 m N² + N² flops for m hypotheses.
 //! Limits: the mixture's shape is lost: two far hypotheses of equal weight give a wide Gaussian between them.
 
-use crate::filter::{check_measurement, position_of};
+use crate::check::check_weighted;
+use crate::gaussian::position_of;
 use crate::linalg::{invert_pair, symmetrize};
-use crate::{FilterError, Gaussian, GaussianFilter, Real, Weighted};
+use crate::{FilterError, Gaussian, Real, Weighted};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-
-/// Weights may exceed 1 by their rounding.
-fn weight_slack<T: Real>() -> T {
-    T::EPSILON * T::of(64.0)
-}
-
-/// Checks all hypotheses and returns the sum of weights and how many have a weight above 0.
-pub(crate) fn check_weighted<T: Real>(
-    hypotheses: impl Iterator<Item = Weighted<T>>,
-) -> Result<(T, usize), FilterError> {
-    // In f64 for f32 too: a hundred thousand small weights must not add up to more than 1 by rounding.
-    let (mut sum, mut n) = (0.0, 0);
-    for h in hypotheses {
-        check_measurement(&h.measurement)?;
-        if !(h.weight >= T::zero() && h.weight <= T::one() + weight_slack()) {
-            return Err(FilterError::OutOfRange("weights in 0..=1"));
-        }
-        sum += h.weight.as_f64();
-        n += usize::from(h.weight > T::zero());
-    }
-    if sum > 1.0 + weight_slack::<T>().as_f64() + f64::EPSILON * n as f64 {
-        Err(FilterError::OutOfRange("weights that sum to at most 1"))
-    } else {
-        Ok((T::of(sum), n))
-    }
-}
 
 /// A gain and the measurement covariance that it belongs to.
 type Known<const N: usize, T> = Option<(Matrix2<T>, SMatrix<T, N, 2>)>;
@@ -58,7 +33,7 @@ fn gain<const N: usize, T: Real>(
 
 /// Returns the moment-matched belief after the hypotheses.
 /// # Errors
-/// [`FilterError`] as [`GaussianFilter::correct_weighted`].
+/// [`FilterError`] as [`crate::GaussianFilter::correct_weighted`].
 pub fn mixture_update<T: Real, const N: usize>(
     prior: &Gaussian<N, T>,
     at: [usize; 2],
@@ -137,31 +112,11 @@ pub(crate) fn joseph<T: Real, const N: usize>(
     a
 }
 
-/// The default of [`GaussianFilter::correct_weighted`].
-pub(crate) fn correct_by_mixture<F, const N: usize, I>(filter: &mut F, hypotheses: I) -> Result<(), FilterError>
-where
-    F: GaussianFilter<N>,
-    I: Iterator<Item = Weighted<F::Real>> + Clone,
-{
-    let (_, n) = check_weighted(hypotheses.clone())?;
-    if n == 0 {
-        return Ok(());
-    }
-    if n == 1
-        && let Some(only) = hypotheses.clone().find(|h| h.weight > F::Real::ZERO)
-        && only.weight == F::Real::ONE
-    {
-        return filter.correct(&only.measurement);
-    }
-    let posterior = mixture_update(&filter.belief(), filter.position_at(), hypotheses)?;
-    filter.set_belief(&posterior)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::ConstantVelocity;
-    use crate::{Measurement, Start, Ud};
+    use crate::{GaussianFilter, Measurement, Start, Ud};
 
     fn half_way<T: Real>() {
         let first = Measurement::isotropic(T::zero(), T::zero(), T::one());

@@ -12,15 +12,16 @@
 //! time (discrete white acceleration) is exact in neither. Cost: retrodiction about 10 N³, replay a step per update.
 //! Symbols: τ, now s; x, b N x 1; P, Q, B N x N.
 
-use crate::filter::{check_dt, check_measurement};
+use crate::check::check_weighted;
+use crate::check::{check_dt, check_measurement};
 use crate::linalg::{Cholesky, invert_pair, mul, mul_transposed, symmetrize};
-use crate::mixture::check_weighted;
 use crate::model::Model;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Start, Weighted};
 use nalgebra::{SMatrix, SVector};
 
 /// How a late measurement is brought in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Late {
     /// Move the belief back, update across time: one step, whatever the lag.
     #[default]
@@ -156,7 +157,7 @@ impl<F: Clone, M, const K: usize, T: Real> OutOfSequence<F, M, K, T> {
         let x_tau = mul(&f, &(now.mean - mul(&q, &b)));
         let cross = mul_transposed(&(now.cov - p_xv), &f);
         let [i, j] = M::POSITION;
-        let past = crate::filter::position_of(&Gaussian { mean: x_tau, cov: p_tau }, [i, j]);
+        let past = crate::gaussian::position_of(&Gaussian { mean: x_tau, cov: p_tau }, [i, j]);
         let s = past.cov + m.cov;
         let pair = invert_pair(&s, "the innovation covariance")?;
         let mut p_xz = SMatrix::<T, N, 2>::zeros();

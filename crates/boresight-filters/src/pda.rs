@@ -62,7 +62,7 @@ pub fn association_probabilities<T: Real>(
     let half = T::of(0.5);
     let mut largest = -T::MAX;
     for (m, o) in measurements.iter().zip(out.iter_mut()) {
-        crate::filter::check_measurement(m)?;
+        crate::check::check_measurement(m)?;
         let s = invert_pair(&(predicted.cov + m.cov), "the innovation covariance")?;
         *o = -half * (s.distance2(&(m.position - predicted.mean)) + s.det.ln());
         largest = largest.max(*o);

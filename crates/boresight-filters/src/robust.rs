@@ -8,15 +8,15 @@
 //! Symbols: ν 2 x 1 (px); S, R 2 x 2 (px²); w, k, n no unit. Cost: about 40 flops on top of the filter's.
 //! Limits: a true manoeuvre looks like a row of outliers; with Huber k = 2 the filter follows it later.
 
-use crate::filter::check_measurement;
+use crate::check::check_measurement;
+use crate::check::check_weighted;
 use crate::linalg::invert_pair;
-use crate::mixture::check_weighted;
 use crate::{FilterError, Gaussian, GaussianFilter, Measurement, Real, Weighted};
 
 /// How a far innovation is held back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Innovation<T = f64> {
+pub enum InnovationRule<T = f64> {
     /// Taken as it is.
     Plain,
     /// Huber weight min(1, k/d): full trust up to `k` standard deviations. 2 keeps 86 % of true measurements whole.
@@ -31,7 +31,7 @@ pub enum Innovation<T = f64> {
     },
 }
 
-impl<T: Real> Innovation<T> {
+impl<T: Real> InnovationRule<T> {
     /// Returns the weight of a measurement at squared distance d² (no unit), in (0, 1].
     pub fn weight(&self, distance2: T) -> T {
         match *self {
@@ -80,14 +80,14 @@ impl<T: Real> Innovation<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robust<F, T = f64> {
     filter: F,
-    innovation: Innovation<T>,
+    innovation: InnovationRule<T>,
 }
 
 impl<F, T: Real> Robust<F, T> {
     /// Wraps a filter.
     /// # Errors
     /// [`FilterError::OutOfRange`] if the parameter of the innovation is not above 0.
-    pub fn new(filter: F, innovation: Innovation<T>) -> Result<Self, FilterError> {
+    pub fn new(filter: F, innovation: InnovationRule<T>) -> Result<Self, FilterError> {
         innovation.validate()?;
         Ok(Self { filter, innovation })
     }
@@ -143,14 +143,14 @@ mod tests {
         let near = Measurement::isotropic(0.5, -0.5, 1.0);
         let mut plain = kf();
         plain.correct(&near).unwrap();
-        let mut huber = Robust::new(kf(), Innovation::Huber { threshold: 2.0 }).unwrap();
+        let mut huber = Robust::new(kf(), InnovationRule::Huber { threshold: 2.0 }).unwrap();
         huber.correct(&near).unwrap();
         assert_eq!(plain.belief(), huber.belief());
     }
 
     #[test]
     fn the_pull_of_an_outlier_is_bounded() {
-        for rule in [Innovation::Huber { threshold: 2.0 }, Innovation::StudentT { degrees_of_freedom: 4.0 }] {
+        for rule in [InnovationRule::Huber { threshold: 2.0 }, InnovationRule::StudentT { degrees_of_freedom: 4.0 }] {
             let mut f = Robust::new(kf(), rule).unwrap();
             f.correct(&Measurement::isotropic(1e6, 0.0, 1.0)).unwrap();
             assert!(f.belief().mean[0].abs() < 2.0, "{rule:?}: {}", f.belief().mean[0]);
@@ -162,7 +162,7 @@ mod tests {
     fn the_softened_innovation_covariance_is_the_plain_one_over_the_weight() {
         let p = kf().predicted();
         let m = Measurement::isotropic(8.0, 6.0, 1.0);
-        let rule = Innovation::Huber { threshold: 2.0 };
+        let rule = InnovationRule::Huber { threshold: 2.0 };
         let w = rule.weight(100.0 / 2.0);
         let soft = rule.soften(&p, &m).unwrap();
         assert!(((p.cov + soft.cov) - (p.cov + m.cov) / w).norm() < 1e-12);

@@ -5,7 +5,7 @@
 //! Symbols: s N x N (px, px/s), lower triangular after a predict, full after a correct; a row of H; r px².
 //! Limits: none of rank. Cost: about 2 N²(N + W) flops per predict, 6 N² per correct; two roots more than [`crate::Ud`].
 
-use crate::filter::{check_belief, check_dt, check_measurement};
+use crate::check::{check_belief, check_dt, check_measurement};
 use crate::linalg::{Cholesky, lower_factor, mul};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;

@@ -9,7 +9,7 @@
 //! Limits: Phi of an axis must be upper triangular ([`crate::model::Model::AXES`]).
 
 use crate::Real;
-use crate::srif::InformationPair;
+use crate::information_pair::InformationPair;
 use nalgebra::{SMatrix, SVector, Vector2};
 
 /// Puts the axes of a pair side by side.

@@ -10,8 +10,10 @@
 //! Two uncorrelated axes are filtered apart, side by side (`ud_axes`), until a full R or a PDA update couples them.
 //! Limits: none of rank: a zero variance is allowed. Cost: about N²(N + W) + 3 N² flops per predict + update.
 
-use crate::filter::{check_belief, check_dt, check_measurement, position_of};
-use crate::linalg::{UdFactors, halves_apart, mwgs, ud_factorize};
+use crate::axes::halves_apart;
+use crate::check::{check_belief, check_dt, check_measurement};
+use crate::gaussian::position_of;
+use crate::linalg::{UdFactors, mwgs, ud_factorize};
 use crate::model::{Model, NoiseVisitor};
 use crate::real::all_finite;
 use crate::ud_axes;
@@ -20,6 +22,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// Innovation variance and gain of a scalar update.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ScalarUpdate<const N: usize, T = f64> {
     /// Innovation variance aᵀ P a + r.
     pub alpha: T,

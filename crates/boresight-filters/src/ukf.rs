@@ -8,7 +8,7 @@
 //! Linear models and position measurements give the Kalman answer. Cost: 2N + 1 motions, N³ for each root and product.
 //! Limits: a posterior bent within one standard deviation (range known far better than azimuth) is still no Gaussian.
 
-use crate::filter::{check_belief, check_dt, check_measurement};
+use crate::check::{check_belief, check_dt, check_measurement};
 use crate::linalg::{Cholesky, symmetrize};
 use crate::linear::LinearUpdate;
 use crate::mixture::mixture_update;

@@ -8,7 +8,8 @@
 //! Cost: two dense 3 x 3 blocks, about 100 flops to predict.
 
 use super::axes::both_axes;
-use super::{Model, NoiseVisitor, check_strength};
+use super::{Model, NoiseVisitor};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

@@ -7,7 +7,8 @@
 //! Limits: the discrete form is not the same for one step of 2 dt as for two of dt; the continuous form is: take it for
 //! uneven frame times. Cost: [`Model::propagate`] uses the two 2 x 2 blocks, about 60 flops.
 
-use super::{Model, NoiseVisitor, check_strength};
+use super::{Model, NoiseVisitor};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{Matrix2, SMatrix, SVector};
 

@@ -163,7 +163,7 @@ pub trait NoiseVisitor<const N: usize, T> {
 /// # Errors
 /// [`FilterError`] if the measurement is not finite or `velocity_std` is not positive and finite.
 pub fn kinematics_from_point<T: Real>(m: &Measurement<T>, velocity_std: T) -> Result<Gaussian<4, T>, FilterError> {
-    crate::filter::check_measurement(m)?;
+    crate::check::check_measurement(m)?;
     if !(velocity_std > T::zero() && velocity_std <= T::MAX.sqrt()) {
         return Err(FilterError::OutOfRange("a velocity standard deviation above 0"));
     }
@@ -178,9 +178,4 @@ pub fn kinematics_from_point<T: Real>(m: &Measurement<T>, velocity_std: T) -> Re
     k.cov[(1, 1)] = velocity_std * velocity_std;
     k.cov[(3, 3)] = velocity_std * velocity_std;
     Ok(k)
-}
-
-/// Returns whether a noise strength is usable: finite and at least 0.
-pub(crate) fn check_strength<T: Real>(value: T, what: &'static str) -> Result<T, FilterError> {
-    if value >= T::zero() && value <= T::MAX { Ok(value) } else { Err(FilterError::OutOfRange(what)) }
 }

@@ -7,8 +7,9 @@
 //! the model for cells, particles, pedestrians. Limits: a target on a long straight course is pulled towards rest.
 //! Cost: an exponential, and five quadrature points where the closed form would cancel.
 
+use super::Model;
 use super::axes::{both_axes, decay1, noise_integral};
-use super::{Model, check_strength};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

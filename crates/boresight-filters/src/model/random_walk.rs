@@ -6,7 +6,8 @@
 //! so that nothing downstream takes it for a known standstill.
 //! Limits: nothing is predicted but the growth of the uncertainty. Cost: two additions.
 
-use super::{Model, check_strength};
+use super::Model;
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

@@ -3,7 +3,8 @@
 //! Symbols: Q process covariance of the model inside; s factor, no unit: s Q. Limits: at s other than 1 the model's own
 //! shortcuts are not taken. Cost: that of the model.
 
-use super::{Dense, Model, NoiseVisitor, check_strength};
+use super::{Dense, Model, NoiseVisitor};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

@@ -8,9 +8,10 @@
 //! constant velocity with white acceleration of density 2 σ_m² τ.
 //! Cost: an exponential, and five quadrature points where the closed form would cancel.
 
+use super::Model;
 use super::axes::{both_axes, decay1, decay2, noise_integral};
 use super::constant_acceleration::lift_to_acceleration;
-use super::{Model, check_strength};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

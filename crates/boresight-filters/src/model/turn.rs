@@ -8,7 +8,8 @@
 //! Limits: [`NearlyConstantTurn`] is linearised (or taken by sigma points, [`crate::Ukf`]): ω dt below about 1 rad.
 //! Cost: one sine and cosine a step; dense 4 x 4 or 5 x 5 products.
 
-use super::{ConstantVelocity, Model, NoiseVisitor, check_strength};
+use super::{ConstantVelocity, Model, NoiseVisitor};
+use crate::check::check_strength;
 use crate::{FilterError, Gaussian, Real};
 use nalgebra::{SMatrix, SVector};
 

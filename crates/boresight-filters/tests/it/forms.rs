@@ -6,8 +6,8 @@ use boresight_filters::model::{
     Scaled, Singer,
 };
 use boresight_filters::{
-    Adaptive, AdaptiveConfig, Ar1, Displacement, Filter, Fuzzy, FuzzySrif, Gaussian, Imm, Information, Innovation, Kf,
-    Late, Lms, LmsRule, Measurement, OutOfSequence, Robust, SquareRoot, Srif, Start, Tracked, Ud, Ukf,
+    Adaptive, AdaptiveConfig, Ar1, Displacement, Filter, Fuzzy, FuzzySrif, Gaussian, Imm, Information, InnovationRule,
+    Kf, Late, Lms, LmsRule, Measurement, OutOfSequence, Robust, SquareRoot, Srif, Start, Tracked, Ud, Ukf,
 };
 use nalgebra::{Matrix2, Vector2};
 
@@ -36,7 +36,7 @@ pub fn exact_forms(belief: &Gaussian<4>) -> Named {
         ("ukf", Box::new(Tracked(Ukf::start(cv, b).unwrap()))),
         ("imm of one", Box::new(Tracked(Imm::new([kf], [1.0]).unwrap()))),
         ("out of sequence", Box::new(Tracked(OutOfSequence::<_, ConstantVelocity, 4>::new(kf, Late::Retrodict)))),
-        ("plain robust", Box::new(Tracked(Robust::new(kf, Innovation::Plain).unwrap()))),
+        ("plain robust", Box::new(Tracked(Robust::new(kf, InnovationRule::Plain).unwrap()))),
     ]
 }
 
@@ -54,10 +54,10 @@ pub fn forms(belief: &Gaussian<4>) -> Named {
     let more: Named = vec![
         ("fuzzy srif", Box::new(Tracked(FuzzySrif::<_, 4>::start(cv, b).unwrap()))),
         ("fuzzy kf", Box::new(Tracked(Fuzzy::new(kf, Correlator::default()).unwrap()))),
-        ("huber", Box::new(Tracked(Robust::new(kf, Innovation::Huber { threshold: 2.0 }).unwrap()))),
+        ("huber", Box::new(Tracked(Robust::new(kf, InnovationRule::Huber { threshold: 2.0 }).unwrap()))),
         (
             "student-t",
-            Box::new(Tracked(Robust::new(turns[0], Innovation::StudentT { degrees_of_freedom: 4.0 }).unwrap())),
+            Box::new(Tracked(Robust::new(turns[0], InnovationRule::StudentT { degrees_of_freedom: 4.0 }).unwrap())),
         ),
         ("imm", Box::new(Tracked(Imm::new(turns, [4.0, 2.0]).unwrap()))),
         ("adaptive", Box::new(Tracked(Adaptive::<_, 0>::new(scaled, AdaptiveConfig::default()).unwrap()))),

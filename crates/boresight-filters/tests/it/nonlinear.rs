@@ -164,10 +164,10 @@ fn adaptive_noise_finds_the_true_variances_and_scale() {
         let first = Measurement::isotropic(0.0, 0.0, 1.0);
         // R alone, told four times too large; the process noise is told right.
         let right = Scaled::new(true_model);
-        let config = AdaptiveConfig { memory, ..AdaptiveConfig::default() };
+        let config = AdaptiveConfig::measurement_noise(memory);
         let mut learns_r =
             Adaptive::<_, 400>::new(Kf::<_, 4>::from_point(right, &first, 2.0).unwrap(), config).unwrap();
-        let config = AdaptiveConfig { measurement_noise: false, process_noise: true, memory, ..config };
+        let config = AdaptiveConfig::process_noise(memory);
         let mut learns_q = Adaptive::<_, 400>::new(Kf::<_, 4>::from_point(told, &first, 2.0).unwrap(), config).unwrap();
         let mut truth = Vector4::new(0.0, 1.0, 0.0, 2.0);
         let l = true_model.process_noise(0.5).cholesky().unwrap().l();

@@ -1,6 +1,6 @@
 //! The filter of one track as the tracker stores it: in place for the constant-velocity Kalman filter, boxed for the rest.
 
-use super::constant_velocity::ConstantVelocity;
+use super::constant_velocity::ConstantVelocityKf;
 use boresight_filters::{Filter, FilterError, Gaussian, Weighted};
 
 /// A filter that can be copied behind its trait: what the tracker holds when the filter is not kept in place.
@@ -18,7 +18,7 @@ impl<F: Filter + Clone + Send + Sync + 'static> TrackFilter for F {
 /// A filter in place, or behind its trait.
 pub enum Belief {
     /// Constant velocity, 15 numbers in the track itself: no pointer to follow at a hundred thousand tracks.
-    Cv(ConstantVelocity),
+    Cv(ConstantVelocityKf),
     /// Any other filter.
     Boxed(Box<dyn TrackFilter>),
 }

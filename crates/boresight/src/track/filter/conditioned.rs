@@ -6,7 +6,7 @@ use super::belief::TrackFilter;
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
 use boresight_filters::{
-    Filter, FilterError, FuzzyInnovation, Gaussian, GaussianFilter, Innovation, NoiseLearner, ScaleNoise, Tracked,
+    Filter, FilterError, FuzzyInnovation, Gaussian, GaussianFilter, InnovationRule, NoiseLearner, ScaleNoise, Tracked,
     Weighted,
 };
 use nalgebra::Vector2;
@@ -36,13 +36,13 @@ pub(super) fn conditioned(
     adaptive: Option<&LearningConfig>,
 ) -> Result<Box<dyn TrackFilter>, FilterError> {
     let innovation = match innovation {
-        InnovationConfig::Plain {} => Rule::Robust(Innovation::Plain),
+        InnovationConfig::Plain {} => Rule::Robust(InnovationRule::Plain),
         InnovationConfig::Huber(c) => Rule::Robust(c.innovation()),
         InnovationConfig::StudentT(c) => Rule::Robust(c.innovation()),
         InnovationConfig::Fuzzy(c) => Rule::Fuzzy(Box::new(FuzzyInnovation::new(c.correlator())?)),
     };
     let learner = adaptive.map(|c| NoiseLearner::new(c.config()).map(Box::new)).transpose()?;
-    if learner.is_none() && innovation == Rule::Robust(Innovation::Plain) {
+    if learner.is_none() && innovation == Rule::Robust(InnovationRule::Plain) {
         return Ok(filter);
     }
     Ok(Box::new(Conditioned { filter, innovation, learner, scratch: Vec::new() }))
@@ -51,7 +51,7 @@ pub(super) fn conditioned(
 /// How innovations are held back.
 #[derive(Clone, Debug, PartialEq)]
 enum Rule {
-    Robust(Innovation),
+    Robust(InnovationRule),
     Fuzzy(Box<FuzzyInnovation>),
 }
 

@@ -5,7 +5,7 @@
 //! filters stand in `presets`.
 
 use super::belief::Belief;
-use super::constant_velocity::ConstantVelocity;
+use super::constant_velocity::ConstantVelocityKf;
 use super::form::FormConfig;
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
@@ -54,7 +54,7 @@ impl FilterConfig {
     /// Builds the filter of a new track.
     pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
         if *self == Self::default() {
-            return Ok(Belief::Cv(ConstantVelocity::new(start, acceleration_std)));
+            return Ok(Belief::Cv(ConstantVelocityKf::new(start, acceleration_std)));
         }
         let adaptive = self.adaptive.as_ref();
         self.form.start(&self.model, &self.innovation, adaptive, start, acceleration_std).map(Belief::Boxed)

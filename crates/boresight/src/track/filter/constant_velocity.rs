@@ -49,7 +49,7 @@ impl Axis {
 
 /// The belief of a constant-velocity track.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ConstantVelocity {
+pub struct ConstantVelocityKf {
     axes: [Axis; 2],
     /// cov([x, vx], [y, vy]), row by row.
     coupling: [f64; 4],
@@ -57,7 +57,7 @@ pub struct ConstantVelocity {
     coupled: bool,
 }
 
-impl ConstantVelocity {
+impl ConstantVelocityKf {
     /// Builds a filter from a first belief and the standard deviation of the acceleration, px/s².
     pub fn new(start: &Gaussian<4>, acceleration_std_px_per_s2: f64) -> Self {
         let mut filter = Self {
@@ -135,7 +135,7 @@ fn corrected(belief: &Gaussian<4>, z: &Measurement) -> Result<(Vector4<f64>, Mat
     Ok((belief.mean + k * nu, cov))
 }
 
-impl Filter for ConstantVelocity {
+impl Filter for ConstantVelocityKf {
     #[inline]
     fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
         if !(dt_s >= 0.0 && dt_s.is_finite()) {
@@ -209,9 +209,9 @@ impl Filter for ConstantVelocity {
 mod tests {
     use super::*;
 
-    fn filter() -> ConstantVelocity {
+    fn filter() -> ConstantVelocityKf {
         let cov = Matrix4::from_diagonal(&Vector4::new(1.0, 4.0, 2.0, 4.0));
-        let mut f = ConstantVelocity::new(&Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov }, 2.0);
+        let mut f = ConstantVelocityKf::new(&Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov }, 2.0);
         f.predict(0.5).unwrap();
         f
     }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::validate::{check, positive};
-use boresight_filters::Innovation;
+use boresight_filters::InnovationRule;
 use boresight_filters::fuzzy::{Correlator, SETS, Triangle};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -137,8 +137,8 @@ impl HuberConfig {
     fn validate(&self, at: &str) -> Result<()> {
         positive(at, "threshold", self.threshold, "2 is usual")
     }
-    pub(super) fn innovation(&self) -> Innovation {
-        Innovation::Huber { threshold: self.threshold }
+    pub(super) fn innovation(&self) -> InnovationRule {
+        InnovationRule::Huber { threshold: self.threshold }
     }
 }
 
@@ -146,7 +146,7 @@ impl StudentTConfig {
     fn validate(&self, at: &str) -> Result<()> {
         positive(at, "degrees-of-freedom", self.degrees_of_freedom, "4 is usual")
     }
-    pub(super) fn innovation(&self) -> Innovation {
-        Innovation::StudentT { degrees_of_freedom: self.degrees_of_freedom }
+    pub(super) fn innovation(&self) -> InnovationRule {
+        InnovationRule::StudentT { degrees_of_freedom: self.degrees_of_freedom }
     }
 }

@@ -38,12 +38,10 @@ impl LearningConfig {
 
     pub(super) fn config(&self) -> AdaptiveConfig {
         let memory = if self.windowed { Memory::Windowed } else { Memory::Recursive(self.memory_updates) };
-        AdaptiveConfig {
-            measurement_noise: self.measurement_noise,
-            process_noise: self.process_noise,
-            memory,
-            floor: self.floor,
-            ..AdaptiveConfig::default()
-        }
+        let mut config = AdaptiveConfig::measurement_noise(memory);
+        config.measurement_noise = self.measurement_noise;
+        config.process_noise = self.process_noise;
+        config.floor = self.floor;
+        config
     }
 }

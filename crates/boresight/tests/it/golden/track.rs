@@ -3,7 +3,7 @@
 use super::{load, number, numbers, rows};
 use boresight::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior};
 use boresight::track::{
-    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocity, step::gate as gating,
+    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocityKf, step::gate as gating,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};
@@ -115,7 +115,7 @@ fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
         let r = square(&i["R"]);
         let scan =
             Scan { detections: rows(&i["Z"]).iter().map(|z| detection(z[0], z[1], r)).collect(), ..Scan::default() };
-        let p = ConstantVelocity::new(&belief(i), 1.0).predicted();
+        let p = ConstantVelocityKf::new(&belief(i), 1.0).predicted();
         let track = gating::Predicted {
             x: p.mean.x,
             y: p.mean.y,
@@ -152,7 +152,7 @@ fn probabilistic_data_association_agrees_with_the_golden_vectors() {
         let i = &case["inputs"];
         let r = square(&i["R"]);
         let z: Vec<Vector2<f64>> = rows(&i["Z"]).iter().map(|z| Vector2::new(z[0], z[1])).collect();
-        let mut filter = ConstantVelocity::new(&belief(i), 1.0);
+        let mut filter = ConstantVelocityKf::new(&belief(i), 1.0);
         let p = filter.predicted();
         let s = p.cov + r;
         let mut gates = Gates::new();

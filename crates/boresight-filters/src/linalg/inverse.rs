@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 /// The inverse and determinant of a symmetric positive definite 2 x 2 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair<T = f64> {
+pub struct Inverse<T = f64> {
     /// The inverse, px⁻².
     pub inverse: Matrix2<T>,
     /// The determinant, px⁴.
@@ -19,7 +19,7 @@ pub struct Pair<T = f64> {
 /// # Errors
 /// [`FilterError::NotPositiveDefinite`] if it cannot be factored.
 #[inline(always)]
-pub fn invert_pair<T: Real>(s: &Matrix2<T>, what: &'static str) -> Result<Pair<T>, FilterError> {
+pub fn invert_pair<T: Real>(s: &Matrix2<T>, what: &'static str) -> Result<Inverse<T>, FilterError> {
     let (a, b, c) = (s[(0, 0)], s[(1, 0)], s[(1, 1)]);
     let det = a * c - b * b;
     // NaN fails these comparisons, so it is refused here as well.
@@ -30,10 +30,10 @@ pub fn invert_pair<T: Real>(s: &Matrix2<T>, what: &'static str) -> Result<Pair<T
     if !(inv <= T::MAX) {
         return Err(FilterError::NotPositiveDefinite(what));
     }
-    Ok(Pair { inverse: Matrix2::new(c * inv, -b * inv, -b * inv, a * inv), det })
+    Ok(Inverse { inverse: Matrix2::new(c * inv, -b * inv, -b * inv, a * inv), det })
 }
 
-impl<T: Real> Pair<T> {
+impl<T: Real> Inverse<T> {
     /// Returns νᵀ S⁻¹ ν, the squared Mahalanobis distance (no unit; χ² with 2 degrees of freedom).
     #[inline(always)]
     pub fn distance2(&self, innovation: &Vector2<T>) -> T {
