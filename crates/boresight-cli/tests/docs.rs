@@ -3,11 +3,10 @@
 //! Blocks fenced as `sh` hold commands, a line each; blocks fenced as `console` hold commands after `$ ` and what they print
 //! (`...` stands for anything). A chapter's blocks run in order in one folder, in which `samples/` and `configs/` lie.
 //! A block of any kind with `file=NAME` is written to that file first (a scene, a configuration).
-//! After `sh` or `console` may stand: `needs=data` (or any other need: not run here, printed as skipped), `exit=2` (the code expected).
+//! After `sh` or `console` may stand: `needs=data` (or any other need: not run here, shown as ignored), `exit=2` (the code expected).
 //! Lines whose command is not `boresight` (cargo, .ci/run) are left to `.ci/run`.
 
-#![cfg(unix)]
-
+use libtest_mimic::{Arguments, Trial};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -134,11 +133,11 @@ fn check(chapter: &Path) {
     let name = chapter.strip_prefix(root()).unwrap().display().to_string();
     let dir = tempfile::tempdir().unwrap();
     for shared in ["samples", "configs"] {
+        #[cfg(unix)]
         std::os::unix::fs::symlink(root().join(shared), dir.path().join(shared)).unwrap();
     }
     for block in blocks(&std::fs::read_to_string(chapter).unwrap()) {
-        if let Some(needs) = &block.needs {
-            println!("{name}:{}: skipped, needs {needs}", block.line);
+        if block.needs.is_some() {
             continue;
         }
         if let Some(file) = &block.file {
@@ -160,28 +159,6 @@ fn check(chapter: &Path) {
     }
 }
 
-#[test]
-fn the_commands_of_the_readme_run() {
-    check(&root().join("README.md"));
-}
-
-#[test]
-fn the_commands_of_the_chapters_run() {
-    let mut chapters: Vec<PathBuf> =
-        std::fs::read_dir(root().join("docs")).unwrap().map(|e| e.unwrap().path()).collect();
-    chapters.retain(|p| p.extension().is_some_and(|e| e == "md"));
-    chapters.sort();
-    assert!(chapters.len() >= 5, "{chapters:?}");
-    // Two at a time: each is a chain of commands of its own.
-    std::thread::scope(|s| {
-        let (a, b) = chapters.split_at(chapters.len() / 2);
-        let first = s.spawn(|| a.iter().for_each(|c| check(c)));
-        b.iter().for_each(|c| check(c));
-        first.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
-    });
-}
-
-#[test]
 fn every_link_between_chapters_leads_to_a_file() {
     let mut pages = vec![root().join("README.md"), root().join("ARCHITECTURE.md"), root().join("CONTRIBUTING.md")];
     pages.extend(std::fs::read_dir(root().join("docs")).unwrap().map(|e| e.unwrap().path()));
@@ -200,7 +177,6 @@ fn every_link_between_chapters_leads_to_a_file() {
     assert!(dead.is_empty(), "{dead:#?}");
 }
 
-#[test]
 fn every_chapter_stands_in_the_index() {
     let index = std::fs::read_to_string(root().join("docs/README.md")).unwrap();
     for entry in std::fs::read_dir(root().join("docs")).unwrap() {
@@ -211,7 +187,6 @@ fn every_chapter_stands_in_the_index() {
     }
 }
 
-#[test]
 fn a_block_that_lies_is_caught() {
     let shown = |lines: &[&str]| lines.iter().map(ToString::to_string).collect::<Vec<_>>();
     assert!(shows("a\nb\nc\n", &shown(&["a", "...", "c"])).is_ok());
@@ -223,4 +198,37 @@ fn a_block_that_lies_is_caught() {
     assert_eq!(commands(&found[0]), [("boresight a b".to_string(), vec![])]);
     assert_eq!(commands(&found[1]), [("boresight c".to_string(), vec!["d".to_string()])]);
     assert!(found[1].exit == 2 && found[2].needs.as_deref() == Some("data"));
+}
+
+/// The README and the chapters, in order.
+fn chapters() -> Vec<PathBuf> {
+    let mut chapters: Vec<PathBuf> =
+        std::fs::read_dir(root().join("docs")).unwrap().map(|e| e.unwrap().path()).collect();
+    chapters.push(root().join("README.md"));
+    chapters.retain(|p| p.extension().is_some_and(|e| e == "md"));
+    chapters.sort();
+    assert!(chapters.len() > 5, "{chapters:?}");
+    chapters
+}
+
+/// A test for each chapter, an ignored one for each block that is not run, and those of the pages as a whole.
+fn main() -> std::process::ExitCode {
+    let test = |name: &str, run: fn()| Trial::test(name, move || Ok(run()));
+    let mut trials = vec![
+        test("every_link_between_chapters_leads_to_a_file", every_link_between_chapters_leads_to_a_file),
+        test("every_chapter_stands_in_the_index", every_chapter_stands_in_the_index),
+        test("a_block_that_lies_is_caught", a_block_that_lies_is_caught),
+    ];
+    // The commands stand there for a shell.
+    for chapter in chapters().into_iter().filter(|_| cfg!(unix)) {
+        let name = chapter.strip_prefix(root()).unwrap().display().to_string();
+        for block in blocks(&std::fs::read_to_string(&chapter).unwrap()) {
+            if let Some(needs) = block.needs {
+                let trial = Trial::test(format!("{name}:{}", block.line), || Ok(()));
+                trials.push(trial.with_kind(format!("needs {needs}")).with_ignored_flag(true));
+            }
+        }
+        trials.push(Trial::test(format!("the commands of {name} run"), move || Ok(check(&chapter))));
+    }
+    libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }

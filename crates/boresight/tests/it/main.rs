@@ -4,12 +4,15 @@ mod background;
 mod citations;
 mod fuse;
 mod golden;
+#[cfg(all(feature = "images", feature = "video"))]
 mod hostile;
+#[cfg(feature = "images")]
 mod images;
 mod memory;
 mod metrics;
 mod rooms;
 mod track;
+#[cfg(feature = "video")]
 mod video;
 mod vision_conformance;
 mod vision_covariance;

@@ -7,6 +7,7 @@ use crate::{Error, ErrorKind, Result};
 
 /// A linear programme; A is given by columns: column k holds `values[i]` in `rows[i]` for i in `starts[k]..starts[k + 1]`.
 #[derive(Debug)]
+#[cfg_attr(not(feature = "trajectory-gospa"), allow(dead_code))] // only the solver reads it
 pub struct LinearProgramme {
     /// c.
     pub cost: Vec<f64>,

@@ -155,6 +155,7 @@ fn corner_points(t: &TrackTable) -> TrackTable {
 }
 
 #[test]
+#[cfg_attr(not(feature = "trajectory-gospa"), ignore = "needs the feature trajectory-gospa")]
 fn a_thousand_scenes_have_the_trajectory_gospa_of_the_papers_programme() {
     let (names, rows) = reference("trajectory");
     assert_eq!((names.len(), rows.len()), (3, 1000));
