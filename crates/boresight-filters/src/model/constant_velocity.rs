@@ -82,7 +82,7 @@ impl<T: Real> ConstantVelocity<T> {
             }
             Noise::Continuous(q) => {
                 let qdt = q * dt;
-                (qdt * dt * dt * T::of(1.0 / 3.0), qdt * dt * T::of(0.5), qdt)
+                (q * (dt * dt * dt) / T::of(3.0), qdt * dt * T::of(0.5), qdt)
             }
         }
     }

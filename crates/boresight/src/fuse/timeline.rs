@@ -7,6 +7,7 @@
 
 use crate::{Extent, TrackId, TrackState, TrackStatus};
 use boresight_filters::Gaussian;
+use boresight_filters::model::{ConstantVelocity, Model};
 use nalgebra::{Vector2, Vector4};
 use std::collections::BTreeMap;
 
@@ -43,7 +44,7 @@ impl Timeline {
         let after = self.points.partition_point(|(t, _)| *t <= time_s);
         let (t, belief) = self.points.get(after.checked_sub(1)?)?;
         let dt = time_s - t;
-        (dt <= max_gap_s).then(|| predict(belief, dt, density))
+        if dt <= max_gap_s { predict(belief, dt, density) } else { None }
     }
 
     /// Position and velocity at `time_s` between two points at most `max_gap_s` apart.
@@ -81,17 +82,9 @@ pub(super) fn extent_about(x: &Vector4<f64>, size: [f64; 2]) -> Extent {
     Extent { left_px: x[0] - size[0] / 2.0, top_px: x[2] - size[1] / 2.0, width_px: size[0], height_px: size[1] }
 }
 
-/// Constant-velocity prediction.
-fn predict(b: &Gaussian<4>, dt: f64, density: f64) -> Gaussian<4> {
-    let mut f = nalgebra::Matrix4::identity();
-    f[(0, 1)] = dt;
-    f[(2, 3)] = dt;
-    let mut cov = f * b.cov * f.transpose();
-    for i in [0, 2] {
-        cov[(i, i)] += density * dt.powi(3) / 3.0;
-        cov[(i, i + 1)] += density * dt * dt / 2.0;
-        cov[(i + 1, i)] += density * dt * dt / 2.0;
-        cov[(i + 1, i + 1)] += density * dt;
-    }
-    Gaussian { mean: f * b.mean, cov }
+/// Constant-velocity prediction by the filters' own model.
+fn predict(b: &Gaussian<4>, dt_s: f64, density: f64) -> Option<Gaussian<4>> {
+    let model = ConstantVelocity::continuous(density).ok()?;
+    let phi = model.transition(dt_s, &b.mean);
+    Some(Gaussian { mean: phi * b.mean, cov: phi * b.cov * phi.transpose() + model.process_noise(dt_s) })
 }

@@ -11,7 +11,8 @@ use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, Uniform
 use crate::validate::{not_negative, positive, probability};
 use crate::{Result, Timestamp, TrackId};
 use boresight_filters::Gaussian;
-use nalgebra::{Matrix4, Vector4};
+use boresight_filters::model::{ConstantVelocity, Model};
+use nalgebra::Vector4;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -143,19 +144,9 @@ fn finite(v: f64) -> f64 {
 
 /// d² and ln det S of the end of `a`, moved over the gap, against the start of `b`.
 fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Option<(f64, f64)> {
-    let t = gap_s;
-    let mut phi = Matrix4::identity();
-    phi[(0, 1)] = t;
-    phi[(2, 3)] = t;
-    let q = config.acceleration_std_px_per_s2.powi(2);
-    let t = t.abs();
-    let mut noise = Matrix4::zeros();
-    for k in [0, 2] {
-        noise[(k, k)] = 0.25 * q * t.powi(4);
-        noise[(k, k + 1)] = 0.5 * q * t.powi(3);
-        noise[(k + 1, k)] = 0.5 * q * t.powi(3);
-        noise[(k + 1, k + 1)] = q * t * t;
-    }
+    // Backwards in time the noise grows as forwards.
+    let model = ConstantVelocity::discrete(config.acceleration_std_px_per_s2).ok()?;
+    let (phi, noise) = (model.transition(gap_s, &a.last.mean), model.process_noise(gap_s.abs()));
     let s = phi * a.last.cov * phi.transpose() + noise + b.first.cov;
     let difference: Vector4<f64> = b.first.mean - phi * a.last.mean;
     let c = s.cholesky()?;
@@ -167,6 +158,7 @@ fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix4;
 
     fn fragment(id: u64, begin_s: f64, end_s: f64, at: impl Fn(f64) -> [f64; 4]) -> Fragment {
         let belief = |s: f64| Gaussian { mean: Vector4::from(at(s)), cov: Matrix4::identity() * 0.5 };

@@ -34,7 +34,6 @@ const KNOWN_CYCLES: &[&str] = &[
     "crates/boresight/src/config",
     "crates/boresight/src/metrics/",
     "crates/boresight/src/track/",
-    "crates/boresight-filters/",
     "crates/boresight-cli/",
     "xtask/",
 ];

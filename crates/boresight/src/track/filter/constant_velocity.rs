@@ -6,6 +6,8 @@
 //! the axes stay independent and a step is two 2x2 filters. Several hypotheses: each is corrected by itself and the
 //! mixture is matched in mean and covariance, which is PDA's update when all share one R.
 //! Symbols: state `[x, vx, y, vy]` (px, px/s); q acceleration variance, px²/s⁴; r measurement variance, px².
+//! The prediction is [`boresight_filters::model::ConstantVelocity`]'s, written out for the numbers kept; its order of operations is
+//! that of all published tables, so it stands here once more.
 //! Limits: linear, constant velocity with piecewise-constant acceleration over each dt.
 
 use boresight_filters::mixture::mixture_update;
