@@ -10,3 +10,17 @@ macro_rules! opaque_debug {
         }
     };
 }
+
+/// Compiles a function whose loops the compiler turns into vectors once for each vector width, and takes the widest that the
+/// machine has. The body stays a function of its own, so that the compiler knows that its arguments do not overlap.
+macro_rules! widest {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $(<$($generic:ident: $bound:path),+>)?
+        ($($arg:ident: $of:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$meta])*
+        $vis fn $name $(<$($generic: $bound),+>)? ($($arg: $of),*) $(-> $out)? {
+            #[inline(always)]
+            fn each_width $(<$($generic: $bound),+>)? ($($arg: $of),*) $(-> $out)? $body
+            fearless_simd::dispatch!(fearless_simd::Level::new(), _simd => each_width($($arg),*))
+        }
+    };
+}

@@ -8,7 +8,6 @@
 //! Departure: level probabilities are rounded to 2⁻³² (24-bit alias thresholds in 256 cells).
 //! Units: levels are counts 0..=255. Limits: not for secrets; a stream repeats after 2¹²⁸ words.
 
-use multiversion::multiversion;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use statrs::function::erf::erfc;
@@ -169,37 +168,38 @@ impl LevelNoise {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2", "x86_64+avx2+bmi1+bmi2"))]
-fn fill_levels(state: &mut [[u32; LANES]; 4], cells: &[u32; 256], out: &mut [u8]) {
-    let [mut s0, mut s1, mut s2, mut s3] = *state;
-    let mut chunks = out.chunks_exact_mut(LANES);
-    let mut words = [0u32; LANES];
-    let mut next = |words: &mut [u32; LANES]| {
-        for i in 0..LANES {
-            words[i] = s0[i].wrapping_add(s3[i]).rotate_left(7).wrapping_add(s0[i]);
-            let t = s1[i] << 9;
-            s2[i] ^= s0[i];
-            s3[i] ^= s1[i];
-            s1[i] ^= s2[i];
-            s0[i] ^= s3[i];
-            s2[i] ^= t;
-            s3[i] = s3[i].rotate_left(11);
+widest! {
+    fn fill_levels(state: &mut [[u32; LANES]; 4], cells: &[u32; 256], out: &mut [u8]) {
+        let [mut s0, mut s1, mut s2, mut s3] = *state;
+        let mut chunks = out.chunks_exact_mut(LANES);
+        let mut words = [0u32; LANES];
+        let mut next = |words: &mut [u32; LANES]| {
+            for i in 0..LANES {
+                words[i] = s0[i].wrapping_add(s3[i]).rotate_left(7).wrapping_add(s0[i]);
+                let t = s1[i] << 9;
+                s2[i] ^= s0[i];
+                s3[i] ^= s1[i];
+                s1[i] ^= s2[i];
+                s0[i] ^= s3[i];
+                s2[i] ^= t;
+                s3[i] = s3[i].rotate_left(11);
+            }
+        };
+        for chunk in &mut chunks {
+            next(&mut words);
+            for i in 0..LANES {
+                chunk[i] = pick(cells, words[i]);
+            }
         }
-    };
-    for chunk in &mut chunks {
-        next(&mut words);
-        for i in 0..LANES {
-            chunk[i] = pick(cells, words[i]);
+        let rest = chunks.into_remainder();
+        if !rest.is_empty() {
+            next(&mut words);
+            for (p, w) in rest.iter_mut().zip(words) {
+                *p = pick(cells, w);
+            }
         }
+        *state = [s0, s1, s2, s3];
     }
-    let rest = chunks.into_remainder();
-    if !rest.is_empty() {
-        next(&mut words);
-        for (p, w) in rest.iter_mut().zip(words) {
-            *p = pick(cells, w);
-        }
-    }
-    *state = [s0, s1, s2, s3];
 }
 
 /// The level that a random word stands for: the upper 8 bits name the cell, the lower 24 choose in it.

@@ -8,7 +8,6 @@
 //! Limits: costs must be finite.
 
 use crate::{Error, ErrorKind, Result};
-use multiversion::multiversion;
 
 /// No partner yet.
 const NONE: u32 = u32::MAX;
@@ -175,110 +174,114 @@ impl Dense {
     }
 }
 
-/// Lowers each column's least cost and names the row it comes from.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn least_by_column(row: &[f64], i: u64, v: &mut [f64], from: &mut [u64]) {
-    for ((c, v), from) in row.iter().zip(v.iter_mut()).zip(from.iter_mut()) {
-        let lower = *c < *v;
-        *v = if lower { *c } else { *v };
-        *from = if lower { i } else { *from };
+widest! {
+    /// Lowers each column's least cost and names the row it comes from.
+    fn least_by_column(row: &[f64], i: u64, v: &mut [f64], from: &mut [u64]) {
+        for ((c, v), from) in row.iter().zip(v.iter_mut()).zip(from.iter_mut()) {
+            let lower = *c < *v;
+            *v = if lower { *c } else { *v };
+            *from = if lower { i } else { *from };
+        }
     }
 }
 
-/// Least and second least of c − v with their places.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn two_least(row: &[f64], v: &[f64]) -> (f64, f64, u64, u64) {
-    let mut first = [f64::INFINITY; LANES];
-    let mut second = [f64::INFINITY; LANES];
-    let mut first_at = [0u64; LANES];
-    let mut second_at = [0u64; LANES];
-    let (row_blocks, row_rest) = row.as_chunks::<LANES>();
-    let (v_blocks, v_rest) = v.as_chunks::<LANES>();
-    for (block, (c, v)) in row_blocks.iter().zip(v_blocks).enumerate() {
+widest! {
+    /// Least and second least of c − v with their places.
+    fn two_least(row: &[f64], v: &[f64]) -> (f64, f64, u64, u64) {
+        let mut first = [f64::INFINITY; LANES];
+        let mut second = [f64::INFINITY; LANES];
+        let mut first_at = [0u64; LANES];
+        let mut second_at = [0u64; LANES];
+        let (row_blocks, row_rest) = row.as_chunks::<LANES>();
+        let (v_blocks, v_rest) = v.as_chunks::<LANES>();
+        for (block, (c, v)) in row_blocks.iter().zip(v_blocks).enumerate() {
+            for l in 0..LANES {
+                let d = c[l] - v[l];
+                let at = (block * LANES + l) as u64;
+                let is_first = d < first[l];
+                let is_second = d < second[l];
+                second_at[l] = if is_first {
+                    first_at[l]
+                } else if is_second {
+                    at
+                } else {
+                    second_at[l]
+                };
+                second[l] = if is_first {
+                    first[l]
+                } else if is_second {
+                    d
+                } else {
+                    second[l]
+                };
+                first_at[l] = if is_first { at } else { first_at[l] };
+                first[l] = if is_first { d } else { first[l] };
+            }
+        }
+        let mut out = (f64::INFINITY, f64::INFINITY, 0, 0);
+        let mut take = |d: f64, at: u64| {
+            if d < out.0 {
+                out = (d, out.0, at, out.2);
+            } else if d < out.1 {
+                out = (out.0, d, out.2, at);
+            }
+        };
         for l in 0..LANES {
-            let d = c[l] - v[l];
-            let at = (block * LANES + l) as u64;
-            let is_first = d < first[l];
-            let is_second = d < second[l];
-            second_at[l] = if is_first {
-                first_at[l]
-            } else if is_second {
-                at
-            } else {
-                second_at[l]
-            };
-            second[l] = if is_first {
-                first[l]
-            } else if is_second {
-                d
-            } else {
-                second[l]
-            };
-            first_at[l] = if is_first { at } else { first_at[l] };
-            first[l] = if is_first { d } else { first[l] };
+            take(first[l], first_at[l]);
+            take(second[l], second_at[l]);
         }
-    }
-    let mut out = (f64::INFINITY, f64::INFINITY, 0, 0);
-    let mut take = |d: f64, at: u64| {
-        if d < out.0 {
-            out = (d, out.0, at, out.2);
-        } else if d < out.1 {
-            out = (out.0, d, out.2, at);
+        for (k, (c, v)) in row_rest.iter().zip(v_rest).enumerate() {
+            take(c - v, (row.len() - row_rest.len() + k) as u64);
         }
-    };
-    for l in 0..LANES {
-        take(first[l], first_at[l]);
-        take(second[l], second_at[l]);
+        out
     }
-    for (k, (c, v)) in row_rest.iter().zip(v_rest).enumerate() {
-        take(c - v, (row.len() - row_rest.len() + k) as u64);
-    }
-    out
 }
 
-/// Relaxes all open columns from one row and returns the least distance among them.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn relax(row: &[f64], v: &[f64], shift: f64, i: u64, closed: &[f64], open: &mut [f64], from: &mut [u64]) -> f64 {
-    let mut least = [f64::INFINITY; LANES];
-    let (row, row_rest) = row.as_chunks::<LANES>();
-    let (v, v_rest) = v.as_chunks::<LANES>();
-    let (closed, closed_rest) = closed.as_chunks::<LANES>();
-    let (open, open_rest) = open.as_chunks_mut::<LANES>();
-    let (from, from_rest) = from.as_chunks_mut::<LANES>();
-    for ((((c, v), closed), open), from) in row.iter().zip(v).zip(closed).zip(open).zip(from) {
-        for l in 0..LANES {
-            let d = c[l] - v[l] - shift + closed[l];
-            let nearer = d < open[l];
-            open[l] = if nearer { d } else { open[l] };
-            from[l] = if nearer { i } else { from[l] };
-            least[l] = if open[l] < least[l] { open[l] } else { least[l] };
+widest! {
+    /// Relaxes all open columns from one row and returns the least distance among them.
+    fn relax(row: &[f64], v: &[f64], shift: f64, i: u64, closed: &[f64], open: &mut [f64], from: &mut [u64]) -> f64 {
+        let mut least = [f64::INFINITY; LANES];
+        let (row, row_rest) = row.as_chunks::<LANES>();
+        let (v, v_rest) = v.as_chunks::<LANES>();
+        let (closed, closed_rest) = closed.as_chunks::<LANES>();
+        let (open, open_rest) = open.as_chunks_mut::<LANES>();
+        let (from, from_rest) = from.as_chunks_mut::<LANES>();
+        for ((((c, v), closed), open), from) in row.iter().zip(v).zip(closed).zip(open).zip(from) {
+            for l in 0..LANES {
+                let d = c[l] - v[l] - shift + closed[l];
+                let nearer = d < open[l];
+                open[l] = if nearer { d } else { open[l] };
+                from[l] = if nearer { i } else { from[l] };
+                least[l] = if open[l] < least[l] { open[l] } else { least[l] };
+            }
         }
-    }
-    let mut out = least.iter().copied().fold(f64::INFINITY, f64::min);
-    let rest = row_rest.iter().zip(v_rest).zip(closed_rest).zip(open_rest).zip(from_rest);
-    for ((((c, v), closed), open), from) in rest {
-        let d = c - v - shift + closed;
-        if d < *open {
-            *open = d;
-            *from = i;
+        let mut out = least.iter().copied().fold(f64::INFINITY, f64::min);
+        let rest = row_rest.iter().zip(v_rest).zip(closed_rest).zip(open_rest).zip(from_rest);
+        for ((((c, v), closed), open), from) in rest {
+            let d = c - v - shift + closed;
+            if d < *open {
+                *open = d;
+                *from = i;
+            }
+            out = out.min(*open);
         }
-        out = out.min(*open);
+        out
     }
-    out
 }
 
-/// The first place that holds `value`.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn first_equal(values: &[f64], value: f64) -> usize {
-    let (blocks, _) = values.as_chunks::<32>();
-    let mut at = 0;
-    for block in blocks {
-        if block.iter().fold(false, |any, v| any | (*v == value)) {
-            break;
+widest! {
+    /// The first place that holds `value`.
+    fn first_equal(values: &[f64], value: f64) -> usize {
+        let (blocks, _) = values.as_chunks::<32>();
+        let mut at = 0;
+        for block in blocks {
+            if block.iter().fold(false, |any, v| any | (*v == value)) {
+                break;
+            }
+            at += 32;
         }
-        at += 32;
+        at + values[at..].iter().position(|v| *v == value).unwrap_or(0)
     }
-    at + values[at..].iter().position(|v| *v == value).unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ use super::{GRID_PX, pack, size_changed};
 use crate::vision::spatial::SpatialPixel;
 use crate::{Error, ErrorKind, Image, Result};
 use fearless_simd::{Level, dispatch};
-use multiversion::multiversion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -143,13 +142,14 @@ fn threshold<T: SpatialPixel>(c: &DifferenceConfig, a: &Image<T>, b: &Image<T>, 
     Ok((c.threshold_sd * noise).max(c.min_difference))
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn changed<T: SpatialPixel>(now: &[T], last: &[T], other: &[T], threshold: f32, states: &mut [u8]) {
-    let n = states.len();
-    let (now, last, other) = (&now[..n], &last[..n], &other[..n]);
-    for x in 0..n {
-        let v = now[x].to_f32();
-        states[x] = u8::from(((v - last[x].to_f32()).abs() > threshold) & ((v - other[x].to_f32()).abs() > threshold));
+widest! {
+    fn changed<T: SpatialPixel>(now: &[T], last: &[T], other: &[T], threshold: f32, states: &mut [u8]) {
+        let n = states.len();
+        let (now, last, other) = (&now[..n], &last[..n], &other[..n]);
+        for x in 0..n {
+            let v = now[x].to_f32();
+            states[x] = u8::from(((v - last[x].to_f32()).abs() > threshold) & ((v - other[x].to_f32()).abs() > threshold));
+        }
     }
 }
 

@@ -2,40 +2,41 @@
 
 use super::BackgroundPixel;
 use fearless_simd::{Simd, SimdBase, SimdMask};
-use multiversion::multiversion;
 
-/// Writes 1 for each pixel that moves and 0 for the rest, also past the width.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-pub(super) fn judge<T: BackgroundPixel>(
-    row: &[T],
-    mean: &[T::Level],
-    deviation: &[T::Level],
-    terms: &T::Terms,
-    states: &mut [u8],
-) {
-    let n = row.len();
-    let (mean, deviation) = (&mean[..n], &deviation[..n]);
-    let (inside, outside) = states.split_at_mut(n);
-    for x in 0..n {
-        inside[x] = u8::from(row[x].moves(mean[x], deviation[x], terms));
+widest! {
+    /// Writes 1 for each pixel that moves and 0 for the rest, also past the width.
+    pub(super) fn judge<T: BackgroundPixel>(
+        row: &[T],
+        mean: &[T::Level],
+        deviation: &[T::Level],
+        terms: &T::Terms,
+        states: &mut [u8],
+    ) {
+        let n = row.len();
+        let (mean, deviation) = (&mean[..n], &deviation[..n]);
+        let (inside, outside) = states.split_at_mut(n);
+        for x in 0..n {
+            inside[x] = u8::from(row[x].moves(mean[x], deviation[x], terms));
+        }
+        outside.fill(0);
     }
-    outside.fill(0);
 }
 
-/// Lets mean and deviation of each pixel follow the row.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-pub(super) fn adapt<T: BackgroundPixel>(
-    row: &[T],
-    states: &[u8],
-    terms: &T::Terms,
-    steps: &T::Steps,
-    mean: &mut [T::Level],
-    deviation: &mut [T::Level],
-) {
-    let n = row.len();
-    let (states, mean, deviation) = (&states[..n], &mut mean[..n], &mut deviation[..n]);
-    for x in 0..n {
-        (mean[x], deviation[x]) = row[x].adapt(mean[x], deviation[x], states[x], terms, steps);
+widest! {
+    /// Lets mean and deviation of each pixel follow the row.
+    pub(super) fn adapt<T: BackgroundPixel>(
+        row: &[T],
+        states: &[u8],
+        terms: &T::Terms,
+        steps: &T::Steps,
+        mean: &mut [T::Level],
+        deviation: &mut [T::Level],
+    ) {
+        let n = row.len();
+        let (states, mean, deviation) = (&states[..n], &mut mean[..n], &mut deviation[..n]);
+        for x in 0..n {
+            (mean[x], deviation[x]) = row[x].adapt(mean[x], deviation[x], states[x], terms, steps);
+        }
     }
 }
 

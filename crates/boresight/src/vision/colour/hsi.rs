@@ -5,7 +5,6 @@
 //! D² = (dH / 180)² + (dS / 2)², dH circular; intensity is left out.
 
 use crate::Image;
-use multiversion::multiversion;
 
 /// Grey of a colour: (9798 R + 19235 G + 3735 B + 16384) >> 15.
 ///
@@ -27,10 +26,11 @@ pub fn grey_image(colour: &Image<[u8; 3]>, out: &mut Image<u8>) {
     grey_pixels(colour.as_slice(), out.as_mut_slice());
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn grey_pixels(colour: &[[u8; 3]], out: &mut [u8]) {
-    for (o, &p) in out.iter_mut().zip(colour) {
-        *o = grey(p);
+widest! {
+    fn grey_pixels(colour: &[[u8; 3]], out: &mut [u8]) {
+        for (o, &p) in out.iter_mut().zip(colour) {
+            *o = grey(p);
+        }
     }
 }
 

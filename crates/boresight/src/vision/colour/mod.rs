@@ -15,7 +15,6 @@ pub use reference::{Reference, choose_reference};
 use crate::Result;
 use crate::vision::background::{CleanUp, pack};
 use fearless_simd::{Level, dispatch};
-use multiversion::multiversion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -139,12 +138,13 @@ impl ColourMatch {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512vbmi", "x86_64+avx2", "x86_64+sse4.2"))]
-fn split(row: &[[u8; 3]], r: &mut [u8], g: &mut [u8], b: &mut [u8]) {
-    let n = row.len();
-    let (r, g, b) = (&mut r[..n], &mut g[..n], &mut b[..n]);
-    for x in 0..n {
-        [r[x], g[x], b[x]] = row[x];
+widest! {
+    fn split(row: &[[u8; 3]], r: &mut [u8], g: &mut [u8], b: &mut [u8]) {
+        let n = row.len();
+        let (r, g, b) = (&mut r[..n], &mut g[..n], &mut b[..n]);
+        for x in 0..n {
+            [r[x], g[x], b[x]] = row[x];
+        }
     }
 }
 
@@ -156,39 +156,40 @@ fn cos_of_root(q: f32) -> f32 {
     C[0] + q * (C[1] + q * (C[2] + q * (C[3] + q * (C[4] + q * (C[5] + q * C[6])))))
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn compare(r: &[u8], g: &[u8], b: &[u8], t: &Terms, states: &mut [u8]) {
-    /// Far above the error of single precision here, far below what a step of a pixel makes, mostly.
-    const NEAR: f32 = 2e-5;
-    let n = states.len();
-    let (r, g, b) = (&r[..n], &g[..n], &b[..n]);
-    for x in 0..n {
-        let (red, green, blue) = (f32::from(r[x]), f32::from(g[x]), f32::from(b[x]));
-        let least = f32::from(r[x].min(g[x]).min(b[x]));
-        let sum = red + green + blue;
-        let saturation = 1.0 - 3.0 * least / sum.max(1.0);
-        // Twice the colour's vector in the plane of hues: (u, sqrt(3) v); its length and its part along the reference.
-        let (u, v) = (2.0 * red - green - blue, green - blue);
-        let length2 = u * u + 3.0 * v * v;
-        let along = u * t.along + v * t.across;
-        let off = 0.5 * (saturation - t.saturation);
-        let q = t.max_distance2 - off * off;
-        let cos = cos_of_root(q.max(0.0));
-        // Squares with their sign, so that an angle above 90 degrees is not taken for one below.
-        let margin = along * along.abs() - cos * cos * length2;
-        let near = NEAR * length2;
-        let grey = length2 == 0.0;
-        let maybe = (margin >= -near) & (q >= -NEAR) & (saturation >= t.min_saturation - NEAR) | grey;
-        let sure = (margin > near) & (q > NEAR) & (saturation > t.min_saturation + NEAR) & !grey;
-        // Greys match only where the limit of saturation lets them.
-        let maybe = maybe & (!grey | (t.min_saturation <= NEAR));
-        states[x] = if sure {
-            YES
-        } else if maybe {
-            UNSURE
-        } else {
-            NO
-        };
+widest! {
+    fn compare(r: &[u8], g: &[u8], b: &[u8], t: &Terms, states: &mut [u8]) {
+        /// Far above the error of single precision here, far below what a step of a pixel makes, mostly.
+        const NEAR: f32 = 2e-5;
+        let n = states.len();
+        let (r, g, b) = (&r[..n], &g[..n], &b[..n]);
+        for x in 0..n {
+            let (red, green, blue) = (f32::from(r[x]), f32::from(g[x]), f32::from(b[x]));
+            let least = f32::from(r[x].min(g[x]).min(b[x]));
+            let sum = red + green + blue;
+            let saturation = 1.0 - 3.0 * least / sum.max(1.0);
+            // Twice the colour's vector in the plane of hues: (u, sqrt(3) v); its length and its part along the reference.
+            let (u, v) = (2.0 * red - green - blue, green - blue);
+            let length2 = u * u + 3.0 * v * v;
+            let along = u * t.along + v * t.across;
+            let off = 0.5 * (saturation - t.saturation);
+            let q = t.max_distance2 - off * off;
+            let cos = cos_of_root(q.max(0.0));
+            // Squares with their sign, so that an angle above 90 degrees is not taken for one below.
+            let margin = along * along.abs() - cos * cos * length2;
+            let near = NEAR * length2;
+            let grey = length2 == 0.0;
+            let maybe = (margin >= -near) & (q >= -NEAR) & (saturation >= t.min_saturation - NEAR) | grey;
+            let sure = (margin > near) & (q > NEAR) & (saturation > t.min_saturation + NEAR) & !grey;
+            // Greys match only where the limit of saturation lets them.
+            let maybe = maybe & (!grey | (t.min_saturation <= NEAR));
+            states[x] = if sure {
+                YES
+            } else if maybe {
+                UNSURE
+            } else {
+                NO
+            };
+        }
     }
 }
 

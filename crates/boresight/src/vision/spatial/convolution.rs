@@ -8,7 +8,6 @@ use super::border::{Border, RowRing};
 use super::check_size;
 use super::pixel::SpatialPixel;
 use crate::{Error, ErrorKind, Image, Result};
-use multiversion::multiversion;
 
 /// A square kernel, rows from the top; the middle weight belongs to the pixel itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,9 +84,10 @@ pub(super) fn each_row<T: SpatialPixel>(
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn add_scaled(row: &[f64], h: f64, sum: &mut [f64]) {
-    for (s, &v) in sum.iter_mut().zip(row) {
-        *s += h * v;
+widest! {
+    fn add_scaled(row: &[f64], h: f64, sum: &mut [f64]) {
+        for (s, &v) in sum.iter_mut().zip(row) {
+            *s += h * v;
+        }
     }
 }

@@ -8,7 +8,6 @@
 use super::border::{Border, RowRing};
 use super::pixel::SpatialPixel;
 use crate::Image;
-use multiversion::multiversion;
 
 /// Radius of the kernel, px.
 pub(super) fn radius_px(sigma_px: f64) -> usize {
@@ -63,23 +62,26 @@ impl Gaussian {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn scale(from: &[f32], h: f32, to: &mut [f32]) {
-    for (t, &f) in to.iter_mut().zip(from) {
-        *t = f * h;
+widest! {
+    fn scale(from: &[f32], h: f32, to: &mut [f32]) {
+        for (t, &f) in to.iter_mut().zip(from) {
+            *t = f * h;
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn add_pair(a: &[f32], b: &[f32], h: f32, to: &mut [f32]) {
-    for ((t, &a), &b) in to.iter_mut().zip(a).zip(b) {
-        *t += (a + b) * h;
+widest! {
+    fn add_pair(a: &[f32], b: &[f32], h: f32, to: &mut [f32]) {
+        for ((t, &a), &b) in to.iter_mut().zip(a).zip(b) {
+            *t += (a + b) * h;
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn round<T: SpatialPixel>(from: &[f32], to: &mut [T]) {
-    for (t, &f) in to.iter_mut().zip(from) {
-        *t = T::from_f32(f);
+widest! {
+    fn round<T: SpatialPixel>(from: &[f32], to: &mut [T]) {
+        for (t, &f) in to.iter_mut().zip(from) {
+            *t = T::from_f32(f);
+        }
     }
 }

@@ -10,7 +10,6 @@
 use super::border::Border;
 use super::pixel::SpatialPixel;
 use crate::Image;
-use multiversion::multiversion;
 
 /// Column sums, padded, and room for the sums of neighbours.
 #[derive(Clone, Debug, Default)]
@@ -94,10 +93,11 @@ pub(super) fn row<T: SpatialPixel>(src: &Image<T>, y: usize, n: usize, border: B
 
 macro_rules! accumulate {
     ($name:ident, $v:ty, $get:ident, $op:ident) => {
-        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-        fn $name<T: SpatialPixel>(row: &[T], columns: &mut [$v]) {
-            for (c, &v) in columns.iter_mut().zip(row) {
-                *c = c.$op(v.$get() as $v);
+        widest! {
+            fn $name<T: SpatialPixel>(row: &[T], columns: &mut [$v]) {
+                for (c, &v) in columns.iter_mut().zip(row) {
+                    *c = c.$op(v.$get() as $v);
+                }
             }
         }
     };
@@ -107,17 +107,19 @@ accumulate!(sub_u16, u16, to_u32, wrapping_sub);
 accumulate!(add_u32, u32, to_u32, wrapping_add);
 accumulate!(sub_u32, u32, to_u32, wrapping_sub);
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn exchange_u16<T: SpatialPixel>(new: &[T], old: &[T], columns: &mut [u16]) {
-    for ((c, &new), &old) in columns.iter_mut().zip(new).zip(old) {
-        *c = c.wrapping_add(new.to_u32() as u16).wrapping_sub(old.to_u32() as u16);
+widest! {
+    fn exchange_u16<T: SpatialPixel>(new: &[T], old: &[T], columns: &mut [u16]) {
+        for ((c, &new), &old) in columns.iter_mut().zip(new).zip(old) {
+            *c = c.wrapping_add(new.to_u32() as u16).wrapping_sub(old.to_u32() as u16);
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn add_f64<T: SpatialPixel>(row: &[T], columns: &mut [f64]) {
-    for (c, &v) in columns.iter_mut().zip(row) {
-        *c += v.to_f64();
+widest! {
+    fn add_f64<T: SpatialPixel>(row: &[T], columns: &mut [f64]) {
+        for (c, &v) in columns.iter_mut().zip(row) {
+            *c += v.to_f64();
+        }
     }
 }
 
@@ -133,8 +135,12 @@ fn divide(sum: u16, half: u16, (k, t): (u16, u32)) -> u16 {
     ((u32::from(sum.wrapping_add(half)) * u32::from(k)) >> 16) as u16 >> t
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
 fn mean_u16<const N: usize, T: SpatialPixel>(columns: &[u16], out: &mut [T]) {
+    fearless_simd::dispatch!(fearless_simd::Level::new(), _simd => mean_u16_each_width::<N, T>(columns, out));
+}
+
+#[inline(always)]
+fn mean_u16_each_width<const N: usize, T: SpatialPixel>(columns: &[u16], out: &mut [T]) {
     let (half, k) = ((N * N / 2) as u16, reciprocal(N * N));
     let w = out.len();
     let shifted: [&[u16]; N] = std::array::from_fn(|i| &columns[i..i + w]);
@@ -147,36 +153,40 @@ fn mean_u16<const N: usize, T: SpatialPixel>(columns: &[u16], out: &mut [T]) {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn divide_u16<T: SpatialPixel>(sum: &[u16], area: usize, out: &mut [T]) {
-    let (half, k) = ((area / 2) as u16, reciprocal(area));
-    for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_u16_exact(divide(s, half, k));
+widest! {
+    fn divide_u16<T: SpatialPixel>(sum: &[u16], area: usize, out: &mut [T]) {
+        let (half, k) = ((area / 2) as u16, reciprocal(area));
+        for (o, &s) in out.iter_mut().zip(sum) {
+            *o = T::from_u16_exact(divide(s, half, k));
+        }
     }
 }
 
-/// Sums of 8-bit pixels over 17x17 to 255x255: below 2²⁴, and 2⁴⁰ / area below 2³².
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn divide_u24<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
-    let (half, k) = (area as u32 / 2, ((1u64 << 40) / area as u64 + 1) as u32);
-    for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_u16_exact(((u64::from(s + half) * u64::from(k)) >> 40) as u16);
+widest! {
+    /// Sums of 8-bit pixels over 17x17 to 255x255: below 2²⁴, and 2⁴⁰ / area below 2³².
+    fn divide_u24<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
+        let (half, k) = (area as u32 / 2, ((1u64 << 40) / area as u64 + 1) as u32);
+        for (o, &s) in out.iter_mut().zip(sum) {
+            *o = T::from_u16_exact(((u64::from(s + half) * u64::from(k)) >> 40) as u16);
+        }
     }
 }
 
-/// Sums of 16-bit pixels up to 255x255: below 2³²; the product stays below 2⁶⁴ since sum / area <= 2¹⁶ - 1.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2", "x86_64+sse4.2"))]
-fn divide_u32<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
-    let (half, k) = (area as u64 / 2, (1u64 << 48) / area as u64 + 1);
-    for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_u16_exact(((u64::from(s) + half).wrapping_mul(k) >> 48) as u16);
+widest! {
+    /// Sums of 16-bit pixels up to 255x255: below 2³²; the product stays below 2⁶⁴ since sum / area <= 2¹⁶ - 1.
+    fn divide_u32<T: SpatialPixel>(sum: &[u32], area: usize, out: &mut [T]) {
+        let (half, k) = (area as u64 / 2, (1u64 << 48) / area as u64 + 1);
+        for (o, &s) in out.iter_mut().zip(sum) {
+            *o = T::from_u16_exact(((u64::from(s) + half).wrapping_mul(k) >> 48) as u16);
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-fn divide_f64<T: SpatialPixel>(sum: &[f64], area: f64, out: &mut [T]) {
-    for (o, &s) in out.iter_mut().zip(sum) {
-        *o = T::from_f64(s / area);
+widest! {
+    fn divide_f64<T: SpatialPixel>(sum: &[f64], area: f64, out: &mut [T]) {
+        for (o, &s) in out.iter_mut().zip(sum) {
+            *o = T::from_f64(s / area);
+        }
     }
 }
 
@@ -194,19 +204,21 @@ fn running_u32(n: usize, columns: &[u32], sum: &mut [u32]) {
 
 macro_rules! neighbours {
     ($name:ident, $step:ident, $add:ident, $v:ty, $op:ident) => {
-        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-        fn $step(from: &[$v], shift: usize, to: &mut [$v]) {
-            let n = from.len() - shift;
-            let (a, b, to) = (&from[..n], &from[shift..], &mut to[..n]);
-            for i in 0..n {
-                to[i] = a[i].$op(b[i]);
+        widest! {
+            fn $step(from: &[$v], shift: usize, to: &mut [$v]) {
+                let n = from.len() - shift;
+                let (a, b, to) = (&from[..n], &from[shift..], &mut to[..n]);
+                for i in 0..n {
+                    to[i] = a[i].$op(b[i]);
+                }
             }
         }
 
-        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-        fn $add(part: &[$v], sum: &mut [$v]) {
-            for (s, &p) in sum.iter_mut().zip(part) {
-                *s = s.$op(p);
+        widest! {
+            fn $add(part: &[$v], sum: &mut [$v]) {
+                for (s, &p) in sum.iter_mut().zip(part) {
+                    *s = s.$op(p);
+                }
             }
         }
 

@@ -6,7 +6,6 @@
 //! where the median lies. Limits: n <= 255, so that a column's count fits 8 bits and the window's 16.
 
 use super::pixel::Key;
-use multiversion::multiversion;
 
 /// Histograms of all padded columns.
 #[derive(Clone, Debug, Default)]
@@ -56,38 +55,39 @@ impl Histograms {
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.2"))]
-fn medians<K: Key>(columns: &[[u8; 16]], fine_columns: &[[u8; 16]], n: usize, out: &mut [K]) {
-    let stride = columns.len();
-    let half = (n * n / 2) as u16;
-    let mut coarse = [0u16; 16];
-    let mut fine = [[0u16; 16]; 16];
-    // fine[c] covers the columns ahead[c] - n .. ahead[c].
-    let mut ahead = [0usize; 16];
-    for column in &columns[..n - 1] {
-        add(&mut coarse, column);
-    }
-    for (x, o) in out.iter_mut().enumerate() {
-        add(&mut coarse, &columns[x + n - 1]);
-        let (c, before) = bin(&coarse, half);
-        let part = &fine_columns[c * stride..(c + 1) * stride];
-        let (sum, done) = (&mut fine[c], &mut ahead[c]);
-        if *done <= x {
-            // Nothing of the old window is left.
-            *sum = [0; 16];
-            *done = x;
-        } else {
-            for column in &part[*done - n.min(*done)..x] {
-                subtract(sum, column);
+widest! {
+    fn medians<K: Key>(columns: &[[u8; 16]], fine_columns: &[[u8; 16]], n: usize, out: &mut [K]) {
+        let stride = columns.len();
+        let half = (n * n / 2) as u16;
+        let mut coarse = [0u16; 16];
+        let mut fine = [[0u16; 16]; 16];
+        // fine[c] covers the columns ahead[c] - n .. ahead[c].
+        let mut ahead = [0usize; 16];
+        for column in &columns[..n - 1] {
+            add(&mut coarse, column);
+        }
+        for (x, o) in out.iter_mut().enumerate() {
+            add(&mut coarse, &columns[x + n - 1]);
+            let (c, before) = bin(&coarse, half);
+            let part = &fine_columns[c * stride..(c + 1) * stride];
+            let (sum, done) = (&mut fine[c], &mut ahead[c]);
+            if *done <= x {
+                // Nothing of the old window is left.
+                *sum = [0; 16];
+                *done = x;
+            } else {
+                for column in &part[*done - n.min(*done)..x] {
+                    subtract(sum, column);
+                }
             }
+            for column in &part[*done..x + n] {
+                add(sum, column);
+            }
+            *done = x + n;
+            let (f, _) = bin(sum, half - before);
+            *o = K::from_level(c * 16 + f);
+            subtract(&mut coarse, &columns[x]);
         }
-        for column in &part[*done..x + n] {
-            add(sum, column);
-        }
-        *done = x + n;
-        let (f, _) = bin(sum, half - before);
-        *o = K::from_level(c * 16 + f);
-        subtract(&mut coarse, &columns[x]);
     }
 }
 

@@ -5,7 +5,6 @@
 //! integer: -NaN < -inf < ... < -0 < +0 < ... < +inf < +NaN.
 
 use fearless_simd::{Simd, SimdInt, SimdIntElement};
-use multiversion::multiversion;
 
 /// Integers that the median sorts.
 pub trait Key: SimdIntElement + Ord + Default + std::fmt::Debug + Send + Sync + 'static {
@@ -136,10 +135,11 @@ fn ordered(v: f32) -> u32 {
     bits ^ (((bits as i32) >> 31) as u32 | 0x8000_0000)
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.2"))]
-fn ordered_row(row: &[f32], out: &mut [u32]) {
-    for (o, &v) in out.iter_mut().zip(row) {
-        *o = ordered(v);
+widest! {
+    fn ordered_row(row: &[f32], out: &mut [u32]) {
+        for (o, &v) in out.iter_mut().zip(row) {
+            *o = ordered(v);
+        }
     }
 }
 

@@ -5,7 +5,6 @@
 use crate::vision::background::pack;
 use crate::vision::pixel::Pixel;
 use fearless_simd::{Simd, SimdBase, SimdMask};
-use multiversion::multiversion;
 
 /// Number of words for a row of `width` bits.
 pub fn words(width: usize) -> usize {
@@ -65,17 +64,18 @@ pub fn level_bits<T: Pixel>(row: &[T], level: &[f32], above: bool, states: &mut 
 
 macro_rules! level_states {
     ($name:ident, $t:ty) => {
-        #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.2"))]
-        pub(crate) fn $name(row: &[$t], level: &[f32], above: bool, states: &mut [u8]) {
-            let n = row.len().min(level.len()).min(states.len());
-            let (row, level, states) = (&row[..n], &level[..n], &mut states[..n]);
-            if above {
-                for x in 0..n {
-                    states[x] = u8::from(f32::from(row[x]) >= level[x]);
-                }
-            } else {
-                for x in 0..n {
-                    states[x] = u8::from(f32::from(row[x]) <= level[x]);
+        widest! {
+            pub(crate) fn $name(row: &[$t], level: &[f32], above: bool, states: &mut [u8]) {
+                let n = row.len().min(level.len()).min(states.len());
+                let (row, level, states) = (&row[..n], &level[..n], &mut states[..n]);
+                if above {
+                    for x in 0..n {
+                        states[x] = u8::from(f32::from(row[x]) >= level[x]);
+                    }
+                } else {
+                    for x in 0..n {
+                        states[x] = u8::from(f32::from(row[x]) <= level[x]);
+                    }
                 }
             }
         }

@@ -55,33 +55,35 @@ impl I420 {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+fma", "x86_64+sse4.2"))]
-fn luma_row(rgb: &[[u8; 3]], out: &mut [u8]) {
-    for (o, &p) in out.iter_mut().zip(rgb) {
-        *o = luma(p);
-    }
-    if let (Some(&last), Some(pad)) = (rgb.last(), out.get_mut(rgb.len())) {
-        *pad = luma(last);
+widest! {
+    fn luma_row(rgb: &[[u8; 3]], out: &mut [u8]) {
+        for (o, &p) in out.iter_mut().zip(rgb) {
+            *o = luma(p);
+        }
+        if let (Some(&last), Some(pad)) = (rgb.last(), out.get_mut(rgb.len())) {
+            *pad = luma(last);
+        }
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+fma", "x86_64+sse4.2"))]
-fn chroma_row(top: &[[u8; 3]], bottom: &[[u8; 3]], u: &mut [u8], v: &mut [u8]) {
-    let sum = |a: [u8; 3], b: [u8; 3], c: [u8; 3], d: [u8; 3]| {
-        let one = |i: usize| i32::from(a[i]) + i32::from(b[i]) + i32::from(c[i]) + i32::from(d[i]);
-        [one(0), one(1), one(2)]
-    };
-    let (t, t_rest) = top.as_chunks::<2>();
-    let (b, b_rest) = bottom.as_chunks::<2>();
-    for (((u, v), t), b) in u.iter_mut().zip(v.iter_mut()).zip(t).zip(b) {
-        let s = sum(t[0], t[1], b[0], b[1]);
-        *u = chroma(U, s);
-        *v = chroma(V, s);
-    }
-    if let (&[t], &[b], Some(u), Some(v)) = (t_rest, b_rest, u.last_mut(), v.last_mut()) {
-        let s = sum(t, t, b, b);
-        *u = chroma(U, s);
-        *v = chroma(V, s);
+widest! {
+    fn chroma_row(top: &[[u8; 3]], bottom: &[[u8; 3]], u: &mut [u8], v: &mut [u8]) {
+        let sum = |a: [u8; 3], b: [u8; 3], c: [u8; 3], d: [u8; 3]| {
+            let one = |i: usize| i32::from(a[i]) + i32::from(b[i]) + i32::from(c[i]) + i32::from(d[i]);
+            [one(0), one(1), one(2)]
+        };
+        let (t, t_rest) = top.as_chunks::<2>();
+        let (b, b_rest) = bottom.as_chunks::<2>();
+        for (((u, v), t), b) in u.iter_mut().zip(v.iter_mut()).zip(t).zip(b) {
+            let s = sum(t[0], t[1], b[0], b[1]);
+            *u = chroma(U, s);
+            *v = chroma(V, s);
+        }
+        if let (&[t], &[b], Some(u), Some(v)) = (t_rest, b_rest, u.last_mut(), v.last_mut()) {
+            let s = sum(t, t, b, b);
+            *u = chroma(U, s);
+            *v = chroma(V, s);
+        }
     }
 }
 
