@@ -1,7 +1,7 @@
 //! Scale: scans per CPU second of the tracker itself from 10 to 100 000 targets, with memory, GOSPA, IDF1 and links.
 //!
 //! Time is CPU time of the process, so that other work on the machine does not count; memory is the growth of the
-//! resident memory over the tracker's life, scans not included.
+//! resident memory over the tracker's lifetime, scans not included.
 //! Scene: that of W4 of the peers' bench (its own random numbers): speeds N(0, 1.5²) px/scan per axis, acceleration 0.1, a
 //! fifth born and a fifth ended on the way, P_D 0.9, noise 1 px, clutter of 10 % or 100 % of N, 100 scans, side 60 √N px.
 
@@ -10,7 +10,10 @@ use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
 use boresight::metrics::overlap::Similarity;
 use boresight::metrics::set::{SetDistance, SetOptions};
 use boresight::metrics::{MatchOptions, mot_scores};
-use boresight::track::{self, BirthConfig, ExistenceConfig, LifeConfig, TrackerConfig, TwoPointConfig};
+use boresight::track::{
+    self, ConfirmationConfig, ExistenceConfig, InitiationConfig, MergedMeasurementsConfig, TrackerConfig,
+    TwoPointConfig,
+};
 use boresight::{Detection, Extent, FrameIndex, PixelOrigin, Scan, Timestamp, TrackRow, TrackStatus, TrackTable};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
@@ -107,17 +110,17 @@ pub fn tracker_config(clutter_density: f64, associator: AssociatorConfig) -> Tra
         detection_probability: 0.9,
         clutter_density_per_px2: clutter_density,
         associator,
-        birth: BirthConfig::TwoPoint(TwoPointConfig { velocity_std_px_per_s: Some(2.0) }),
-        life: LifeConfig::Existence(ExistenceConfig {
-            birth_density_per_px2: 1e-6,
+        initiation: InitiationConfig::TwoPoint(TwoPointConfig { velocity_std_px_per_s: Some(2.0) }),
+        confirmation: ConfirmationConfig::Existence(ExistenceConfig {
+            new_target_density_per_px2: 1e-6,
             confirm_probability: 0.5,
-            doubt_probability: 0.5,
+            demotion_probability: 0.5,
             delete_probability: 0.001,
-            mean_life_s: 200.0,
+            mean_target_lifetime_s: 200.0,
         }),
         coast_s: 6.0,
         coast_scans: 1,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     }
 }

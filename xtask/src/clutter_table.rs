@@ -6,7 +6,9 @@
 
 use anyhow::Result;
 use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
-use boresight::track::{self, ExistenceConfig, LifeConfig, MOfNConfig, MhtConfig, TrackerConfig};
+use boresight::track::{
+    self, ConfirmationConfig, ExistenceConfig, MOfNConfig, MergedMeasurementsConfig, MhtConfig, TrackerConfig,
+};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackState};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
@@ -82,27 +84,27 @@ fn methods(p_d: f64, lambda: f64) -> Vec<TrackerConfig> {
         // One target, followed to the end: no other starts, no giving up.
         max_tracks: 1,
         coast_s: 1e6,
-        sharing: None,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 2, scans: 2, ..MOfNConfig::default() }),
+        merged_measurements: MergedMeasurementsConfig::off(),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 2, scans: 2, ..MOfNConfig::default() }),
         ..TrackerConfig::default()
     };
     let with = |associator| TrackerConfig { associator, ..base.clone() };
     let jpda = AssociatorConfig::Jpda(JpdaConfig::default());
-    let exists = LifeConfig::Existence(ExistenceConfig {
-        birth_density_per_px2: 100.0 * lambda,
+    let exists = ConfirmationConfig::Existence(ExistenceConfig {
+        new_target_density_per_px2: 100.0 * lambda,
         confirm_probability: 0.5,
-        doubt_probability: 1e-9,
+        demotion_probability: 1e-9,
         delete_probability: 1e-10,
-        mean_life_s: 1000.0,
+        mean_target_lifetime_s: 1000.0,
     });
     // The target is known to exist, as it is for the others: a first score that no miss uses up.
     let certain =
-        MhtConfig { n_scan: 7, max_leaves: 100, birth_density_per_px2: lambda * 1e40, ..MhtConfig::default() };
+        MhtConfig { n_scan: 7, max_leaves: 100, new_target_density_per_px2: lambda * 1e40, ..MhtConfig::default() };
     vec![
         with(AssociatorConfig::Nearest(Default::default())),
         with(AssociatorConfig::Pda(Default::default())),
         with(jpda.clone()),
-        TrackerConfig { life: exists, ..with(AssociatorConfig::Pda(Default::default())) },
+        TrackerConfig { confirmation: exists, ..with(AssociatorConfig::Pda(Default::default())) },
         TrackerConfig { mht: Some(certain), ..base },
     ]
 }

@@ -8,7 +8,9 @@
 use anyhow::Result;
 use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
 use boresight::sim::{Seed, named::named};
-use boresight::track::{self, ExistenceConfig, LifeConfig, MOfNConfig, MhtConfig, SharingConfig, TrackerConfig};
+use boresight::track::{
+    self, ConfirmationConfig, ExistenceConfig, MOfNConfig, MergedMeasurementsConfig, MhtConfig, TrackerConfig,
+};
 use boresight::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::vision::{self, DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
 use boresight::{FrameSource, Scan, TrackStatus};
@@ -55,33 +57,36 @@ fn methods() -> Vec<(&'static str, TrackerConfig)> {
         extra_noise_px: 0.5f64.sqrt(),
         max_speed_px_per_s: 2.0,
         gate_within_max_speed: false,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() }),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() }),
         coast_s: 5.0,
         coast_scans: 5,
         clutter_density_per_px2: 1e-4,
         detection_probability: 0.95,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     };
     let with = |associator| TrackerConfig { associator, ..base.clone() };
-    let longest_s = 15.0;
-    let sharing = Some(SharingConfig { longest_s, ..SharingConfig::default() });
-    let exists = LifeConfig::Existence(ExistenceConfig {
-        mean_life_s: 100.0,
+    let max_secondary_s = 15.0;
+    let merged_measurements = MergedMeasurementsConfig { max_secondary_s, ..MergedMeasurementsConfig::default() };
+    let exists = ConfirmationConfig::Existence(ExistenceConfig {
+        mean_target_lifetime_s: 100.0,
         confirm_probability: 0.9,
         ..ExistenceConfig::default()
     });
-    let at_once = LifeConfig::MOfN(MOfNConfig { hits: 2, scans: 2, ..MOfNConfig::default() });
+    let at_once = ConfirmationConfig::MOfN(MOfNConfig { hits: 2, scans: 2, ..MOfNConfig::default() });
     vec![
         ("nearest", with(AssociatorConfig::Nearest(Default::default()))),
         ("global nearest", base.clone()),
         ("PDA", with(AssociatorConfig::Pda(Default::default()))),
         ("JPDA*", with(AssociatorConfig::Jpda(JpdaConfig::default()))),
-        ("JIPDA", TrackerConfig { life: exists, ..with(AssociatorConfig::Jpda(JpdaConfig::default())) }),
+        ("JIPDA", TrackerConfig { confirmation: exists, ..with(AssociatorConfig::Jpda(JpdaConfig::default())) }),
         ("MHT", TrackerConfig { mht: Some(MhtConfig::default()), ..base.clone() }),
-        ("shared blobs", TrackerConfig { sharing: sharing.clone(), ..base.clone() }),
-        // Clusters of the wrong size are gone before: two points are proof enough, if the second may be 3 px off.
-        ("shared blobs, 2 of 2", TrackerConfig { sharing, max_speed_px_per_s: 3.0, life: at_once, ..base }),
+        ("shared blobs", TrackerConfig { merged_measurements: merged_measurements.clone(), ..base.clone() }),
+        // Clusters of the wrong size are gone before: two points are enough, if the second may be 3 px off.
+        (
+            "shared blobs, 2 of 2",
+            TrackerConfig { merged_measurements, max_speed_px_per_s: 3.0, confirmation: at_once, ..base },
+        ),
     ]
 }
 

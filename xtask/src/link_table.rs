@@ -7,7 +7,8 @@
 use anyhow::{Context, Result};
 use boresight::track::filter::model::RandomWalkConfig;
 use boresight::track::{
-    self, BirthConfig, FilterConfig, LifeConfig, MOfNConfig, ModelConfig, OnePointConfig, TrackerConfig,
+    self, ConfirmationConfig, FilterConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, ModelConfig,
+    OnePointConfig, TrackerConfig,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};
 use nalgebra::{Matrix2, Vector2};
@@ -50,12 +51,12 @@ fn linker(diffusion_px2_per_s: f64, reach_px: f64, rate_hz: f64, memory: u32) ->
         extra_noise_px: 0.0,
         gate_probability: 0.995,
         max_speed_px_per_s: reach_px * rate_hz,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 1, scans: 1, ..MOfNConfig::default() }),
-        birth: BirthConfig::OnePoint(OnePointConfig::default()),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 1, scans: 1, ..MOfNConfig::default() }),
+        initiation: InitiationConfig::OnePoint(OnePointConfig::default()),
         coast_s: 0.0,
         // Gone for `memory` frames and back in the next.
         coast_scans: memory + 1,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     }
 }

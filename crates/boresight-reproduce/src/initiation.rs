@@ -1,4 +1,4 @@
-//! Data set II through the product's own detector, tracker and life: from nothing, and from a known start.
+//! Data set II through the product's own detector, tracker and confirmation rule: from nothing, and from a known start.
 //!
 //! Source: `docs/theory/track-management.md` (M/N 3/5, P_G 0.99, vmax 2 px/scan, R 0.3-0.5, Q 1e-3, deletion after 5
 //! misses, 29..=129 px for 9 x 9; known start with R = 0.5, Q = 1e-5, P0 = diag(0.5, 0.03, 0.5, 0.03): RMSPE 0.176
@@ -10,7 +10,7 @@ use super::score::{MEASURES, four_numbers, spread};
 use super::study::{LOST_PX, Options, monte_carlo};
 use boresight::sim::named::{PAPER_START, paper_scene};
 use boresight::sim::{SceneConfig, Seed};
-use boresight::track::{CueConfig, LifeConfig, MOfNConfig, TrackerConfig};
+use boresight::track::{ConfirmationConfig, InitialTrackConfig, MOfNConfig, MergedMeasurementsConfig, TrackerConfig};
 use boresight::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::vision::{DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
 use boresight::{FrameSource, Result, Scan, TrackId, TrackStatus};
@@ -29,7 +29,7 @@ pub struct Initiation {
     pub confirmed_at: Option<usize>,
     /// Share of the scans with a confirmed track on the first target.
     pub held: f64,
-    /// PFE_x, PFE_y, RMSPE, RMSVE of the cued track, or of the nearest confirmed one where nothing is known, over the scans that have one.
+    /// PFE_x, PFE_y, RMSPE, RMSVE of the designated track, or of the nearest confirmed one where nothing is known, over the scans that have one.
     pub values: [f64; 4],
     /// The first target has no confirmed track within 5 px at the end.
     pub lost: bool,
@@ -52,7 +52,7 @@ pub fn paper_tracker() -> TrackerConfig {
         acceleration_std_px_per_s2: 1e-3f64.sqrt(),
         extra_noise_px: 0.5f64.sqrt(),
         max_speed_px_per_s: 2.0,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 3, scans: 5, tentative_s: 1e9 }),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, tentative_s: 1e9 }),
         coast_s: 5.0,
         coast_scans: 5,
         ..TrackerConfig::default()
@@ -63,7 +63,7 @@ pub fn paper_tracker() -> TrackerConfig {
 pub fn known_start_tracker() -> TrackerConfig {
     TrackerConfig {
         acceleration_std_px_per_s2: 1e-5f64.sqrt(),
-        cues: vec![CueConfig {
+        initial_tracks: vec![InitialTrackConfig {
             // The papers count pixels from 1.
             position_px: [PAPER_START[0] - 1.0, PAPER_START[2] - 1.0],
             velocity_px_per_s: [PAPER_START[1], PAPER_START[3]],
@@ -86,7 +86,7 @@ pub fn initiate(
     tracker: &TrackerConfig,
 ) -> Result<Initiation> {
     let mut source = scene.build(seed)?;
-    let cued = !tracker.cues.is_empty();
+    let designated = !tracker.initial_tracks.is_empty();
     let mut detector = boresight::vision::build(detector, source.info())?;
     let mut tracker = boresight::track::build(tracker)?;
     let mut scan = Scan::default();
@@ -107,8 +107,8 @@ pub fn initiate(
             *ever_near.entry(track.id).or_default() |= source.truth().iter().any(near);
             on_first |= source.truth().first().is_some_and(near);
             let off = (at[0] - first[0]).hypot(at[2] - first[2]);
-            // A cued track answers for itself; without one the nearest does.
-            let counts = !cued || track.id == TrackId(1);
+            // A designated track answers for itself; without one the nearest does.
+            let counts = !designated || track.id == TrackId(1);
             if counts && nearest.is_none_or(|(least, _)| off < least) {
                 nearest = Some((off, at));
             }
@@ -155,7 +155,11 @@ pub fn study_ds2(options: &Options<'_>, start: Start) -> Result<Vec<Initiation>>
         Start::AnySize | Start::SizeLimits => paper_tracker(),
         Start::Known => known_start_tracker(),
         // One target is known to be there: no other track is started that could take its clusters.
-        Start::KnownAnySize => TrackerConfig { max_tracks: 1, sharing: None, ..known_start_tracker() },
+        Start::KnownAnySize => TrackerConfig {
+            max_tracks: 1,
+            merged_measurements: MergedMeasurementsConfig::off(),
+            ..known_start_tracker()
+        },
     };
     monte_carlo(options, |run| initiate(&scene, Seed::new(options.seed).of_run(run), &detector, &tracker))
 }
@@ -211,7 +215,7 @@ pub fn pipeline_ds2(options: &Options<'_>) -> Result<Output> {
         };
         sections.push(Section {
             item: "ds2-pipeline",
-            title: "Data set II through the product's own detector, tracker and life".into(),
+            title: "Data set II through the product's own detector, tracker and confirmation rule".into(),
             reading: format!(
                 "{reading}; band 90..=110, d_p = 2, R = 0.5 px², q = {}",
                 if known { "1e-5" } else { "1e-3" }

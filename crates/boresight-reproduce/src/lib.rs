@@ -67,7 +67,7 @@ pub const ITEMS: &[Item] = &[
     },
     Item {
         name: "ds2-pipeline",
-        what: "data set II through the product's own detector, tracker and life",
+        what: "data set II through the product's own detector, tracker and confirmation rule",
         studies: 3,
         make: initiation::pipeline_ds2,
     },

@@ -230,6 +230,16 @@ mod tests {
     }
 
     #[test]
+    fn merged_measurements_are_on_unless_they_are_switched_off() {
+        let enabled = |text: &str| Config::from_toml(text, "x").unwrap().tracker.merged_measurements.enabled;
+        assert!(enabled("") && enabled("[tracker.merged-measurements]\nmax-secondary-s = 1.0\n"));
+        assert!(!enabled("[tracker.merged-measurements]\nenabled = false\n"));
+        let off = Config::default().with("tracker.merged-measurements.enabled=false").unwrap();
+        assert!(!off.tracker.merged_measurements.enabled);
+        assert_eq!(Config::from_toml(&off.to_toml().unwrap(), "x").unwrap(), off, "off stays off in a written file");
+    }
+
+    #[test]
     fn every_choice_can_be_made_anew_after_another() {
         let schema = schema();
         let mut n_choices = 0;

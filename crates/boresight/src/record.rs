@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TrackId(pub u64);
 
-/// Where a track stands in its life.
+/// Whether a track is confirmed, and whether it was detected in this scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackStatus {
-    /// Started, not yet believed.
+    /// Initiated, not yet confirmed.
     Tentative,
-    /// Believed, with a detection in this scan.
+    /// Confirmed, with a detection in this scan.
     Confirmed,
-    /// Believed, predicted only: no detection in this scan.
+    /// Confirmed, predicted only: no detection in this scan.
     Coasting,
 }
 

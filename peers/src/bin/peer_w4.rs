@@ -3,7 +3,10 @@
 //! The work starts with positions and ends with the confirmed tracks' positions, as for every peer there.
 
 use boresight::associate::AssociatorConfig;
-use boresight::track::{self, BirthConfig, ExistenceConfig, LifeConfig, TrackerConfig, TwoPointConfig};
+use boresight::track::{
+    self, ConfirmationConfig, ExistenceConfig, InitiationConfig, MergedMeasurementsConfig, TrackerConfig,
+    TwoPointConfig,
+};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use nalgebra::{Matrix2, Vector2};
 use peers::{Fault, Job};
@@ -74,17 +77,17 @@ fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
         clutter_density_per_px2: parameter("clutter_density").unwrap_or(1e-5),
         associator: AssociatorConfig::default(),
         gate_probability: 0.9999,
-        birth: BirthConfig::TwoPoint(TwoPointConfig { velocity_std_px_per_s: Some(2.0) }),
-        life: LifeConfig::Existence(ExistenceConfig {
-            birth_density_per_px2: 1e-6,
+        initiation: InitiationConfig::TwoPoint(TwoPointConfig { velocity_std_px_per_s: Some(2.0) }),
+        confirmation: ConfirmationConfig::Existence(ExistenceConfig {
+            new_target_density_per_px2: 1e-6,
             confirm_probability: 0.5,
-            doubt_probability: 0.5,
+            demotion_probability: 0.5,
             delete_probability: 0.001,
-            mean_life_s: 200.0,
+            mean_target_lifetime_s: 200.0,
         }),
         coast_s: 6.0,
         coast_scans: 1,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     };
     // Another configuration may be tried without building anew.

@@ -22,7 +22,7 @@ pub struct Args {
     /// Explain a key or a table: `tracker.coast-s`, `detector.threshold`.
     #[arg(long, value_name = "KEY")]
     explain: Option<String>,
-    /// List what can be chosen: filters, forms, models, innovations, thresholds, associators, lives, births.
+    /// List what can be chosen: filters, forms, models, innovations, thresholds, associators, confirmations, initiations.
     #[arg(long, value_name = "WHAT")]
     list: Option<String>,
     /// Print a JSON schema of the configuration.
@@ -55,10 +55,10 @@ const LISTS: [(&str, &str); 12] = [
     ("models", "tracker.filter.model"),
     ("innovations", "tracker.filter.innovation"),
     ("associators", "tracker.associator"),
-    ("lives", "tracker.life"),
-    ("births", "tracker.birth"),
+    ("confirmations", "tracker.confirmation"),
+    ("initiations", "tracker.initiation"),
     ("clutter", "tracker.clutter"),
-    ("terms", "tracker.terms"),
+    ("association-costs", "tracker.association-cost"),
     ("thresholds", "detector.threshold"),
     ("spatial-filters", "detector.filter"),
     ("centroids", "detector.centroid.method"),

@@ -36,8 +36,8 @@ fn every_list_names_its_choices_with_a_sentence_each() {
     for (list, member) in [
         ("filters", "fuzzy-srif"),
         ("associators", "global-nearest"),
-        ("lives", "m-of-n"),
-        ("births", "two-point"),
+        ("confirmations", "m-of-n"),
+        ("initiations", "two-point"),
         ("clutter", "given"),
         ("thresholds", "isolated"),
         ("spatial-filters", "median"),

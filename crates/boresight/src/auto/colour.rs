@@ -4,7 +4,7 @@ use super::digits::round;
 use super::scene::{Camera, Scene};
 use crate::camera::CameraConfig;
 use crate::io::Colour;
-use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig};
+use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, OnePointConfig};
 use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
@@ -66,6 +66,6 @@ pub fn configure(
     tracker.max_speed_px_per_s = round(2.0 * info.width.max(info.height) as f64);
     // It comes into view at any speed up to that, and may be gone after ten frames.
     let velocity_std_px_per_s = round(tracker.max_speed_px_per_s / 3.0);
-    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
-    tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
+    tracker.initiation = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
+    tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
 }

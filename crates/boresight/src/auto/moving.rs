@@ -3,7 +3,9 @@
 use super::digits::round;
 use super::scene::{Camera, Scene};
 use crate::camera::CameraConfig;
-use crate::track::{BirthConfig, LifeConfig, MOfNConfig, OnePointConfig, SharingConfig, TrackerConfig};
+use crate::track::{
+    ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, TrackerConfig,
+};
 use crate::vision::background::{BackgroundConfig, ShadowConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
@@ -66,10 +68,8 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
     config.detector.cluster.distance_px = round((0.2 * w.min(h)).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
     tracker(w.max(h), info, interval_s, &mut config.tracker);
-    if let Some(sharing) = &mut config.tracker.sharing {
-        // People walk side by side for seconds.
-        sharing.longest_s = 8.0;
-    }
+    // People walk side by side for seconds.
+    config.tracker.merged_measurements.max_secondary_s = 8.0;
     reasons.push(format!(
         "Regions of {least} px or more count, parts nearer than {} px are one. What stands for a minute becomes background \
          (detector.threshold.moving.standing-time-s).",
@@ -84,10 +84,13 @@ pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker:
     tracker.extra_noise_px = round((0.05 * side_px).max(0.5));
     tracker.extra_noise_of_size = 0.03;
     tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
-    tracker.birth = BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(2.0 * side_px) });
-    tracker.life = LifeConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });
+    tracker.initiation = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(2.0 * side_px) });
+    tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });
     // Arms and legs swing the edges of a box more than its middle.
-    tracker.sharing = Some(SharingConfig { edge_std_px: round((0.1 * side_px).max(0.7)), ..SharingConfig::default() });
+    tracker.merged_measurements = MergedMeasurementsConfig {
+        edge_std_px: round((0.1 * side_px).max(0.7)),
+        ..MergedMeasurementsConfig::default()
+    };
     tracker.coast_s = 0.7;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
 }

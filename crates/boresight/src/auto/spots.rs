@@ -2,7 +2,7 @@
 
 use super::digits::round;
 use crate::camera::CameraConfig;
-use crate::track::{SharingConfig, TrackerConfig};
+use crate::track::{MergedMeasurementsConfig, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
@@ -122,26 +122,27 @@ pub fn configure(
     tracker.acceleration_std_px_per_s2 = round((0.1 + 0.03 * large_px) / (interval_s * interval_s));
     tracker.coast_s = 0.7;
     // An aircraft that falls in pieces for some frames is one track soon after.
-    tracker.sharing = Some(SharingConfig { longest_s: tracker.coast_s, ..SharingConfig::default() });
+    tracker.merged_measurements =
+        MergedMeasurementsConfig { max_secondary_s: tracker.coast_s, ..MergedMeasurementsConfig::default() };
     tracker.field_px = Some([info.width as f64, info.height as f64]);
-    tracker.proof.start_score = 6.0;
+    tracker.min_initiation_score = 6.0;
     if seen.per_frame > MANY {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
         );
-        tracker.proof.start_score = 4.0;
+        tracker.min_initiation_score = 4.0;
         return;
     }
-    tracker.proof.sure_score = 11.0;
-    tracker.proof.sure_travel_px = 1.2;
-    tracker.proof.camera_share = 0.05;
+    tracker.confirmation_gate.strong_score = 11.0;
+    tracker.confirmation_gate.strong_min_travel_px = 1.2;
+    tracker.confirmation_gate.camera_travel_share = 0.05;
     // Clouds and lamp posts: on the public infrared clips 0.12 to 0.35 ends them, 0.25 and more delays slow aircraft.
-    tracker.proof.size_share = 0.15;
-    tracker.proof.hits_in_a_row = 2;
-    tracker.proof.travel_px = 2.5;
+    tracker.confirmation_gate.size_share = 0.15;
+    tracker.confirmation_gate.consecutive_hits = 2;
+    tracker.confirmation_gate.min_travel_px = 2.5;
     reasons.push(format!(
         "A track starts from a score of {} or more and is reported once it has moved {} px against the background ({} px if its mean score \
-         is {} or more) and 15 % of its size: what stands still is taken for scenery. Report that too with --set tracker.proof.travel-px=0.",
-        tracker.proof.start_score, tracker.proof.travel_px, tracker.proof.sure_travel_px, tracker.proof.sure_score
+         is {} or more) and 15 % of its size: what stands still is taken for scenery. Report that too with --set tracker.confirmation-gate.min-travel-px=0.",
+        tracker.min_initiation_score, tracker.confirmation_gate.min_travel_px, tracker.confirmation_gate.strong_min_travel_px, tracker.confirmation_gate.strong_score
     ));
 }

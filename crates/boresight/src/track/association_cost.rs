@@ -1,20 +1,21 @@
-//! Terms beside position: what a pair costs because size, intensity, class or box do not fit.
+//! Association cost beside position: what a pair costs because size, intensity, class or box do not fit.
 //!
-//! Each term is added to d², so it speaks the same language: the square of a deviation in standard deviations. Size and
+//! Each term is added to d² and is the same in kind: the square of a deviation in standard deviations. Size and
 //! intensity compare logarithms (a ratio of two is as far up as down). Overlap costs `weight · (1 − IoU)`, with boxes
 //! grown by a buffer for small fast targets (F. Yang et al., "Hard to track objects with irregular motions and similar
 //! appearances? Make it easier by buffering the matching space", WACV 2023); GIoU as H. Rezatofighi et al., CVPR 2019.
 //! Limits: a detector that gives no boxes or sums must leave those terms out.
 
+use super::appearance::Appearance;
 use crate::validate::{check, not_negative, positive};
-use crate::{ClassId, Detection, Extent, Result};
+use crate::{Detection, Extent, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Terms beside position; all are left out by default.
+/// What a pair costs beside position; all terms are left out by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct TermsConfig {
+pub struct AssociationCostConfig {
     /// Standard deviation of ln(width) and ln(height) from scan to scan, above 0: 0.1 for sharp boxes, 0.3 for noisy ones.
     pub size_log_std: Option<f64>,
     /// Standard deviation of ln(sum of the pixels) from scan to scan, above 0.
@@ -47,18 +48,18 @@ pub struct OverlapConfig {
     /// Cost at no overlap, 0 or more (at full overlap it is 0).
     pub weight: f64,
     /// Pairs that overlap less are not made; 0..1 for `iou`, −1..1 for `giou`.
-    pub least: f64,
+    pub min_overlap: f64,
     /// Both boxes are grown by this share of their size on each side, 0 or more.
     pub buffer: f64,
 }
 
 impl Default for OverlapConfig {
     fn default() -> Self {
-        Self { kind: OverlapKind::Iou, weight: 10.0, least: 0.1, buffer: 0.0 }
+        Self { kind: OverlapKind::Iou, weight: 10.0, min_overlap: 0.1, buffer: 0.0 }
     }
 }
 
-impl TermsConfig {
+impl AssociationCostConfig {
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
@@ -77,7 +78,14 @@ impl TermsConfig {
             not_negative(&at, "weight", o.weight, "10 weighs as much as a gate")?;
             not_negative(&at, "buffer", o.buffer, "0.3 for small fast boxes")?;
             let low = if o.kind == OverlapKind::Iou { 0.0 } else { -1.0 };
-            check(o.least >= low && o.least < 1.0, &at, "least", o.least, "an overlap below 1", "0.1 is usual")?;
+            check(
+                o.min_overlap >= low && o.min_overlap < 1.0,
+                &at,
+                "min-overlap",
+                o.min_overlap,
+                "an overlap below 1",
+                "0.1 is usual",
+            )?;
         }
         Ok(())
     }
@@ -99,39 +107,10 @@ impl TermsConfig {
     }
 }
 
-/// What a track looks like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// Smoothed width and height, px.
-    pub size: [f64; 2],
-    /// Smoothed sum of the pixels.
-    pub sum: f64,
-    /// Class of the newest detection that had one.
-    pub class: Option<ClassId>,
-}
-
-impl Look {
-    /// Looks of a detection.
-    pub fn of(d: &Detection) -> Self {
-        Self { size: [d.extent.width_px, d.extent.height_px], sum: d.sum, class: d.class }
-    }
-
-    /// Takes in a new detection with gain `gain` (0..=1).
-    #[inline]
-    pub fn follow(&mut self, d: &Detection, gain: f64) {
-        self.size[0] += gain * (d.extent.width_px - self.size[0]);
-        self.size[1] += gain * (d.extent.height_px - self.size[1]);
-        self.sum += gain * (d.sum - self.sum);
-        if d.class.is_some() {
-            self.class = d.class;
-        }
-    }
-}
-
-/// The terms with the deviations in use now.
+/// The cost with the standard deviations in use now.
 #[derive(Clone, Debug)]
-pub struct Terms {
-    config: TermsConfig,
+pub struct AssociationCost {
+    config: AssociationCostConfig,
     /// Variance of the log ratios of size and intensity.
     variance: [f64; 2],
 }
@@ -139,36 +118,36 @@ pub struct Terms {
 /// Share of a new pair in a learnt variance.
 const LEARNING: f64 = 0.005;
 
-impl Terms {
-    /// Builds the terms.
-    pub fn new(config: &TermsConfig) -> Self {
+impl AssociationCost {
+    /// Builds the cost.
+    pub fn new(config: &AssociationCostConfig) -> Self {
         let square = |v: Option<f64>| v.unwrap_or(1.0).powi(2);
         Self { variance: [square(config.size_log_std), square(config.intensity_log_std)], config: config.clone() }
     }
 
     /// What the pair of a track at (`x`, `y`) and a detection costs beside position; infinite if it must not be made.
-    pub fn cost(&self, x: f64, y: f64, look: &Look, d: &Detection) -> f64 {
+    pub fn cost(&self, x: f64, y: f64, appearance: &Appearance, d: &Detection) -> f64 {
         let c = &self.config;
         let mut cost = 0.0;
         if c.size_log_std.is_some() {
-            let [w, h] = look.size;
+            let [w, h] = appearance.size;
             cost +=
                 (log_ratio(d.extent.width_px, w).powi(2) + log_ratio(d.extent.height_px, h).powi(2)) / self.variance[0];
         }
         if c.intensity_log_std.is_some() {
-            cost += log_ratio(d.sum, look.sum).powi(2) / self.variance[1];
+            cost += log_ratio(d.sum, appearance.sum).powi(2) / self.variance[1];
         }
-        if let (Some(price), Some(a), Some(b)) = (c.class_cost, look.class, d.class)
+        if let (Some(price), Some(a), Some(b)) = (c.class_cost, appearance.class, d.class)
             && a != b
         {
             cost += price;
         }
         if let Some(o) = &c.overlap {
-            let [w, h] = look.size;
+            let [w, h] = appearance.size;
             let own = Extent { left_px: x - 0.5 * w, top_px: y - 0.5 * h, width_px: w, height_px: h };
             let (a, b) = (grown(&own, o.buffer), grown(&d.extent, o.buffer));
             let overlap = if o.kind == OverlapKind::Iou { iou(&a, &b) } else { giou(&a, &b) };
-            if overlap < o.least {
+            if overlap < o.min_overlap {
                 return f64::INFINITY;
             }
             cost += o.weight * (1.0 - overlap);
@@ -176,13 +155,13 @@ impl Terms {
         cost
     }
 
-    /// Takes in a pair that was made.
-    pub fn learn(&mut self, look: &Look, d: &Detection) {
+    /// Learns from a pair that was made.
+    pub fn learn(&mut self, appearance: &Appearance, d: &Detection) {
         if self.config.learn {
             let size = 0.5
-                * (log_ratio(d.extent.width_px, look.size[0]).powi(2)
-                    + log_ratio(d.extent.height_px, look.size[1]).powi(2));
-            let sum = log_ratio(d.sum, look.sum).powi(2);
+                * (log_ratio(d.extent.width_px, appearance.size[0]).powi(2)
+                    + log_ratio(d.extent.height_px, appearance.size[1]).powi(2));
+            let sum = log_ratio(d.sum, appearance.sum).powi(2);
             for (v, new) in self.variance.iter_mut().zip([size, sum]) {
                 *v = (*v + LEARNING * (new - *v)).clamp(1e-4, 4.0);
             }

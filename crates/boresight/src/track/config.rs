@@ -1,18 +1,20 @@
-//! The tracker's configuration: every choice is an enum, every number has a unit and a range.
+//! The tracker's configuration: the parts' own configurations, and the numbers that several parts share.
+//!
+//! Every choice is an enum, every number has a unit and a range. A part's configuration stands in the part's file and never
+//! looks up here.
 
-use super::association_cost::TermsConfig;
+use super::association_cost::AssociationCostConfig;
 use super::clutter::ClutterConfig;
-use super::confirm::config::LifeConfig;
-use super::confirm::confirmation_gate::ProofConfig;
-use super::filter::Belief;
-use super::filter::{FilterConfig, presets};
-use super::initial_tracks::CueConfig;
-use super::initiation::BirthConfig;
-use super::merged_measurements::SharingConfig;
-use super::mht::MhtConfig;
-use crate::Result;
+use super::confirm::confirmation_gate::ConfirmationGateConfig;
+use super::confirm::rule::ConfirmationConfig;
+use super::filter::{Belief, FilterConfig, presets};
+use super::initial_tracks::InitialTrackConfig;
+use super::initiation::InitiationConfig;
+use super::merged_measurements::MergedMeasurementsConfig;
+use super::mht::config::MhtConfig;
 use crate::associate::AssociatorConfig;
 use crate::validate::{at_least_one, check, not_negative, positive, probability};
+use crate::{Error, ErrorKind, Result};
 use boresight_filters::{FilterError, Gaussian};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,7 +39,7 @@ pub struct TrackerConfig {
     pub extra_noise_px: f64,
     /// Probability that a target's detection lies in its gate, in (0, 1); the gate is χ² with 2 degrees of freedom.
     pub gate_probability: f64,
-    /// Largest speed of a target, px/s, above 0: limits two-point starts and gates that grow while a track coasts.
+    /// Largest speed of a target, px/s, above 0: limits two-point initiation and gates that grow while a track coasts.
     pub max_speed_px_per_s: f64,
     /// Whether a gate that grows while its track coasts is cut to what the largest speed allows.
     pub gate_within_max_speed: bool,
@@ -47,29 +49,32 @@ pub struct TrackerConfig {
     pub clutter_density_per_px2: f64,
     /// Whether that density is taken as given, or estimated from the scans.
     pub clutter: ClutterConfig,
-    /// How detections are shared out among tracks.
+    /// How detections are assigned to tracks.
     pub associator: AssociatorConfig,
     /// Multiple-hypothesis tracking instead of an associator (which is then not used); left out: decisions are made at once.
     pub mht: Option<MhtConfig>,
-    /// When a track is believed and when it is given up.
-    pub life: LifeConfig,
-    /// How tracks start.
-    pub birth: BirthConfig,
+    /// When a track is confirmed and when it is deleted.
+    pub confirmation: ConfirmationConfig,
+    /// What a new track must show, beside its confirmation rule, before it is reported as confirmed.
+    pub confirmation_gate: ConfirmationGateConfig,
+    /// How tracks are initiated.
+    pub initiation: InitiationConfig,
+    /// Least score of a detection that initiates a track, 0 or more; weaker ones only continue tracks. 0 asks for no score: some
+    /// detectors give negative ones.
+    pub min_initiation_score: f64,
     /// Targets known before the first scan: confirmed tracks at once. None by default.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub cues: Vec<CueConfig>,
-    /// What a new track must show, beside its life's rule, before it is reported as confirmed.
-    pub proof: ProofConfig,
+    pub initial_tracks: Vec<InitialTrackConfig>,
     /// What a pair costs beside position: size, intensity, class, overlap.
-    pub terms: TermsConfig,
-    /// A second look at weak detections for tracks that found no strong one; left out: all detections are equal.
+    pub association_cost: AssociationCostConfig,
+    /// A second association of weak detections with tracks that took no strong one; left out: all detections are equal.
     pub two_stage: Option<TwoStageConfig>,
-    /// Sharing of merged detections; left out: a detection belongs to one track only.
-    pub sharing: Option<SharingConfig>,
+    /// Detections of several targets at once are split among their tracks; left out: they are (`enabled = false` switches it off).
+    pub merged_measurements: MergedMeasurementsConfig,
     /// Two confirmed tracks that follow the same detections this long become one, s, above 0; the younger ends.
     pub duplicate_s: f64,
     /// How fast a track's box and intensity follow its detections, in (0, 1]; 1 takes the newest box as it is.
-    pub look_gain: f64,
+    pub appearance_gain: f64,
     /// A confirmed track without detections is kept this long, s, 0 or more.
     pub coast_s: f64,
     /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
@@ -99,15 +104,16 @@ impl Default for TrackerConfig {
             clutter: ClutterConfig::default(),
             associator: AssociatorConfig::default(),
             mht: None,
-            life: LifeConfig::default(),
-            birth: BirthConfig::default(),
-            cues: Vec::new(),
-            proof: ProofConfig::default(),
-            terms: TermsConfig::default(),
+            confirmation: ConfirmationConfig::default(),
+            confirmation_gate: ConfirmationGateConfig::default(),
+            initiation: InitiationConfig::default(),
+            min_initiation_score: 0.0,
+            initial_tracks: Vec::new(),
+            association_cost: AssociationCostConfig::default(),
             two_stage: None,
-            sharing: Some(SharingConfig::default()),
+            merged_measurements: MergedMeasurementsConfig::default(),
             duplicate_s: 0.5,
-            look_gain: 0.3,
+            appearance_gain: 0.3,
             coast_s: 0.5,
             coast_scans: 5,
             field_px: None,
@@ -117,13 +123,13 @@ impl Default for TrackerConfig {
     }
 }
 
-/// A second look at weak detections (Y. Zhang et al., "ByteTrack", ECCV 2022).
+/// A second association of weak detections (Y. Zhang et al., "ByteTrack", ECCV 2022).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct TwoStageConfig {
-    /// Detections with at least this score are strong: they may start tracks and are shared out first.
+    /// Detections with at least this score are strong: they may initiate tracks and are assigned first.
     pub high_score: f32,
-    /// Detections with less than this score are not looked at at all; at most `high-score`.
+    /// Detections with less than this score are not used at all; at most `high-score`.
     pub low_score: f32,
 }
 
@@ -137,6 +143,12 @@ impl TrackerConfig {
     /// Gate threshold on d²: γ = −2 ln(1 − P_G), the χ² quantile with 2 degrees of freedom (no unit).
     pub fn gate(&self) -> f64 {
         -2.0 * (1.0 - self.gate_probability).ln()
+    }
+
+    /// Whether a detection of this score may initiate a track.
+    #[inline]
+    pub(super) fn may_initiate(&self, score: f32) -> bool {
+        self.min_initiation_score <= 0.0 || f64::from(score) >= self.min_initiation_score
     }
 
     /// Builds the filter of a new track of that height.
@@ -178,12 +190,19 @@ impl TrackerConfig {
         if let Some(c) = &self.mht {
             c.validate(&format!("{at}.mht"))?;
         }
-        self.life.validate(&format!("{at}.life"))?;
-        self.birth.validate(&format!("{at}.birth"))?;
-        super::initial_tracks::validate(self, at)?;
-        self.proof.validate(&format!("{at}.proof"))?;
+        self.confirmation.validate(&format!("{at}.confirmation"))?;
+        self.confirmation_gate.validate(&format!("{at}.confirmation-gate"))?;
+        self.initiation.validate(&format!("{at}.initiation"))?;
+        not_negative(at, "min-initiation-score", self.min_initiation_score, "0 lets every detection initiate a track")?;
+        for (i, initial) in self.initial_tracks.iter().enumerate() {
+            initial.validate(&format!("{at}.initial-tracks[{i}]"))?;
+        }
+        if self.mht.is_some() && !self.initial_tracks.is_empty() {
+            let e = Error::new(ErrorKind::Config, "multiple hypotheses take no initial tracks");
+            return Err(e.at(format!("{at}.initial-tracks")).hint("leave out `mht`, or the initial tracks"));
+        }
         self.clutter.validate(&format!("{at}.clutter"))?;
-        self.terms.validate(&format!("{at}.terms"))?;
+        self.association_cost.validate(&format!("{at}.association-cost"))?;
         if let Some(c) = &self.two_stage {
             check(
                 c.low_score <= c.high_score,
@@ -194,15 +213,13 @@ impl TrackerConfig {
                 "0.1 and 0.5 suit detectors with scores in 0..1",
             )?;
         }
-        if let Some(c) = &self.sharing {
-            c.validate(&format!("{at}.sharing"))?;
-        }
+        self.merged_measurements.validate(&format!("{at}.merged-measurements"))?;
         positive(at, "duplicate-s", self.duplicate_s, "half a second is usual")?;
         check(
-            self.look_gain > 0.0 && self.look_gain <= 1.0,
+            self.appearance_gain > 0.0 && self.appearance_gain <= 1.0,
             at,
-            "look-gain",
-            self.look_gain,
+            "appearance-gain",
+            self.appearance_gain,
             "a gain in (0, 1]",
             "0.3 smooths over about five scans",
         )?;
@@ -215,5 +232,24 @@ impl TrackerConfig {
         at_least_one(at, "coast-scans", self.coast_scans)?;
         at_least_one(at, "max-tracks", self.max_tracks)?;
         at_least_one(at, "max-gated", self.max_gated)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_least_score_every_detection_may_initiate_a_track() {
+        // Scores of the public MOT17 detections by DPM go below 0.
+        assert!(TrackerConfig::default().may_initiate(-0.3));
+        let config = TrackerConfig { min_initiation_score: 5.0, ..TrackerConfig::default() };
+        assert!(config.may_initiate(5.0) && !config.may_initiate(4.9) && !config.may_initiate(-0.3));
+    }
+
+    #[test]
+    fn the_gate_is_the_quantile_of_chi_square_with_two_degrees_of_freedom() {
+        // −2 ln 0.01 = 9.2103403719762.
+        assert!((TrackerConfig::default().gate() - 9.210_340_371_976_2).abs() < 1e-12);
     }
 }

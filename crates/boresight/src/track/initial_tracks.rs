@@ -1,19 +1,14 @@
-//! Cues: targets known before the first scan become confirmed tracks at once.
+//! Initial tracks: targets known before the first scan are confirmed tracks at once (designation).
 //!
-//! Source: our own; the papers' trackers start from a known state. A cue is a state with its standard deviations some
-//! time before the first scan (an operator's designation, a radar's hand-over); it is predicted to the first scan and then lives
-//! like any confirmed track: gated, corrected, coasting, deleted.
-//! Symbols: state `[x, vx, y, vy]` px, px/s. Limits: the plain tracker only, not multiple hypotheses; errors of a cue are taken as
-//! independent between axes, position and velocity.
+//! Source: our own; the papers' trackers start from a known state (docs/theory/papers.md). An initial track is a state with its standard
+//! deviations some time before the first scan (an operator's designation, a radar's hand-over); it is predicted to the first scan and
+//! from then on treated like any confirmed track: gated, updated, coasting, deleted.
+//! Symbols: state `[x, vx, y, vy]` px, px/s. Limits: the plain tracker only, not multiple hypotheses; errors of a designation are taken
+//! as independent between axes, position and velocity.
 
-use super::association_cost::Look;
-use super::config::TrackerConfig;
-use super::confirm::confirmation_gate::Proof;
-use super::single_track::Track;
-use super::tracker::Tracker;
 use crate::validate::{not_negative, positive};
-use crate::{Error, ErrorKind, Result, Timestamp};
-use boresight_filters::{Filter, Gaussian};
+use crate::{Error, ErrorKind, Result};
+use boresight_filters::Gaussian;
 use nalgebra::{Matrix4, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// A target known before the first scan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct CueConfig {
+pub struct InitialTrackConfig {
     /// Position (x, y), px.
     pub position_px: [f64; 2],
     /// Velocity (x, y), px/s.
@@ -36,7 +31,7 @@ pub struct CueConfig {
     pub size_px: [f64; 2],
 }
 
-impl Default for CueConfig {
+impl Default for InitialTrackConfig {
     fn default() -> Self {
         Self {
             position_px: [0.0; 2],
@@ -49,7 +44,7 @@ impl Default for CueConfig {
     }
 }
 
-impl CueConfig {
+impl InitialTrackConfig {
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
@@ -69,56 +64,19 @@ impl CueConfig {
         Ok(())
     }
 
-    fn belief(&self) -> Gaussian<4> {
+    /// The state as a Gaussian.
+    pub(super) fn belief(&self) -> Gaussian<4> {
         let ([x, y], [vx, vy]) = (self.position_px, self.velocity_px_per_s);
         let (p, v) = (self.position_std_px.powi(2), self.velocity_std_px_per_s.powi(2));
         Gaussian { mean: Vector4::new(x, vx, y, vy), cov: Matrix4::from_diagonal(&Vector4::new(p, v, p, v)) }
     }
 }
 
-/// Refuses cues that the configured tracker cannot take; `at` names the place in the configuration (`tracker`).
-pub(super) fn validate(config: &TrackerConfig, at: &str) -> Result<()> {
-    for (i, cue) in config.cues.iter().enumerate() {
-        cue.validate(&format!("{at}.cues[{i}]"))?;
-    }
-    if config.mht.is_some() && !config.cues.is_empty() {
-        let e = Error::new(ErrorKind::Config, "multiple hypotheses take no cues").at(format!("{at}.cues"));
-        return Err(e.hint("leave out `mht`, or the cues"));
-    }
-    Ok(())
-}
-
-impl Tracker {
-    /// Makes the cues confirmed tracks at the time of the first scan.
-    pub(super) fn take_cues(&mut self, now: Timestamp) -> Result<()> {
-        for cue in &self.config.cues {
-            let mut belief = self.config.belief(&cue.belief(), cue.size_px[1])?;
-            belief.predict(cue.age_s)?;
-            let k = belief.kinematics();
-            let mut life = self.config.life.begin(2, now.ns, self.config.clutter_density_per_px2, 1.0);
-            life.confirmed = true;
-            // Reach of the first gate: where it can be, and where its detection can then lie.
-            let spread = k.cov[(0, 0)].max(k.cov[(2, 2)]).sqrt() + self.config.extra_noise_px;
-            self.tracks.push(Track {
-                id: self.next_id,
-                belief,
-                life,
-                look: Look { size: cue.size_px, sum: 0.0, class: None },
-                twin_since_ns: None,
-                anchor: [k.mean[0], k.mean[2], spread],
-                proof: Proof::given(),
-            });
-            self.next_id += 1;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{MhtConfig, build};
-    use crate::{Detection, Extent, Scan, TrackStatus};
+    use crate::track::{MhtConfig, TrackerConfig, build};
+    use crate::{Detection, Extent, Scan, Timestamp, TrackStatus};
     use nalgebra::{Matrix2, Vector2};
 
     fn scan(k: i64, at: Option<f64>) -> Scan {
@@ -140,13 +98,17 @@ mod tests {
     }
 
     fn config() -> TrackerConfig {
-        let cue =
-            CueConfig { position_px: [8.0, 5.0], velocity_px_per_s: [1.0, 0.0], age_s: 2.0, ..CueConfig::default() };
-        TrackerConfig { acceleration_std_px_per_s2: 0.1, cues: vec![cue], ..TrackerConfig::default() }
+        let initial = InitialTrackConfig {
+            position_px: [8.0, 5.0],
+            velocity_px_per_s: [1.0, 0.0],
+            age_s: 2.0,
+            ..InitialTrackConfig::default()
+        };
+        TrackerConfig { acceleration_std_px_per_s2: 0.1, initial_tracks: vec![initial], ..TrackerConfig::default() }
     }
 
     #[test]
-    fn a_cue_is_a_confirmed_track_in_the_first_scan() {
+    fn an_initial_track_is_a_confirmed_track_in_the_first_scan() {
         let mut tracker = build(&config()).unwrap();
         let first = tracker.step(&scan(0, Some(10.3))).unwrap();
         assert_eq!((first.len(), first[0].id.0, first[0].status), (1, 1, TrackStatus::Confirmed));
@@ -154,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cue_without_a_detection_coasts_from_where_it_was_predicted_and_ends_as_any_track() {
+    fn an_initial_track_without_a_detection_coasts_from_where_it_was_predicted_and_ends_as_any_track() {
         let mut tracker = build(&config()).unwrap();
         let first = tracker.step(&scan(0, None)).unwrap();
         assert_eq!(first[0].status, TrackStatus::Coasting);
@@ -164,11 +126,11 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_cue_is_refused_with_its_place() {
+    fn a_wrong_initial_track_is_refused_with_its_place() {
         let mut c = config();
-        c.cues[0].position_std_px = 0.0;
-        assert!(c.validate("tracker").unwrap_err().to_string().contains("tracker.cues[0].position-std-px"));
+        c.initial_tracks[0].position_std_px = 0.0;
+        assert!(c.validate("tracker").unwrap_err().to_string().contains("tracker.initial-tracks[0].position-std-px"));
         let c = TrackerConfig { mht: Some(MhtConfig::default()), ..config() };
-        assert!(c.validate("tracker").unwrap_err().to_string().contains("tracker.cues"));
+        assert!(c.validate("tracker").unwrap_err().to_string().contains("tracker.initial-tracks"));
     }
 }

@@ -1,4 +1,4 @@
-//! Starts of tracks from detections that no track took: from one point, from two points, or within velocity bounds.
+//! How tracks are initiated from unassociated detections: from one point, from two points, or within velocity bounds.
 //!
 //! Source: two points `docs/theory/track-management.md`: x = [z, Δz/T], P = R[[1, 1/T], [1/T, 2/T²]] per axis; with a
 //! covariance of its own on each point this is cov(z₂) = R₂, cov(z₂, v) = R₂/T, cov(v) = (R₁ + R₂)/T². One point:
@@ -12,25 +12,25 @@ use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How tracks start.
+/// How tracks are initiated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum BirthConfig {
-    /// Every left-over detection starts a track at once, with unknown velocity.
+pub enum InitiationConfig {
+    /// Every unassociated detection initiates a track at once, with unknown velocity.
     OnePoint(OnePointConfig),
-    /// Two left-over detections of scans in a row start a track when the speed between them is possible.
+    /// Two unassociated detections of scans in a row initiate a track when the speed between them is possible.
     TwoPoint(TwoPointConfig),
     /// As two points, but the velocity between them must lie in a box (a road, a river, a known approach).
     VelocityBounds(VelocityBoundsConfig),
 }
 
-impl Default for BirthConfig {
+impl Default for InitiationConfig {
     fn default() -> Self {
         Self::TwoPoint(TwoPointConfig::default())
     }
 }
 
-/// Every left-over detection starts a track at once.
+/// Every unassociated detection initiates a track at once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct OnePointConfig {
@@ -44,11 +44,11 @@ impl Default for OnePointConfig {
     }
 }
 
-/// Two left-over detections of scans in a row start a track.
+/// Two unassociated detections of scans in a row initiate a track.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct TwoPointConfig {
-    /// Standard deviation of the targets' velocities per axis, px/s, above 0, if it is known: starts are then surer and
+    /// Standard deviation of the targets' velocities per axis, px/s, above 0, if it is known: first states are then surer and
     /// better told from clutter. Left out: nothing is known but the largest speed.
     pub velocity_std_px_per_s: Option<f64>,
 }
@@ -69,7 +69,7 @@ impl Default for VelocityBoundsConfig {
     }
 }
 
-impl BirthConfig {
+impl InitiationConfig {
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
@@ -102,6 +102,24 @@ impl BirthConfig {
                     )?;
                 }
                 Ok(())
+            }
+        }
+    }
+}
+
+/// Mean and variance of a new target's velocity (px/s, px²/s²), if anything is known of it.
+pub(super) type VelocityPrior = Option<(Vector2<f64>, Vector2<f64>)>;
+
+impl InitiationConfig {
+    /// What is known of a new target's velocity.
+    pub(super) fn velocity_prior(&self) -> VelocityPrior {
+        match self {
+            Self::OnePoint(c) => Some((Vector2::zeros(), Vector2::repeat(c.velocity_std_px_per_s.powi(2)))),
+            Self::TwoPoint(c) => c.velocity_std_px_per_s.map(|std| (Vector2::zeros(), Vector2::repeat(std * std))),
+            Self::VelocityBounds(c) => {
+                let (low, high) = (Vector2::from(c.min_px_per_s), Vector2::from(c.max_px_per_s));
+                // A uniform density over the box.
+                Some((0.5 * (low + high), (high - low).map(|w| w * w / 12.0)))
             }
         }
     }

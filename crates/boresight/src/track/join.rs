@@ -56,7 +56,7 @@ pub fn join(scans: &mut [TrackFrame], config: &StitchConfig, smooth: bool) -> Re
         let parts = members.iter().filter_map(|m| tracks.remove(m)).collect();
         out.insert(id, chain(id, parts, scans, smooth.then_some(&model), &mut done)?);
     }
-    // Tracks that were never believed are no fragments; they stay as they are.
+    // Tracks that were never confirmed are no fragments; they stay as they are.
     out.append(&mut tracks);
     done.after = out.len();
     for scan in scans.iter_mut() {
@@ -89,10 +89,10 @@ fn by_track(scans: &[TrackFrame]) -> Result<BTreeMap<u64, Vec<Row>>> {
     Ok(tracks)
 }
 
-/// The two ends of a track: its first row, and its last with a detection; nothing of a track that was never believed.
+/// The two ends of a track: its first row, and its last with a detection; nothing of a track that was never confirmed.
 fn fragment(id: u64, rows: &[Row], scans: &[TrackFrame]) -> Option<Fragment> {
-    let believed = rows.iter().any(|r| r.1.status != TrackStatus::Tentative);
-    let first = rows.first().filter(|_| believed)?;
+    let confirmed = rows.iter().any(|r| r.1.status != TrackStatus::Tentative);
+    let first = rows.first().filter(|_| confirmed)?;
     let last = rows.iter().rev().find(|r| r.1.status != TrackStatus::Coasting).unwrap_or(first);
     Some(Fragment {
         id: TrackId(id),

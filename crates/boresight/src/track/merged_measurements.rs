@@ -1,46 +1,53 @@
-//! Merged targets: one detection that several tracks predict is shared among them, and they part on exit.
+//! Merged measurements: one detection that several tracks predict is split among them, until they part again.
 //!
-//! Method (ours): a confirmed track without a detection whose predicted centre lies inside a detection's box shares that
-//! detection with whoever took it. Along each axis the outer members are placed by the box's edges and their own size from
-//! before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place relative
-//! to the centre. Sizes do not follow while shared. The member that fits best stays; the others are guests and live on a
-//! budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
+//! Method (ours; docs/theory/track-management.md): a confirmed track without a detection whose predicted centre lies inside a
+//! detection's box shares that detection with the track that took it. Along each axis the outer members are placed by the box's edges
+//! and their own size from before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place
+//! relative to the centre. Sizes do not follow while merged. The member that fits best is primary; the others are secondary and live on
+//! a budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
-use super::association_cost::Look;
-use super::step::gate::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
+use super::appearance::Appearance;
+use super::scan_table::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
 use crate::validate::not_negative;
 use crate::{Result, Scan};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Sharing of merged detections.
+/// Merged measurements: one detection of several targets is split among their tracks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct SharingConfig {
-    /// Longest time a track lives on detections that fit another track better, s since it had one of its own, 0 or more.
-    pub longest_s: f64,
+pub struct MergedMeasurementsConfig {
+    /// Whether detections are split at all; off: a detection belongs to one track only. On where the table is left out.
+    pub enabled: bool,
+    /// Longest time a track is kept on detections that fit another track better, s since it had one of its own, 0 or more.
+    pub max_secondary_s: f64,
     /// Standard deviation of a box edge, px, 0 or more: noise of the places found from edges.
     pub edge_std_px: f64,
 }
 
-impl Default for SharingConfig {
+impl Default for MergedMeasurementsConfig {
     fn default() -> Self {
-        Self { longest_s: 2.0, edge_std_px: 0.7 }
+        Self { enabled: true, max_secondary_s: 2.0, edge_std_px: 0.7 }
     }
 }
 
-impl SharingConfig {
+impl MergedMeasurementsConfig {
+    /// Switched off: a detection belongs to one track only.
+    pub fn off() -> Self {
+        Self { enabled: false, ..Self::default() }
+    }
+
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
-        not_negative(at, "longest-s", self.longest_s, "2 s bridges people who pass each other")?;
+        not_negative(at, "max-secondary-s", self.max_secondary_s, "2 s bridges people who pass each other")?;
         not_negative(at, "edge-std-px", self.edge_std_px, "0.7 px suits thresholded blobs")
     }
 }
 
-/// One member's part of a shared detection.
+/// One member's part of a merged measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Part {
     pub track: u32,
@@ -48,39 +55,39 @@ pub(super) struct Part {
     pub position: [f64; 2],
     pub noise: Noise,
     /// Whether this member fits best.
-    pub main: bool,
+    pub primary: bool,
 }
 
-/// Finds who shares what in one scan; keeps its memory.
+/// Finds which tracks a detection is merged of; keeps its memory.
 #[derive(Default)]
-pub(super) struct Sharing {
+pub(super) struct MergedMeasurements {
     members: Vec<(u32, u32)>,
     pub parts: Vec<Part>,
     group: Vec<u32>,
     order: Vec<usize>,
 }
 
-impl Sharing {
-    /// Finds the parts. `taker[j]` is the confirmed track that took detection j (or `u32::MAX`), `silent` the confirmed
+impl MergedMeasurements {
+    /// Finds the parts. `taker[j]` is the confirmed track that took detection j (or `u32::MAX`), `missed` the confirmed
     /// tracks without a detection, ascending.
     pub fn find(
         &mut self,
-        config: &SharingConfig,
+        config: &MergedMeasurementsConfig,
         scan: &Scan,
         table: &ScanTable,
         predicted: &[Predicted],
-        look: impl Fn(u32) -> Look,
+        appearance: impl Fn(u32) -> Appearance,
         taker: &[u32],
-        silent: &[u32],
-        largest_half_px: [f64; 2],
+        missed: &[u32],
     ) {
+        let [half_x, half_y] = table.largest_half_px;
         self.members.clear();
         self.parts.clear();
-        for i in silent {
+        for i in missed {
             let p = &predicted[*i as usize];
             let mut best: Option<(f64, u32)> = None;
             let mut looked_at = 0;
-            table.grid().near(p.x, p.y, largest_half_px[0], largest_half_px[1], |g| {
+            table.grid().near(p.x, p.y, half_x, half_y, |g| {
                 looked_at += 1;
                 let e = &scan.detections[g.index as usize].extent;
                 let (dx, dy) = (p.x - e.left_px, p.y - e.top_px);
@@ -108,7 +115,7 @@ impl Sharing {
                 group.push(took);
             }
             if group.len() > 1 {
-                self.split(config, scan, table, predicted, &look, j, took, &group);
+                self.split(config, scan, table, predicted, &appearance, j, took, &group);
             }
             self.group = group;
             from = to;
@@ -118,11 +125,11 @@ impl Sharing {
 
     fn split(
         &mut self,
-        config: &SharingConfig,
+        config: &MergedMeasurementsConfig,
         scan: &Scan,
         table: &ScanTable,
         predicted: &[Predicted],
-        look: &impl Fn(u32) -> Look,
+        appearance: &impl Fn(u32) -> Appearance,
         j: u32,
         took: u32,
         group: &[u32],
@@ -135,11 +142,11 @@ impl Sharing {
             (p.x - d.position.x).powi(2) + (p.y - d.position.y).powi(2)
         };
         let nearest = group.iter().copied().min_by(|a, b| off(*a).total_cmp(&off(*b)).then(a.cmp(b)));
-        let main = if took != u32::MAX { Some(took) } else { nearest };
+        let primary = if took != u32::MAX { Some(took) } else { nearest };
         let edge = config.edge_std_px * config.edge_std_px;
         for i in group {
             let noise = Noise { xx: noise.xx + edge, xy: noise.xy, yy: noise.yy + edge };
-            self.parts.push(Part { track: *i, detection: j, position: [0.0; 2], noise, main: Some(*i) == main });
+            self.parts.push(Part { track: *i, detection: j, position: [0.0; 2], noise, primary: Some(*i) == primary });
         }
         for axis in 0..2 {
             let (low, high) = if axis == 0 {
@@ -153,7 +160,7 @@ impl Sharing {
             self.order.sort_by(|a, b| place(group[*a]).total_cmp(&place(group[*b])).then(a.cmp(b)));
             let mean = group.iter().map(|i| place(*i)).sum::<f64>() / group.len() as f64;
             for (rank, k) in self.order.iter().enumerate() {
-                let half = (0.5 * look(group[*k]).size[axis]).min(0.5 * (high - low));
+                let half = (0.5 * appearance(group[*k]).size[axis]).min(0.5 * (high - low));
                 self.parts[first + *k].position[axis] = if rank == 0 {
                     low + half
                 } else if rank + 1 == group.len() {

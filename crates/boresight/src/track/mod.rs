@@ -1,8 +1,12 @@
-//! From detections to tracks: filters, life cycle, birth; never sees pixels.
+//! From detections to tracks; never sees pixels.
 //!
-//! [`build`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the living tracks come out.
+//! [`build()`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the tracks come out. [`tracker`] is the order of a step,
+//! `step/` its parts (predict, gate, associate, update, delete, initiate, report), `confirm/` the confirmation rules.
 
+mod appearance;
 pub mod association_cost;
+mod build;
+mod clock;
 pub mod clutter;
 pub mod config;
 pub mod confirm;
@@ -13,44 +17,32 @@ pub mod join;
 pub mod merged_measurements;
 pub mod mht;
 mod scan_interval;
+pub mod scan_table;
 mod single_track;
 pub mod smooth;
 pub mod stabilised;
 pub mod step;
 pub mod stitch;
 pub mod tracker;
+mod tracking;
 
-pub use association_cost::{OverlapConfig, OverlapKind, TermsConfig};
+pub use appearance::Appearance;
+pub use association_cost::{AssociationCostConfig, OverlapConfig, OverlapKind};
+pub use build::build;
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};
-pub use confirm::config::{ExistenceConfig, LifeConfig, MOfNConfig, ScoreConfig};
-pub use confirm::confirmation_gate::ProofConfig;
+pub use confirm::confirmation_gate::ConfirmationGateConfig;
+pub use confirm::existence::ExistenceConfig;
+pub use confirm::m_of_n::MOfNConfig;
+pub use confirm::rule::ConfirmationConfig;
+pub use confirm::sprt::SprtConfig;
 pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, PRESETS, Preset, TrackFilter};
-pub use initial_tracks::CueConfig;
-pub use initiation::{BirthConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
+pub use initial_tracks::InitialTrackConfig;
+pub use initiation::{InitiationConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};
 pub use join::{Joined, join};
-pub use merged_measurements::SharingConfig;
-pub use mht::{Mht, MhtConfig};
+pub use merged_measurements::MergedMeasurementsConfig;
+pub use mht::config::MhtConfig;
+pub use mht::tracker::Mht;
 pub use stitch::StitchConfig;
 pub use tracker::Tracker;
-
-use crate::{Result, Scan, TrackState};
-
-/// Turns scans into tracks: the tracker, or the multiple-hypothesis tracker.
-pub trait Tracking: Send {
-    /// Takes the next scan and returns all living tracks after it.
-    /// # Errors
-    /// A scan that runs back in time or holds values that are not finite; the tracks are then unchanged.
-    fn step(&mut self, scan: &Scan) -> Result<&[TrackState]>;
-}
-
-/// Builds the tracker that a configuration describes.
-/// # Errors
-/// A value of the configuration outside its range.
-pub fn build(config: &TrackerConfig) -> Result<Box<dyn Tracking>> {
-    let inner: Box<dyn Tracking> = match &config.mht {
-        Some(mht) => Box::new(Mht::new(config, mht)?),
-        None => Box::new(Tracker::new(config)?),
-    };
-    Ok(Box::new(stabilised::Stabilised::new(inner, config.field_px)))
-}
+pub use tracking::Tracking;

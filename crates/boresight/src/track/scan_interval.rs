@@ -8,15 +8,15 @@ const KEPT: usize = 9;
 
 /// The usual interval between scans.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct ScanInterval {
     recent: [f64; KEPT],
     n: usize,
     next: usize,
     median_s: f64,
 }
 
-impl Pace {
-    /// Takes the newest interval, s; scans of one time (of several sensors) are one look.
+impl ScanInterval {
+    /// Takes the newest interval, s; scans of one time (of several sensors) are one scan.
     pub fn note(&mut self, dt_s: f64) {
         if dt_s <= 0.0 {
             return;
@@ -50,15 +50,15 @@ mod tests {
     fn five_scans_of_a_rate_that_nanoseconds_cannot_tell_last_no_longer_than_five_scans() {
         for rate in [3.0, 6.0, 7.0, 60.0, 1024.0] {
             let time = |k: u32| crate::Timestamp::from_secs_f64(f64::from(k) / rate);
-            let mut pace = Pace::default();
+            let mut interval = ScanInterval::default();
             for k in 1..40 {
-                pace.note(time(k).seconds_since(time(k - 1)));
+                interval.note(time(k).seconds_since(time(k - 1)));
                 if k > 5 {
                     let five = time(k).seconds_since(time(k - 5));
                     assert!(
-                        pace.span_s(5) <= five && five - pace.span_s(5) < 1e-7,
+                        interval.span_s(5) <= five && five - interval.span_s(5) < 1e-7,
                         "{rate}: {} {five}",
-                        pace.span_s(5)
+                        interval.span_s(5)
                     );
                 }
             }
@@ -66,22 +66,22 @@ mod tests {
     }
 
     #[test]
-    fn scans_of_several_sensors_at_one_time_are_one_look() {
-        let mut pace = Pace::default();
+    fn scans_of_several_sensors_at_one_time_are_one_scan() {
+        let mut interval = ScanInterval::default();
         for _ in 0..20 {
             for dt in [5.0, 0.0, 0.0] {
-                pace.note(dt);
-                assert_eq!(pace.interval_s(), 5.0);
+                interval.note(dt);
+                assert_eq!(interval.interval_s(), 5.0);
             }
         }
     }
 
     #[test]
-    fn an_hours_pause_does_not_change_the_pace() {
-        let mut pace = Pace::default();
+    fn an_hours_pause_does_not_change_the_interval() {
+        let mut interval = ScanInterval::default();
         for dt in [0.04, 0.04, 0.08, 0.04, 3600.0, 0.04] {
-            pace.note(dt);
+            interval.note(dt);
         }
-        assert_eq!(pace.interval_s(), 0.04);
+        assert_eq!(interval.interval_s(), 0.04);
     }
 }

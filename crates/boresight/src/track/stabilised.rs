@@ -5,7 +5,7 @@
 //! Where the image's size is known, tracks that have left it are no longer reported (they may come back while they coast).
 //! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a shift.
 
-use super::Tracking;
+use super::tracking::Tracking;
 use crate::camera::SteadyGround;
 use crate::{Result, Scan, TrackState};
 

@@ -111,7 +111,7 @@ pub fn stitch(fragments: &[Fragment], config: &StitchConfig) -> Result<Vec<Track
             {
                 row.push((p.index, d2 + log_det));
             }
-            looked_at < super::step::gate::MOST_LOOKED_AT
+            looked_at < super::scan_table::MOST_LOOKED_AT
         });
         row.sort_unstable_by_key(|r| r.0);
         for (detection, cost) in row {

@@ -6,7 +6,7 @@ use crate::needs::{data, real_tests};
 use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables, timelines};
 use boresight::sim::radar_config::{Measures, PolarErrors};
 use boresight::sim::{Radar, RadarConfig, Seed};
-use boresight::track::{self, LifeConfig, MOfNConfig, TrackerConfig};
+use boresight::track::{self, ConfirmationConfig, MOfNConfig, MergedMeasurementsConfig, TrackerConfig};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackId, TrackState, TrackStatus};
 use boresight_filters::Gaussian;
 use boresight_filters::converted::{Polar, converted};
@@ -80,9 +80,9 @@ fn the_solent_radars_azimuth_bias_is_found_from_ais_and_taken_away() {
         acceleration_std_px_per_s2: 0.05,
         extra_noise_px: 0.1,
         max_speed_px_per_s: 25.0,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 5, scans: 8, tentative_s: 60.0 }),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 5, scans: 8, tentative_s: 60.0 }),
         coast_s: 15.0,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     };
     let radar = run(&tracker, &scans);
@@ -193,9 +193,9 @@ fn two_simulated_radars_on_real_aircraft_are_better_fused_than_alone() {
         max_speed_px_per_s: 320.0,
         clutter_density_per_px2: 5e-11,
         detection_probability: 0.95,
-        life: LifeConfig::MOfN(MOfNConfig { hits: 4, scans: 6, tentative_s: 1e3 }),
+        confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 4, scans: 6, tentative_s: 1e3 }),
         coast_s: 40.0,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     };
     let tracks: Vec<Vec<Timeline>> = sensors

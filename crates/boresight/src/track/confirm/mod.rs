@@ -1,5 +1,12 @@
-//! When a track is confirmed and when it is given up: the rules, and the gate that a confirmed track must pass to be reported.
+//! Whether a track is real: the rule that confirms and deletes it, and the gate that a confirmed track must pass to be reported.
+//!
+//! [`rule`] chooses among [`m_of_n`], [`sprt`] and [`existence`]; [`confirmation_gate`] stands behind every rule; [`status`] is the
+//! one place that says "confirmed" to the outside.
 
-pub mod config;
 pub mod confirmation_gate;
+pub mod existence;
+pub mod history;
+pub mod m_of_n;
 pub mod rule;
+pub mod sprt;
+pub(in crate::track) mod status;

@@ -6,7 +6,7 @@
 //! Limits: a budget of steps for each cluster; when it is spent the best set found so far stands (the first one is greedy,
 //! so an answer is always there).
 
-use super::{NONE, Tree, WINDOW};
+use super::hypothesis::{NONE, Tree, WINDOW};
 use crate::union_find::{join, root};
 
 /// Largest cluster that is searched (the search is as deep as the cluster is large).

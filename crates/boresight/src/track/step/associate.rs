@@ -1,140 +1,181 @@
-//! One stage of association: some of the tracks against the detections still free.
+//! Associate: which detection each track takes, in three stages and with merged measurements.
 //!
-//! Source: `docs/theory/track-management.md`, steps 2 and 3. Rows are tracks in ascending order; detections taken by an
-//! earlier stage are not seen. In soft stages (PDA and its kin) all gated detections count as used.
+//! Source: docs/theory/track-management.md, "One scan"; the second stage for weak detections: Y. Zhang et al., "ByteTrack", ECCV 2022.
+//! Method: confirmed tracks choose first; with two-stage association those that missed try the weak detections; tentative tracks
+//! choose among what is left. Then confirmed tracks that still miss may share a merged measurement. The associator of the configuration
+//! decides in the first stage, global nearest neighbour in the others.
+//! Limits: a stage never takes a detection back.
 
+use super::super::association_cost::AssociationCost;
 use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
-use super::super::single_track::{Outcome, Track};
-use super::gate::{Predicted, ScanTable};
-use super::update::Scratch;
+use super::super::merged_measurements::MergedMeasurements;
+use super::super::scan_table::Predicted;
+use super::super::single_track::Track;
+use super::context::Context;
+use super::stage::Stage;
 use crate::Scan;
-use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior, Share};
+use crate::associate::AssociatorConfig;
 
-/// An associator with its tables and the rows of this scan.
-pub(in crate::track) struct Stage {
-    associator: Box<dyn Associator>,
-    pub soft: bool,
-    likelihood: bool,
-    /// What pairs may cost beside d².
-    terms_budget: f64,
-    pub gates: Gates,
-    pub answer: Assignment,
-    rows: Vec<u32>,
-    cursor: usize,
+/// No track took it.
+const NONE: u32 = u32::MAX;
+
+/// The stages: confirmed tracks, tentative ones, and confirmed ones again with the weak detections.
+const CONFIRMED: usize = 0;
+const TENTATIVE: usize = 1;
+const WEAK: usize = 2;
+
+/// The stages with their answers, and who took what; keeps its memory.
+pub(in crate::track) struct Association {
+    pub(super) stages: [Stage; 3],
+    /// Whether each detection is taken.
+    pub used: Vec<bool>,
+    /// Whether each detection was taken by a confirmed track.
+    pub taken_by_confirmed: Vec<bool>,
+    /// Which confirmed track took each detection.
+    taker: Vec<u32>,
+    /// Confirmed tracks that took none.
+    missed: Vec<u32>,
+    /// Tentative tracks.
+    tentative: Vec<u32>,
 }
 
-impl Stage {
-    pub fn new(config: &AssociatorConfig, terms_budget: f64) -> Self {
-        let associator = config.build();
+impl Association {
+    pub fn new(config: &TrackerConfig) -> Self {
+        let (hard, budget) = (AssociatorConfig::default(), config.association_cost.budget());
         Self {
-            likelihood: associator.needs_likelihood(),
-            associator,
-            soft: config.is_soft(),
-            terms_budget,
-            gates: Gates::new(),
-            answer: Assignment::new(),
-            rows: Vec::new(),
-            cursor: 0,
-        }
-    }
-
-    /// The rows, each with its track and its shares.
-    pub fn rows(&self) -> impl Iterator<Item = (u32, &[Share])> {
-        self.rows.iter().enumerate().map(|(row, i)| (*i, self.answer.row(row)))
-    }
-
-    /// Fetches ahead the detections that the next `n` rows took.
-    #[inline]
-    pub fn touch(&self, scan: &Scan, n: usize) {
-        let mut sum = 0.0;
-        for row in self.cursor..self.rows.len().min(self.cursor + n) {
-            for share in self.answer.row(row) {
-                // The first and the last field: a detection spans two cache lines.
-                let d = &scan.detections[share.detection as usize];
-                sum += d.position.x + f64::from(d.score);
-            }
-        }
-        std::hint::black_box(sum);
-    }
-
-    /// Passes over the row of track `i`, if it has one here.
-    pub fn skip(&mut self, i: usize) {
-        if self.rows.get(self.cursor) == Some(&(i as u32)) {
-            self.cursor += 1;
+            stages: [Stage::new(&config.associator, budget), Stage::new(&hard, budget), Stage::new(&hard, budget)],
+            used: Vec::new(),
+            taken_by_confirmed: Vec::new(),
+            taker: Vec::new(),
+            missed: Vec::new(),
+            tentative: Vec::new(),
         }
     }
 
     /// Begins a scan.
     pub fn begin(&mut self, scan: &Scan, clutter: &Clutter) {
-        self.gates.reset(scan.detections.len(), clutter.density());
-        if clutter.is_map() {
-            self.gates.set_clutter(scan.detections.iter().map(|d| clutter.at(d.position.x, d.position.y)));
+        self.used.clear();
+        self.used.resize(scan.detections.len(), false);
+        self.tentative.clear();
+        for stage in &mut self.stages {
+            stage.begin(scan, clutter);
         }
-        self.rows.clear();
-        self.cursor = 0;
     }
 
-    /// Adds a track with the detections that `free` lets pass.
+    /// Fetches ahead the detections that the next `n` confirmed tracks took.
     #[inline]
-    pub fn add(
-        &mut self,
-        i: usize,
-        track: &Predicted,
-        existence: f64,
-        table: &ScanTable,
-        gate: f64,
-        config: &TrackerConfig,
-        free: impl Fn(u32) -> bool,
-        terms: impl Fn(u32) -> f64,
-    ) {
-        self.rows.push(i as u32);
-        table.gate_row(track, gate, config.max_gated as usize, self.likelihood, free, terms, &mut self.gates);
-        self.gates.end_row(Prior {
-            p_detection: config.detection_probability,
-            p_gate: config.gate_probability,
-            existence,
-            miss_cost: gate + self.terms_budget,
-        });
+    pub fn touch(&self, scan: &Scan, n: usize) {
+        self.stages[CONFIRMED].touch(scan, n);
     }
+}
 
-    /// Associates, and marks the detections that are taken.
-    pub fn solve(&mut self, used: &mut [bool]) {
-        self.associator.associate(&self.gates, &mut self.answer);
-        for row in 0..self.rows.len() {
-            if self.soft {
-                for pair in self.gates.row(row) {
-                    used[pair.detection as usize] = true;
-                }
-            } else {
-                for share in self.answer.row(row) {
-                    used[share.detection as usize] = true;
-                }
+/// Gates the confirmed ones of some tracks, whose first has the index `first`, and notes the tentative ones. `predicted` belongs to
+/// `tracks`; `plain` says that neither scores nor costs beside position count.
+#[inline]
+pub(in crate::track) fn gate_confirmed(
+    context: &Context<'_>,
+    first: usize,
+    tracks: &[Track],
+    predicted: &[Predicted],
+    cost: &AssociationCost,
+    plain: bool,
+    association: &mut Association,
+) {
+    let high = context.high_score();
+    for (k, t) in tracks.iter().enumerate() {
+        if !t.history.confirmed {
+            association.tentative.push((first + k) as u32);
+            continue;
+        }
+        let p = &predicted[k];
+        let existence = context.config.confirmation.existence(&t.history);
+        let stage = &mut association.stages[CONFIRMED];
+        if plain {
+            stage.add(first + k, p, existence, context, |_| true, |_| 0.0);
+        } else {
+            let detections = &context.scan.detections;
+            let strong = |j: u32| detections[j as usize].score >= high;
+            let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
+            stage.add(first + k, p, existence, context, strong, extra);
+        }
+    }
+}
+
+/// Associates all tracks; the confirmed ones were gated before.
+pub(in crate::track) fn associate(
+    context: &Context<'_>,
+    tracks: &[Track],
+    predicted: &[Predicted],
+    cost: &AssociationCost,
+    association: &mut Association,
+    merged: &mut MergedMeasurements,
+) {
+    let (config, scan) = (context.config, context.scan);
+    let Association { stages, used, taken_by_confirmed, taker, missed, tentative } = association;
+    stages[CONFIRMED].solve(used);
+    missed.clear();
+    taker.clear();
+    let may_merge = config.merged_measurements.enabled && context.table.largest_half_px != [0.0; 2];
+    if may_merge || config.two_stage.is_some() {
+        taker.resize(scan.detections.len(), NONE);
+        for (i, shares) in stages[CONFIRMED].rows() {
+            match shares {
+                [] => missed.push(i),
+                [one] => taker[one.detection as usize] = i,
+                _ => {}
             }
         }
     }
-
-    /// Whether track `i`, asked for in ascending order, has a row here; then corrects it by its shares.
-    #[inline]
-    pub fn correct(
-        &mut self,
-        i: usize,
-        track: &mut Track,
-        predicted: &Predicted,
-        scan: &Scan,
-        table: &ScanTable,
-        config: &TrackerConfig,
-        scratch: &mut Scratch,
-    ) -> Option<Outcome> {
-        let row = self.cursor;
-        if self.rows.get(row) != Some(&(i as u32)) {
-            return None;
+    if let Some(low) = config.two_stage.as_ref().map(|c| c.low_score) {
+        for i in missed.iter() {
+            add_later(context, &mut stages[WEAK], *i as usize, tracks, predicted, cost, used, low);
         }
-        self.cursor += 1;
-        Some(if self.soft {
-            scratch.soft(track, predicted, scan, table, &self.gates, row, self.answer.row(row), config)
-        } else {
-            scratch.hard(track, predicted, scan, table, &self.gates, row, self.answer.row(row), config)
-        })
+        stages[WEAK].solve(used);
+        missed.clear();
+        for (i, shares) in stages[WEAK].rows() {
+            match shares {
+                [one] => taker[one.detection as usize] = i,
+                _ => missed.push(i),
+            }
+        }
     }
+    taken_by_confirmed.clone_from(used);
+    for i in tentative.iter() {
+        add_later(context, &mut stages[TENTATIVE], *i as usize, tracks, predicted, cost, used, context.high_score());
+    }
+    stages[TENTATIVE].solve(used);
+    merged.parts.clear();
+    if may_merge && !missed.is_empty() {
+        let appearance = |i: u32| tracks[i as usize].appearance;
+        merged.find(&config.merged_measurements, scan, context.table, predicted, appearance, taker, missed);
+        for part in &merged.parts {
+            used[part.detection as usize] = true;
+        }
+    }
+    // Weak detections initiate nothing.
+    if config.two_stage.is_some() {
+        let high = context.high_score();
+        for (used, d) in used.iter_mut().zip(&scan.detections) {
+            *used |= d.score < high;
+        }
+    }
+}
+
+/// Adds a track to a later stage, with the detections that are free and score at least `min_score`.
+fn add_later(
+    context: &Context<'_>,
+    stage: &mut Stage,
+    i: usize,
+    tracks: &[Track],
+    predicted: &[Predicted],
+    cost: &AssociationCost,
+    used: &[bool],
+    min_score: f32,
+) {
+    let (t, p, detections) = (&tracks[i], &predicted[i], &context.scan.detections);
+    let free = |j: u32| !used[j as usize] && detections[j as usize].score >= min_score;
+    let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
+    let existence = context.config.confirmation.existence(&t.history);
+    stage.add(i, p, existence, context, free, extra);
 }

@@ -1,189 +1,62 @@
-//! From predicted tracks and a scan to the sparse table of pairs that are near.
+//! Gate: from a predicted track and a scan to the sparse row of detections that can be the track's.
 //!
-//! Source: `docs/theory/association.md`: d² = νᵀ S⁻¹ ν ≤ γ, S = H P Hᵀ + R, with the R of each detection.
+//! Source: docs/theory/association.md: d² = νᵀ S⁻¹ ν ≤ γ, S = H P Hᵀ + R, with the R of each detection.
 //! Method: a grid over the detections hands out candidates in the rectangle that holds the gate's ellipse (pre-gate); the
 //! ellipse decides. A gate that has grown while its track coasted is cut to what the largest speed allows.
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
 //! in one pixel cost bounded time and memory.
 
-use crate::associate::{Gates, Pair, UniformGrid};
-use crate::camera::CameraPath;
-use crate::{Detection, Error, ErrorKind, Result, Scan};
+use super::super::scan_table::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
+use crate::associate::{Gates, Pair};
 use nalgebra::{Matrix2, Vector2};
-
-/// Candidates looked at per track before the search stops.
-pub const MOST_LOOKED_AT: usize = 4096;
 
 /// ln 2π.
 const LN_2PI: f64 = 1.837_877_066_409_345_5;
 
-/// A detection's covariance with the extra noise, three numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Noise {
-    /// Variance along x, px².
-    pub xx: f64,
-    /// Covariance, px².
-    pub xy: f64,
-    /// Variance along y, px².
-    pub yy: f64,
-}
-
-impl Noise {
-    /// The covariance as a matrix.
-    #[inline]
-    pub fn matrix(&self) -> Matrix2<f64> {
-        Matrix2::new(self.xx, self.xy, self.xy, self.yy)
-    }
-}
-
-/// A track's predicted position and covariance, and how far it can have come.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Predicted {
-    /// Position, px.
-    pub x: f64,
-    /// Position, px.
-    pub y: f64,
-    /// Covariance H P Hᵀ, px².
-    pub cov: Noise,
-    /// Farthest distance from the prediction that the largest speed allows, px.
-    pub reach: f64,
-}
-
-/// A scan made ready for gating: checked, noise added, sorted into a grid.
-#[derive(Clone, Debug, Default)]
-pub struct ScanTable {
-    /// Noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
-    noise: Vec<Noise>,
-    /// Largest variances in the scan, px².
-    max_xx: f64,
-    max_yy: f64,
-    /// Half of the widest and of the tallest box, px.
-    pub largest_half_px: [f64; 2],
-    /// What the camera did over all scans so far.
-    pub camera: CameraPath,
-    grid: UniformGrid,
-}
-
-impl ScanTable {
-    /// Checks a scan and takes its noise; nothing else changes before the check is over.
-    /// # Errors
-    /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
-    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_of_size: f64) -> Result<()> {
-        self.noise.clear();
-        (self.max_xx, self.max_yy) = (0.0, 0.0);
-        self.largest_half_px = [0.0; 2];
-        for (i, d) in scan.detections.iter().enumerate() {
-            let extra = extra_noise_px * extra_noise_px + (extra_of_size * d.extent.height_px).powi(2);
-            let n = Noise {
-                xx: d.cov[(0, 0)] + extra,
-                xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
-                yy: d.cov[(1, 1)] + extra,
-            };
-            let e = &d.extent;
-            let sides = e.left_px + e.top_px + e.width_px + e.height_px;
-            let finite = (d.position.x + d.position.y + n.xx + n.xy + n.yy + sides).is_finite();
-            // Room for rounding: a covariance of rank one is a legal (if odd) measurement.
-            let sound = d.cov[(0, 0)] >= 0.0 && d.cov[(1, 1)] >= 0.0 && n.xy * n.xy <= n.xx * n.yy * (1.0 + 1e-9);
-            if !(finite && sound) {
-                return Err(refused(scan, i, d, finite));
-            }
-            self.largest_half_px[0] = self.largest_half_px[0].max(0.5 * e.width_px);
-            self.largest_half_px[1] = self.largest_half_px[1].max(0.5 * e.height_px);
-            if self.noise.len() == 1 && self.noise[0] == n {
-                continue;
-            }
-            self.max_xx = self.max_xx.max(n.xx);
-            self.max_yy = self.max_yy.max(n.yy);
-            if self.noise.len() == 1 && i > 1 {
-                let same = self.noise[0];
-                self.noise.resize(i, same);
-            }
-            self.noise.push(n);
-        }
-        self.camera.step(scan.camera_shift_px);
-        Ok(())
-    }
-
-    /// Noise of a detection.
-    #[inline]
-    pub fn noise(&self, detection: u32) -> Noise {
-        let at = if self.noise.len() == 1 { 0 } else { detection as usize };
-        self.noise[at]
-    }
-
-    /// Sorts the scan's detections into the grid.
-    pub fn sort(&mut self, scan: &Scan) {
-        self.grid.build(scan.detections.iter().map(|d| (d.position.x, d.position.y)));
-    }
-
-    /// The grid over the detections.
-    pub fn grid(&self) -> &UniformGrid {
-        &self.grid
-    }
-
-    /// Half the sides of the rectangle that holds a track's gate, px.
-    #[inline]
-    fn half_sides(&self, track: &Predicted, gate: f64) -> (f64, f64) {
-        let half = |own: f64, largest: f64| (gate * (own + largest)).sqrt().min(track.reach);
-        (half(track.cov.xx, self.max_xx), half(track.cov.yy, self.max_yy))
-    }
-
-    /// Fetches ahead what gating a batch of tracks will read.
-    #[inline]
-    pub fn touch(&self, batch: &[Predicted], gate: f64) {
-        let mut sum = 0u32;
-        for track in batch {
-            let (half_x, half_y) = self.half_sides(track, gate);
-            sum = sum.wrapping_add(self.grid.touch(track.x, track.y, half_x, half_y));
-        }
-        std::hint::black_box(sum);
-    }
-
-    /// Adds the pairs of one track to the open row of `gates`: those with d² ≤ `gate` that `free` lets pass.
-    /// `terms` returns what a pair costs beside position (0 if nothing).
-    #[inline]
-    pub fn gate_row(
-        &self,
-        track: &Predicted,
-        gate: f64,
-        max_gated: usize,
-        likelihood: bool,
-        free: impl Fn(u32) -> bool,
-        terms: impl Fn(u32) -> f64,
-        gates: &mut Gates,
-    ) {
-        let reach2 = track.reach * track.reach;
-        let (half_x, half_y) = self.half_sides(track, gate);
-        let mut looked_at = 0;
-        let mut gated = 0;
-        self.grid.near(track.x, track.y, half_x, half_y, |p| {
-            looked_at += 1;
-            let (dx, dy) = (p.x - track.x, p.y - track.y);
-            if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
-                let r = self.noise(p.index);
-                let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
-                let det = sxx * syy - sxy * sxy;
-                let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
-                if distance2 <= gate && dx * dx + dy * dy <= reach2 {
-                    let cost = distance2 + terms(p.index);
-                    if cost.is_infinite() {
-                        return looked_at < MOST_LOOKED_AT;
-                    }
-                    let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
-                    gates.push(Pair { detection: p.index, cost, log_likelihood });
-                    gated += 1;
+/// Adds the pairs of one track to the open row of `gates`: those with d² ≤ `gate` that `free` lets pass.
+/// `extra_cost` returns what a pair costs beside position (0 if nothing).
+#[inline]
+pub fn gate_row(
+    table: &ScanTable,
+    track: &Predicted,
+    gate: f64,
+    max_gated: usize,
+    likelihood: bool,
+    free: impl Fn(u32) -> bool,
+    extra_cost: impl Fn(u32) -> f64,
+    gates: &mut Gates,
+) {
+    let reach2 = track.reach * track.reach;
+    let (half_x, half_y) = table.half_sides(track, gate);
+    let mut looked_at = 0;
+    let mut gated = 0;
+    table.grid().near(track.x, track.y, half_x, half_y, |p| {
+        looked_at += 1;
+        let (dx, dy) = (p.x - track.x, p.y - track.y);
+        if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
+            let r = table.noise(p.index);
+            let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
+            let det = sxx * syy - sxy * sxy;
+            let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
+            if distance2 <= gate && dx * dx + dy * dy <= reach2 {
+                let cost = distance2 + extra_cost(p.index);
+                if cost.is_infinite() {
+                    return looked_at < MOST_LOOKED_AT;
                 }
+                let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
+                gates.push(Pair { detection: p.index, cost, log_likelihood });
+                gated += 1;
             }
-            looked_at < MOST_LOOKED_AT
-        });
-        if gated > 1 {
-            let row = gates.open_row();
-            if gated > max_gated {
-                row.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost).then(a.detection.cmp(&b.detection)));
-                gates.truncate_open_row(max_gated);
-            }
-            gates.open_row().sort_unstable_by_key(|p| p.detection);
         }
+        looked_at < MOST_LOOKED_AT
+    });
+    if gated > 1 {
+        let row = gates.open_row();
+        if gated > max_gated {
+            row.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost).then(a.detection.cmp(&b.detection)));
+            gates.truncate_open_row(max_gated);
+        }
+        gates.open_row().sort_unstable_by_key(|p| p.detection);
     }
 }
 
@@ -196,15 +69,4 @@ pub fn innovation_cov(track: &Predicted, r: &Noise) -> Matrix2<f64> {
 pub fn normalised_square(nu: &Vector2<f64>, s: &Matrix2<f64>) -> f64 {
     let det = s.determinant();
     (nu.x * (s[(1, 1)] * nu.x - s[(0, 1)] * nu.y) + nu.y * (s[(0, 0)] * nu.y - s[(0, 1)] * nu.x)) / det
-}
-
-fn refused(scan: &Scan, i: usize, d: &Detection, finite: bool) -> Error {
-    let what = if finite {
-        format!("covariance {:?} is not positive semi-definite", d.cov.as_slice())
-    } else {
-        format!("position {:?}, covariance {:?} or box is not finite", d.position.as_slice(), d.cov.as_slice())
-    };
-    Error::new(ErrorKind::Damaged, what)
-        .at(format!("frame {}, detection {i}", scan.index.0))
-        .hint("drop such detections before tracking, or mend the detector that makes them")
 }

@@ -1,150 +1,173 @@
-//! The correction of one track by what was associated with it, and what the scan says of its existence.
+//! Update: each track's state by what was associated with it, and what the scan says of its existence.
 //!
-//! Source: `docs/theory/filters.md`, `docs/theory/association.md`. Λ of a hard choice is P_D l / λ, of a miss 1 − P_D
-//! P_G; of soft weights (JIPDA, D. Mušicki, R. Evans, IEEE Trans. AES 40, 2004) it follows from β₀, the probability
-//! that no detection is the target's: ψ ← β₀ ψ (1 − P_D P_G) / (1 − ψ P_D P_G) + (1 − β₀), weights given existence
-//! β_j / ψ.
+//! Source: docs/theory/filters.md, docs/theory/association.md. Λ of a hard choice is P_D l / λ, of a miss 1 − P_D P_G; of soft weights
+//! (JIPDA, D. Mušicki, R. Evans, IEEE Trans. AES 40, 2004) it follows from β₀, the probability that no detection is the target's:
+//! ψ ← β₀ ψ (1 − P_D P_G) / (1 − ψ P_D P_G) + (1 − β₀), weights given existence β_j / ψ.
+//! Limits: a filter that refuses a measurement leaves the track as if nothing was seen.
 
-use super::super::config::TrackerConfig;
-use super::super::confirm::config::LifeConfig;
+use super::super::confirm::rule::ConfirmationConfig;
 use super::super::merged_measurements::Part;
+use super::super::scan_table::Predicted;
 use super::super::single_track::{Outcome, Track};
-use super::gate::{Predicted, ScanTable, innovation_cov, normalised_square};
-use crate::Scan;
+use super::associate::Association;
+use super::context::Context;
+use super::gate::{innovation_cov, normalised_square};
 use crate::associate::{Gates, Share};
 use crate::record::Innovation;
 use boresight_filters::{Filter, Measurement, Weighted};
 use nalgebra::{Matrix2, Vector2};
 
-/// Scratch memory of corrections.
-#[derive(Default)]
-pub(in crate::track) struct Scratch {
-    weighted: Vec<Weighted>,
-}
-
-impl Scratch {
-    /// Corrects a track by at most one detection; a filter that refuses it leaves the track as if nothing was seen.
-    #[inline]
-    pub fn hard(
-        &mut self,
-        track: &mut Track,
-        predicted: &Predicted,
-        scan: &Scan,
-        table: &ScanTable,
-        gates: &Gates,
-        row: usize,
-        shares: &[Share],
-        config: &TrackerConfig,
-    ) -> Outcome {
-        let prior = gates.prior(row);
-        let missed = Outcome { ratio: 1.0 - prior.p_detection * prior.p_gate, ..Outcome::default() };
-        let [share] = shares else { return missed };
-        let detection = &scan.detections[share.detection as usize];
-        let noise = table.noise(share.detection);
-        let measurement = Measurement { position: detection.position, cov: noise.matrix() };
-        if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
-            return missed;
-        }
-        let residual = detection.position - Vector2::new(predicted.x, predicted.y);
-        let cov = innovation_cov(predicted, &noise);
-        let nis = normalised_square(&residual, &cov);
-        let clutter = gates.clutter(share.detection);
-        let density = (-0.5 * nis).exp() / (std::f64::consts::TAU * cov.determinant().sqrt());
-        track.seen(detection, &noise, config.look_gain);
-        Outcome {
-            hit: true,
-            shared: false,
-            guest: false,
-            detection: Some(share.detection),
-            ratio: prior.p_detection * density / clutter,
-            innovation: Some(Innovation { residual, cov, nis }),
+/// Updates track `i`, asked for in ascending order, by its part of a merged measurement if it has one, else by what the stages assigned
+/// to it. `weighted` is scratch memory.
+#[inline]
+pub(in crate::track) fn update(
+    context: &Context<'_>,
+    i: usize,
+    track: &mut Track,
+    predicted: &Predicted,
+    part: Option<&Part>,
+    association: &mut Association,
+    weighted: &mut Vec<Weighted>,
+) -> Outcome {
+    let mut outcome = Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
+    if let Some(part) = part {
+        outcome = merged(track, predicted, part);
+    }
+    for stage in &mut association.stages {
+        if let Some(row) = stage.next_row(i)
+            && part.is_none()
+        {
+            let (gates, shares) = (&stage.gates, stage.answer.row(row));
+            outcome = if stage.soft {
+                soft(context, track, predicted, gates, row, shares, weighted)
+            } else {
+                hard(context, track, predicted, gates, row, shares)
+            };
         }
     }
+    outcome
+}
 
-    /// Corrects a track by weighted detections.
-    pub fn soft(
-        &mut self,
-        track: &mut Track,
-        predicted: &Predicted,
-        scan: &Scan,
-        table: &ScanTable,
-        gates: &Gates,
-        row: usize,
-        shares: &[Share],
-        config: &TrackerConfig,
-    ) -> Outcome {
-        let p = gates.prior(row);
-        let miss = 1.0 - p.p_detection * p.p_gate;
-        let missed = Outcome { ratio: miss, ..Outcome::default() };
-        let Some(best) = best_share(shares) else { return missed };
-        let seen: f64 = shares.iter().map(|s| s.weight).sum();
-        let none = (1.0 - seen).max(0.0);
-        let (ratio, exists) = if p.existence >= 1.0 {
-            (miss / none.max(1e-300), 1.0)
-        } else {
-            let there = p.existence * miss / (1.0 - p.existence * p.p_detection * p.p_gate).max(1e-300);
-            let after = (none * there + seen).clamp(1e-300, 1.0);
-            // The same, so that a certain target stays in range: odds after over odds before.
-            let odds = after / (none * (1.0 - there)).max(1e-15);
-            (odds * (1.0 - p.existence) / p.existence, after)
-        };
-
-        self.weighted.clear();
-        let mut innovation = Innovation { residual: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
-        for share in shares {
-            let noise = table.noise(share.detection);
-            let position = scan.detections[share.detection as usize].position;
-            let weight = (share.weight / exists).min(1.0);
-            self.weighted.push(Weighted { measurement: Measurement { position, cov: noise.matrix() }, weight });
-            // Means over the detections, given that one of them is the target's: that of νᵀ S⁻¹ ν is χ² as of a sure one,
-            // the square of the mean innovation is not.
-            let given_seen = share.weight / seen.max(1e-300);
-            let residual = position - Vector2::new(predicted.x, predicted.y);
-            let cov = innovation_cov(predicted, &noise);
-            innovation.residual += residual * given_seen;
-            innovation.nis += normalised_square(&residual, &cov) * given_seen;
-            innovation.cov += cov * given_seen;
-        }
-        if track.belief.update(&self.weighted).is_err() {
-            return missed;
-        }
-        // With M-of-N any gated detection is a hit; else the target was seen if that is likelier than not.
-        let hit = matches!(config.life, LifeConfig::MOfN(_)) || seen >= 0.5;
-        if hit {
-            track.seen(&scan.detections[best.detection as usize], &table.noise(best.detection), config.look_gain);
-        }
-        Outcome {
-            hit,
-            shared: false,
-            guest: false,
-            detection: hit.then_some(best.detection),
-            ratio,
-            // Of clutter alone it would say nothing of the filter.
-            innovation: (seen >= 0.5).then_some(innovation),
-        }
+/// Updates a track by at most one detection.
+#[inline]
+fn hard(
+    context: &Context<'_>,
+    track: &mut Track,
+    predicted: &Predicted,
+    gates: &Gates,
+    row: usize,
+    shares: &[Share],
+) -> Outcome {
+    let prior = gates.prior(row);
+    let missed = Outcome { likelihood_ratio: 1.0 - prior.p_detection * prior.p_gate, ..Outcome::default() };
+    let [share] = shares else { return missed };
+    let detection = &context.scan.detections[share.detection as usize];
+    let noise = context.table.noise(share.detection);
+    let measurement = Measurement { position: detection.position, cov: noise.matrix() };
+    if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
+        return missed;
+    }
+    let innovation = innovation_of(&detection.position, predicted, &innovation_cov(predicted, &noise));
+    let clutter = gates.clutter(share.detection);
+    let density = (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());
+    track.follow(detection, &noise, context.config.appearance_gain);
+    Outcome {
+        hit: true,
+        detection: Some(share.detection),
+        likelihood_ratio: prior.p_detection * density / clutter,
+        innovation: Some(innovation),
+        ..Outcome::default()
     }
 }
 
-/// Corrects a track by its part of a shared detection; says nothing of its existence.
-pub(in crate::track) fn shared(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
+/// Updates a track by weighted detections.
+fn soft(
+    context: &Context<'_>,
+    track: &mut Track,
+    predicted: &Predicted,
+    gates: &Gates,
+    row: usize,
+    shares: &[Share],
+    weighted: &mut Vec<Weighted>,
+) -> Outcome {
+    let p = gates.prior(row);
+    let miss = 1.0 - p.p_detection * p.p_gate;
+    let missed = Outcome { likelihood_ratio: miss, ..Outcome::default() };
+    let Some(best) = best_share(shares) else { return missed };
+    let seen: f64 = shares.iter().map(|s| s.weight).sum();
+    let none = (1.0 - seen).max(0.0);
+    let (likelihood_ratio, exists) = if p.existence >= 1.0 {
+        (miss / none.max(1e-300), 1.0)
+    } else {
+        let there = p.existence * miss / (1.0 - p.existence * p.p_detection * p.p_gate).max(1e-300);
+        let after = (none * there + seen).clamp(1e-300, 1.0);
+        // The same, so that a certain target stays in range: odds after over odds before.
+        let odds = after / (none * (1.0 - there)).max(1e-15);
+        (odds * (1.0 - p.existence) / p.existence, after)
+    };
+
+    weighted.clear();
+    let mut innovation = Innovation { residual: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
+    for share in shares {
+        let noise = context.table.noise(share.detection);
+        let position = context.scan.detections[share.detection as usize].position;
+        let weight = (share.weight / exists).min(1.0);
+        weighted.push(Weighted { measurement: Measurement { position, cov: noise.matrix() }, weight });
+        // Means over the detections, given that one of them is the target's: that of νᵀ S⁻¹ ν is χ² as of a sure one,
+        // the square of the mean innovation is not.
+        let given_seen = share.weight / seen.max(1e-300);
+        let one = innovation_of(&position, predicted, &innovation_cov(predicted, &noise));
+        innovation.residual += one.residual * given_seen;
+        innovation.nis += one.nis * given_seen;
+        innovation.cov += one.cov * given_seen;
+    }
+    if track.belief.update(weighted).is_err() {
+        return missed;
+    }
+    // With M-of-N any gated detection is a hit; else the target was seen if that is likelier than not.
+    let hit = matches!(context.config.confirmation, ConfirmationConfig::MOfN(_)) || seen >= 0.5;
+    if hit {
+        let (d, noise) = (&context.scan.detections[best.detection as usize], context.table.noise(best.detection));
+        track.follow(d, &noise, context.config.appearance_gain);
+    }
+    Outcome {
+        hit,
+        detection: hit.then_some(best.detection),
+        likelihood_ratio,
+        // Of clutter alone it would say nothing of the filter.
+        innovation: (seen >= 0.5).then_some(innovation),
+        ..Outcome::default()
+    }
+}
+
+/// Updates a track by its part of a merged measurement; says nothing of its existence.
+fn merged(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
     let position = Vector2::from(part.position);
     let measurement = Measurement { position, cov: part.noise.matrix() };
     if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
-        return Outcome { ratio: 1.0, ..Outcome::default() };
+        return Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
     }
     let [x, y] = part.position;
-    track.anchor = [x, y, part.noise.xx.max(part.noise.yy).sqrt()];
-    let residual = position - Vector2::new(predicted.x, predicted.y);
-    let cov = innovation_cov(predicted, &part.noise);
-    let nis = normalised_square(&residual, &cov);
+    track.last_place = [x, y, part.noise.xx.max(part.noise.yy).sqrt()];
     Outcome {
         hit: true,
-        shared: true,
-        guest: !part.main,
+        merged: true,
+        secondary: !part.primary,
         detection: Some(part.detection),
-        ratio: 1.0,
-        innovation: Some(Innovation { residual, cov, nis }),
+        likelihood_ratio: 1.0,
+        innovation: Some(innovation_of(&position, predicted, &innovation_cov(predicted, &part.noise))),
     }
+}
+
+/// Innovation of a measurement at `position` (px) with the innovation covariance `cov` (px²).
+#[inline]
+pub(in crate::track) fn innovation_of(
+    position: &Vector2<f64>,
+    predicted: &Predicted,
+    cov: &Matrix2<f64>,
+) -> Innovation {
+    let residual = position - Vector2::new(predicted.x, predicted.y);
+    Innovation { residual, cov: *cov, nis: normalised_square(&residual, cov) }
 }
 
 fn best_share(shares: &[Share]) -> Option<Share> {
@@ -154,7 +177,7 @@ fn best_share(shares: &[Share]) -> Option<Share> {
 #[cfg(test)]
 mod tests {
     use crate::associate::AssociatorConfig;
-    use crate::track::{CueConfig, TrackerConfig, build};
+    use crate::track::{InitialTrackConfig, TrackerConfig, build};
     use crate::{Detection, Extent, Scan, Timestamp};
     use nalgebra::{Matrix2, Vector2};
     use rand::{RngExt, SeedableRng};
@@ -163,10 +186,11 @@ mod tests {
 
     /// Mean NIS of a target of known model (P_D 0.9, R 1 px²) in `n_clutter` false detections a scan over 40 x 40 px.
     fn mean_nis(n_clutter: usize) -> f64 {
-        let cue = CueConfig { position_std_px: 1.0, velocity_std_px_per_s: 0.1, ..CueConfig::default() };
+        let initial =
+            InitialTrackConfig { position_std_px: 1.0, velocity_std_px_per_s: 0.1, ..InitialTrackConfig::default() };
         let config = TrackerConfig {
             associator: AssociatorConfig::Pda(Default::default()),
-            cues: vec![cue],
+            initial_tracks: vec![initial],
             acceleration_std_px_per_s2: 0.1,
             extra_noise_px: 0.0,
             clutter_density_per_px2: (n_clutter as f64 / 1600.0).max(1e-9),

@@ -3,7 +3,8 @@
 use super::{load, number, numbers, rows};
 use boresight::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior};
 use boresight::track::{
-    self, LifeConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocityKf, step::gate as gating,
+    self, ConfirmationConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocityKf, scan_table,
+    step::gate,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};
@@ -44,7 +45,7 @@ fn the_tracker_keeps_the_golden_tracks() {
             detection_probability: get("pd"),
             clutter_density_per_px2: get("lam"),
             associator,
-            life: LifeConfig::MOfN(MOfNConfig {
+            confirmation: ConfirmationConfig::MOfN(MOfNConfig {
                 hits: get("M") as u32,
                 scans: get("N") as u32,
                 ..MOfNConfig::default()
@@ -116,30 +117,30 @@ fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
         let scan =
             Scan { detections: rows(&i["Z"]).iter().map(|z| detection(z[0], z[1], r)).collect(), ..Scan::default() };
         let p = ConstantVelocityKf::new(&belief(i), 1.0).predicted();
-        let track = gating::Predicted {
+        let track = scan_table::Predicted {
             x: p.mean.x,
             y: p.mean.y,
-            cov: gating::Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
+            cov: scan_table::Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
             reach: f64::INFINITY,
         };
-        let mut table = gating::ScanTable::default();
+        let mut table = scan_table::ScanTable::default();
         table.read(&scan, 0.0, 0.0).unwrap();
         table.sort(&scan);
-        let gate = number(&i["gamma"]);
-        let gates_to = |gate: f64| {
+        let gamma = number(&i["gamma"]);
+        let gates_to = |threshold: f64| {
             let mut gates = Gates::new();
             gates.reset(scan.detections.len(), 1.0);
-            table.gate_row(&track, gate, 64, true, |_| true, |_| 0.0, &mut gates);
-            gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: gate });
+            gate::gate_row(&table, &track, threshold, 64, true, |_| true, |_| 0.0, &mut gates);
+            gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: threshold });
             gates
         };
         let all = gates_to(1e9);
         let ours: Vec<f64> = all.row(0).iter().map(|p| p.cost).collect();
         golden.all_close(&ours, &numbers(&case["outputs"]["d2"]), &format!("case {n}: d2"));
-        let s = gating::innovation_cov(&track, &gating::Noise { xx: r[(0, 0)], xy: r[(0, 1)], yy: r[(1, 1)] });
+        let s = gate::innovation_cov(&track, &scan_table::Noise { xx: r[(0, 0)], xy: r[(0, 1)], yy: r[(1, 1)] });
         golden.all_close(s.transpose().as_slice(), &rows(&case["outputs"]["S"]).concat(), &format!("case {n}: S"));
         let mut answer = Assignment::new();
-        AssociatorConfig::Nearest(Default::default()).build().associate(&gates_to(gate), &mut answer);
+        AssociatorConfig::Nearest(Default::default()).build().associate(&gates_to(gamma), &mut answer);
         let nearest = answer.row(0).first().map_or(-1.0, |s| f64::from(s.detection));
         assert_eq!(nearest, number(&case["outputs"]["nearest"]), "case {n}");
     }
@@ -158,7 +159,7 @@ fn probabilistic_data_association_agrees_with_the_golden_vectors() {
         let mut gates = Gates::new();
         gates.reset(z.len(), number(&i["lam"]));
         for (j, z) in z.iter().enumerate() {
-            let d2 = gating::normalised_square(&(z - p.mean), &s);
+            let d2 = gate::normalised_square(&(z - p.mean), &s);
             if d2 <= number(&i["gamma"]) {
                 let log_likelihood = -0.5 * d2 - (std::f64::consts::TAU * s.determinant().sqrt()).ln();
                 gates.push(Pair { detection: j as u32, cost: d2, log_likelihood });

@@ -1,7 +1,7 @@
 //! Merged targets: what two tracks predict is shared, for longer than they may coast, and split on exit.
 
 use super::{detection, scan};
-use boresight::track::{self, SharingConfig, TrackerConfig};
+use boresight::track::{self, MergedMeasurementsConfig, TrackerConfig};
 use boresight::{Extent, TrackStatus};
 
 #[test]
@@ -11,7 +11,7 @@ fn two_targets_that_pass_through_each_other_keep_their_ids_however_long_they_are
         acceleration_std_px_per_s2: 10.0,
         coast_s: 0.1,
         coast_scans: 5,
-        sharing: Some(SharingConfig { longest_s: 1.0, ..SharingConfig::default() }),
+        merged_measurements: MergedMeasurementsConfig { max_secondary_s: 1.0, ..MergedMeasurementsConfig::default() },
         ..TrackerConfig::default()
     };
     let mut tracker = track::build(&config).unwrap();
@@ -45,7 +45,7 @@ fn two_targets_that_pass_through_each_other_keep_their_ids_however_long_they_are
 #[test]
 fn a_target_that_ends_inside_another_is_given_up_after_the_longest_time() {
     let config = TrackerConfig {
-        sharing: Some(SharingConfig { longest_s: 0.8, ..SharingConfig::default() }),
+        merged_measurements: MergedMeasurementsConfig { max_secondary_s: 0.8, ..MergedMeasurementsConfig::default() },
         ..TrackerConfig::default()
     };
     let mut tracker = track::build(&config).unwrap();
@@ -66,7 +66,7 @@ fn a_target_that_ends_inside_another_is_given_up_after_the_longest_time() {
 #[test]
 fn two_tracks_that_take_turns_on_one_target_become_one() {
     let config = TrackerConfig {
-        sharing: Some(SharingConfig { longest_s: 0.8, ..SharingConfig::default() }),
+        merged_measurements: MergedMeasurementsConfig { max_secondary_s: 0.8, ..MergedMeasurementsConfig::default() },
         ..TrackerConfig::default()
     };
     let mut tracker = track::build(&config).unwrap();

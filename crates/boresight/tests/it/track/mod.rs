@@ -8,8 +8,8 @@ mod units;
 
 use boresight::associate::{AssociatorConfig, jpda::Coalescence, jpda::JpdaConfig};
 use boresight::track::{
-    BirthConfig, ClutterConfig, ExistenceConfig, LifeConfig, MhtConfig, OverlapConfig, ScoreConfig, TermsConfig,
-    TrackerConfig, TwoStageConfig,
+    AssociationCostConfig, ClutterConfig, ConfirmationConfig, ExistenceConfig, InitiationConfig, MhtConfig,
+    OverlapConfig, SprtConfig, TrackerConfig, TwoStageConfig,
 };
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};
 use nalgebra::{Matrix2, Vector2};
@@ -52,31 +52,35 @@ pub fn associators() -> Vec<AssociatorConfig> {
     ]
 }
 
-/// Trackers that between them use every associator, life, birth, clutter estimate and term, and MHT.
+/// Trackers that between them use every associator, confirmation rule, initiation, clutter estimate and association cost, and MHT.
 pub fn trackers() -> Vec<TrackerConfig> {
     let base = TrackerConfig { max_speed_px_per_s: 300.0, ..TrackerConfig::default() };
     let mut out: Vec<TrackerConfig> =
         associators().into_iter().map(|associator| TrackerConfig { associator, ..base.clone() }).collect();
-    for life in [LifeConfig::Score(ScoreConfig::default()), LifeConfig::Existence(ExistenceConfig::default())] {
+    for confirmation in
+        [ConfirmationConfig::Sprt(SprtConfig::default()), ConfirmationConfig::Existence(ExistenceConfig::default())]
+    {
         let associator = AssociatorConfig::Jpda(JpdaConfig::default());
-        out.push(TrackerConfig { life: life.clone(), ..base.clone() });
-        out.push(TrackerConfig { life, associator, ..base.clone() });
+        out.push(TrackerConfig { confirmation: confirmation.clone(), ..base.clone() });
+        out.push(TrackerConfig { confirmation, associator, ..base.clone() });
     }
-    for birth in [BirthConfig::OnePoint(Default::default()), BirthConfig::VelocityBounds(Default::default())] {
-        out.push(TrackerConfig { birth, ..base.clone() });
+    for initiation in
+        [InitiationConfig::OnePoint(Default::default()), InitiationConfig::VelocityBounds(Default::default())]
+    {
+        out.push(TrackerConfig { initiation, ..base.clone() });
     }
     for clutter in [ClutterConfig::PerScan(Default::default()), ClutterConfig::Map(Default::default())] {
         let associator = AssociatorConfig::Pda(Default::default());
         out.push(TrackerConfig { clutter, associator, ..base.clone() });
     }
-    let terms = TermsConfig {
+    let association_cost = AssociationCostConfig {
         size_log_std: Some(0.3),
         intensity_log_std: Some(0.3),
         class_cost: Some(10.0),
         overlap: Some(OverlapConfig { buffer: 0.3, ..OverlapConfig::default() }),
         learn: true,
     };
-    out.push(TrackerConfig { terms, two_stage: Some(TwoStageConfig::default()), ..base.clone() });
+    out.push(TrackerConfig { association_cost, two_stage: Some(TwoStageConfig::default()), ..base.clone() });
     out.push(TrackerConfig { mht: Some(MhtConfig::default()), ..base });
     out
 }

@@ -29,7 +29,7 @@ proptest! {
     #[test]
     fn tracks_stay_sane_and_hard_trackers_give_each_detection_away_once(scans in scans()) {
         for config in trackers() {
-            let hard = config.mht.is_some() || (!config.associator.is_soft() && config.sharing.is_none());
+            let hard = config.mht.is_some() || (!config.associator.is_soft() && !config.merged_measurements.enabled);
             let mut tracker = track::build(&config).unwrap();
             let (mut newest, mut gone) = (0u64, BTreeSet::<u64>::new());
             let mut before = BTreeSet::<u64>::new();

@@ -2,7 +2,8 @@
 
 use super::associators;
 use boresight::track::{
-    BirthConfig, ExistenceConfig, LifeConfig, MhtConfig, OnePointConfig, ScoreConfig, TrackerConfig, build,
+    ConfirmationConfig, ExistenceConfig, InitiationConfig, MergedMeasurementsConfig, MhtConfig, OnePointConfig,
+    SprtConfig, TrackerConfig, build,
 };
 use boresight::{Detection, FrameIndex, Scan, Timestamp, TrackStatus};
 use nalgebra::{Matrix2, Vector2};
@@ -45,7 +46,7 @@ fn scans(u: Units) -> Vec<Scan> {
 }
 
 fn configs(u: Units) -> Vec<TrackerConfig> {
-    let (speed, birth_density_per_px2) = (u.length / u.time, 1e-4 / (u.length * u.length));
+    let (speed, new_target_density_per_px2) = (u.length / u.time, 1e-4 / (u.length * u.length));
     let base = TrackerConfig {
         acceleration_std_px_per_s2: 0.1 * speed / u.time,
         extra_noise_px: 0.1 * u.length,
@@ -53,25 +54,31 @@ fn configs(u: Units) -> Vec<TrackerConfig> {
         clutter_density_per_px2: 4e-4 / (u.length * u.length),
         coast_s: 0.0,
         duplicate_s: 4.5 * u.time,
-        sharing: None,
+        merged_measurements: MergedMeasurementsConfig::off(),
         ..TrackerConfig::default()
     };
-    let lives = [
-        LifeConfig::default(),
-        LifeConfig::Score(ScoreConfig { birth_density_per_px2, ..ScoreConfig::default() }),
-        LifeConfig::Existence(ExistenceConfig {
-            birth_density_per_px2,
-            mean_life_s: 100.0 * u.time,
+    let rules = [
+        ConfirmationConfig::default(),
+        ConfirmationConfig::Sprt(SprtConfig { new_target_density_per_px2, ..SprtConfig::default() }),
+        ConfirmationConfig::Existence(ExistenceConfig {
+            new_target_density_per_px2,
+            mean_target_lifetime_s: 100.0 * u.time,
             ..ExistenceConfig::default()
         }),
     ];
-    let births = [BirthConfig::default(), BirthConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: 3.0 * speed })];
+    let initiations = [
+        InitiationConfig::default(),
+        InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: 3.0 * speed }),
+    ];
     let mut out = Vec::new();
-    for life in &lives {
-        for birth in &births {
-            let with = TrackerConfig { life: life.clone(), birth: birth.clone(), ..base.clone() };
+    for rule in &rules {
+        for initiation in &initiations {
+            let with = TrackerConfig { confirmation: rule.clone(), initiation: initiation.clone(), ..base.clone() };
             out.extend(associators().into_iter().map(|associator| TrackerConfig { associator, ..with.clone() }));
-            out.push(TrackerConfig { mht: Some(MhtConfig { birth_density_per_px2, ..MhtConfig::default() }), ..with });
+            out.push(TrackerConfig {
+                mht: Some(MhtConfig { new_target_density_per_px2, ..MhtConfig::default() }),
+                ..with
+            });
         }
     }
     out

@@ -1,0 +1,35 @@
+//! Time of a tracker: the step from scan to scan, refused where it runs back, and the usual interval.
+
+use super::scan_interval::ScanInterval;
+use crate::{Error, ErrorKind, Result, Scan, Timestamp};
+
+/// When the newest scan was, and how far scans usually lie apart.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Clock {
+    last: Option<Timestamp>,
+    pub interval: ScanInterval,
+}
+
+impl Clock {
+    /// Time since the scan before, s; nothing at the first scan.
+    /// # Errors
+    /// A scan before the last one.
+    pub fn step_s(&self, scan: &Scan) -> Result<Option<f64>> {
+        let Some(last) = self.last else { return Ok(None) };
+        if scan.time < last {
+            let what = format!("time runs back: {} ns after {} ns", scan.time.ns, last.ns);
+            return Err(Error::new(ErrorKind::Damaged, what)
+                .at(format!("frame {}", scan.index.0))
+                .hint("sort the scans by time before tracking"));
+        }
+        Ok(Some(scan.time.seconds_since(last)))
+    }
+
+    /// Takes a scan in, `step_s` after the one before.
+    pub fn advance(&mut self, now: Timestamp, step_s: Option<f64>) {
+        if let Some(step_s) = step_s {
+            self.interval.note(step_s);
+        }
+        self.last = Some(now);
+    }
+}

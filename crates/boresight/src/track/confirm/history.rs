@@ -1,0 +1,79 @@
+//! What a confirmation rule remembers of one track, and what one scan says of it.
+//!
+//! Symbols: Λ likelihood ratio of a scan, target against clutter (no unit).
+//! Limits: the 64 newest scans.
+
+/// What a confirmation rule remembers of one track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct History {
+    /// Hits (1) and misses (0), the newest in the lowest bit.
+    pub(super) hits: u64,
+    /// Track score (ln Λ summed), or the odds that the target exists; by the rule.
+    pub(super) value: f64,
+    /// Largest score so far.
+    pub(super) best: f64,
+    /// Time of the last detection that was the track's own, ns.
+    pub last_hit_ns: i64,
+    /// Time of the last detection that was merged with another track's, ns.
+    pub last_merged_ns: i64,
+    /// Time of the initiation, ns.
+    pub initiated_ns: i64,
+    /// Misses in a row.
+    pub misses: u32,
+    /// Scans remembered, at most 64.
+    pub(super) scans: u8,
+    /// Whether the rule holds the track for confirmed. It then chooses its detections before tentative tracks and coasts; whether it
+    /// is reported as confirmed is said by [`super::status`].
+    pub confirmed: bool,
+}
+
+impl History {
+    /// Time of the last detection, its own or merged, ns: coasting counts from here.
+    #[inline]
+    pub fn last_seen_ns(&self) -> i64 {
+        self.last_hit_ns.max(self.last_merged_ns)
+    }
+
+    /// Number of hits in the newest `n` scans.
+    #[inline]
+    pub(super) fn hits_in(&self, n: u32) -> u32 {
+        let newest = if n >= 64 { u64::MAX } else { (1 << n) - 1 };
+        (self.hits & newest).count_ones()
+    }
+
+    /// Takes one scan in.
+    #[inline]
+    pub(super) fn record(&mut self, evidence: Evidence, now_ns: i64) {
+        self.hits = (self.hits << 1) | u64::from(evidence.hit);
+        self.scans = self.scans.saturating_add(1).min(64);
+        if evidence.hit {
+            self.misses = 0;
+            *(if evidence.merged { &mut self.last_merged_ns } else { &mut self.last_hit_ns }) = now_ns;
+        } else {
+            self.misses = self.misses.saturating_add(1);
+        }
+    }
+}
+
+/// What one scan says of a track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    /// A detection was assigned.
+    pub hit: bool,
+    /// It is a merged measurement of several tracks: the track continues, but was not seen by itself.
+    pub merged: bool,
+    /// Λ of this scan.
+    pub likelihood_ratio: f64,
+}
+
+/// What becomes of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// It continues.
+    Keep,
+    /// It is deleted.
+    Delete,
+}
+
+/// Odds stay within these, so that no past, good or bad, outweighs a new scan for ever.
+pub(super) const ODDS: (f64, f64) = (1e-12, 1e12);

@@ -1,0 +1,139 @@
+//! The multiple-hypothesis tracker: predict, gate and grow, initiate, select, prune, report; one scan at a time.
+//!
+//! Source: T. Kurien, "Issues in the design of practical multitarget tracking algorithms", in *Multitarget-Multisensor
+//! Tracking*, 1990 (track-oriented form, N-scan pruning); S. S. Blackman, "Multiple hypothesis tracking for multiple target
+//! tracking", IEEE AES Magazine 19(1), 2004 (scores).
+//! Method: each target is a tree whose leaves are its possible histories; every scan each leaf grows by a miss and by its
+//! gated detections, and every detection may be a new target. The best set of compatible leaves (no detection used
+//! twice within the window) is the answer; leaves that disagree with it `n_scan` scans back are cut.
+//! Memory is bounded: `max_leaves` a tree and `max_hypotheses` in all; the selection has a budget of steps (`select`).
+//! Symbols: score = Σ ln(P_D l / λ) over hits + Σ ln(1 − P_D P_G) over misses, from ln(β_new / λ) at the start.
+//! Limits: `n_scan` ≤ 7. Targets start from one point whatever `initiation` says (its velocities hold); `merged-measurements` and
+//! `duplicate-s` have no effect here: compatible hypotheses share nothing.
+
+use super::super::association_cost::AssociationCost;
+use super::super::clock::Clock;
+use super::super::clutter::Clutter;
+use super::super::config::TrackerConfig;
+use super::super::scan_table::ScanTable;
+use super::super::step::context::Context;
+use super::super::step::delete::{coast_budget_s, expired_in_gap};
+use super::super::step::report::report;
+use super::super::tracking::Tracking;
+use super::config::MhtConfig;
+use super::grow::{Growth, grow, initiate};
+use super::hypothesis::Tree;
+use super::prune::prune;
+use super::select::Select;
+use crate::associate::Gates;
+use crate::{Result, Scan, Timestamp, TrackState};
+
+/// The multiple-hypothesis tracker.
+pub struct Mht {
+    config: TrackerConfig,
+    mht: MhtConfig,
+    gate: f64,
+    clock: Clock,
+    trees: Vec<Tree>,
+    next_id: u64,
+    clutter: Clutter,
+    cost: AssociationCost,
+    table: ScanTable,
+    gates: Gates,
+    select: Select,
+    /// Detections taken by confirmed tracks of the answer.
+    taken_by_confirmed: Vec<bool>,
+    states: Vec<TrackState>,
+}
+
+opaque_debug!(Mht);
+
+impl Mht {
+    /// Builds the tracker.
+    /// # Errors
+    /// A value of the configuration outside its range.
+    pub fn new(config: &TrackerConfig, mht: &MhtConfig) -> Result<Self> {
+        config.validate("tracker")?;
+        Ok(Self {
+            gate: config.gate(),
+            mht: mht.clone(),
+            clock: Clock::default(),
+            trees: Vec::new(),
+            next_id: 1,
+            clutter: Clutter::new(&config.clutter, config.clutter_density_per_px2),
+            cost: AssociationCost::new(&config.association_cost),
+            table: ScanTable::default(),
+            gates: Gates::new(),
+            select: Select::default(),
+            taken_by_confirmed: Vec::new(),
+            states: Vec::new(),
+            config: config.clone(),
+        })
+    }
+
+    /// Deletes hypotheses whose coasting budget ended during a gap before `now`.
+    fn delete_in_gap(&mut self, now: Timestamp) {
+        let (interval_s, budget_s) =
+            (self.clock.interval.interval_s(), coast_budget_s(&self.config, &self.clock.interval));
+        if interval_s > 0.0 {
+            for tree in &mut self.trees {
+                tree.leaves.retain(|l| !expired_in_gap(&l.track.history, now, budget_s, interval_s));
+            }
+            self.trees.retain(|t| !t.leaves.is_empty());
+        }
+    }
+
+    /// Notes which detections confirmed tracks of the answer took.
+    fn note_taken(&mut self, n_detections: usize) {
+        self.taken_by_confirmed.clear();
+        self.taken_by_confirmed.resize(n_detections, false);
+        for leaf in self.trees.iter().filter_map(Tree::answer) {
+            if let (true, Some(j)) = (leaf.track.history.confirmed, leaf.outcome.detection) {
+                self.taken_by_confirmed[j as usize] = true;
+            }
+        }
+    }
+
+    /// Reports the answer, in the order of the ids.
+    fn report(&mut self) {
+        self.states.clear();
+        for tree in &mut self.trees {
+            let Some(leaf) = tree.chosen.map(|c| &mut tree.leaves[c]) else { continue };
+            if tree.id == 0 {
+                tree.id = self.next_id;
+                self.next_id += 1;
+            }
+            leaf.track.id = tree.id;
+            self.states.push(report(&mut leaf.track, &leaf.outcome, &self.config, self.table.camera));
+        }
+        self.states.sort_by_key(|s| s.id);
+    }
+}
+
+impl Tracking for Mht {
+    fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
+        let step_s = self.clock.step_s(scan)?;
+        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_of_size)?;
+        if step_s.is_some() {
+            self.delete_in_gap(scan.time);
+        }
+        self.clock.advance(scan.time, step_s);
+        let dt_s = step_s.unwrap_or(0.0);
+        self.table.sort(scan);
+        let growth = Growth {
+            context: Context { scan, table: &self.table, config: &self.config, gate: self.gate },
+            mht: &self.mht,
+            cost: &self.cost,
+            clutter: &self.clutter,
+            coast_budget_s: coast_budget_s(&self.config, &self.clock.interval),
+        };
+        grow(&growth, dt_s, &mut self.trees, &mut self.gates)?;
+        initiate(&growth, &mut self.trees);
+        self.select.choose(&mut self.trees, self.mht.max_steps);
+        prune(&mut self.trees, self.mht.n_scan as usize);
+        self.note_taken(scan.detections.len());
+        self.clutter.learn(scan, &self.taken_by_confirmed, dt_s);
+        self.report();
+        Ok(&self.states)
+    }
+}

@@ -1,0 +1,147 @@
+//! A scan made ready for the tracker: checked, the extra noise added, sorted into a grid; and the predicted tracks beside it.
+//!
+//! Method: the noise of each detection is kept as three numbers, or once for all if they are equal; a grid over the positions hands
+//! out what lies in a rectangle.
+//! Limits: [`MOST_LOOKED_AT`] detections are looked at for one track, so that 10⁵ detections in one pixel cost bounded time.
+
+use crate::associate::UniformGrid;
+use crate::camera::CameraPath;
+use crate::{Detection, Error, ErrorKind, Result, Scan};
+use nalgebra::Matrix2;
+
+/// Candidates looked at per track before the search stops.
+pub const MOST_LOOKED_AT: usize = 4096;
+
+/// A detection's covariance with the extra noise, three numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// Variance along x, px².
+    pub xx: f64,
+    /// Covariance, px².
+    pub xy: f64,
+    /// Variance along y, px².
+    pub yy: f64,
+}
+
+impl Noise {
+    /// The covariance as a matrix.
+    #[inline]
+    pub fn matrix(&self) -> Matrix2<f64> {
+        Matrix2::new(self.xx, self.xy, self.xy, self.yy)
+    }
+}
+
+/// A track's predicted position and covariance, and how far it can have come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predicted {
+    /// Position, px.
+    pub x: f64,
+    /// Position, px.
+    pub y: f64,
+    /// Covariance H P Hᵀ, px².
+    pub cov: Noise,
+    /// Farthest distance from the prediction that the largest speed allows, px.
+    pub reach: f64,
+}
+
+/// A scan made ready for gating: checked, noise added, sorted into a grid.
+#[derive(Clone, Debug, Default)]
+pub struct ScanTable {
+    /// Noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
+    noise: Vec<Noise>,
+    /// Largest variances in the scan, px².
+    max_xx: f64,
+    max_yy: f64,
+    /// Half of the widest and of the tallest box, px.
+    pub largest_half_px: [f64; 2],
+    /// What the camera did over all scans so far.
+    pub camera: CameraPath,
+    grid: UniformGrid,
+}
+
+impl ScanTable {
+    /// Checks a scan and takes its noise; nothing else changes before the check is over.
+    /// # Errors
+    /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
+    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_of_size: f64) -> Result<()> {
+        self.noise.clear();
+        (self.max_xx, self.max_yy) = (0.0, 0.0);
+        self.largest_half_px = [0.0; 2];
+        for (i, d) in scan.detections.iter().enumerate() {
+            let extra = extra_noise_px * extra_noise_px + (extra_of_size * d.extent.height_px).powi(2);
+            let n = Noise {
+                xx: d.cov[(0, 0)] + extra,
+                xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
+                yy: d.cov[(1, 1)] + extra,
+            };
+            let e = &d.extent;
+            let sides = e.left_px + e.top_px + e.width_px + e.height_px;
+            let finite = (d.position.x + d.position.y + n.xx + n.xy + n.yy + sides).is_finite();
+            // Room for rounding: a covariance of rank one is a legal (if odd) measurement.
+            let sound = d.cov[(0, 0)] >= 0.0 && d.cov[(1, 1)] >= 0.0 && n.xy * n.xy <= n.xx * n.yy * (1.0 + 1e-9);
+            if !(finite && sound) {
+                return Err(refused(scan, i, d, finite));
+            }
+            self.largest_half_px[0] = self.largest_half_px[0].max(0.5 * e.width_px);
+            self.largest_half_px[1] = self.largest_half_px[1].max(0.5 * e.height_px);
+            if self.noise.len() == 1 && self.noise[0] == n {
+                continue;
+            }
+            self.max_xx = self.max_xx.max(n.xx);
+            self.max_yy = self.max_yy.max(n.yy);
+            if self.noise.len() == 1 && i > 1 {
+                let same = self.noise[0];
+                self.noise.resize(i, same);
+            }
+            self.noise.push(n);
+        }
+        self.camera.step(scan.camera_shift_px);
+        Ok(())
+    }
+
+    /// Noise of a detection.
+    #[inline]
+    pub fn noise(&self, detection: u32) -> Noise {
+        let at = if self.noise.len() == 1 { 0 } else { detection as usize };
+        self.noise[at]
+    }
+
+    /// Sorts the scan's detections into the grid.
+    pub fn sort(&mut self, scan: &Scan) {
+        self.grid.build(scan.detections.iter().map(|d| (d.position.x, d.position.y)));
+    }
+
+    /// The grid over the detections.
+    pub fn grid(&self) -> &UniformGrid {
+        &self.grid
+    }
+
+    /// Half the sides of the rectangle that holds a track's gate, px.
+    #[inline]
+    pub(super) fn half_sides(&self, track: &Predicted, gate: f64) -> (f64, f64) {
+        let half = |own: f64, largest: f64| (gate * (own + largest)).sqrt().min(track.reach);
+        (half(track.cov.xx, self.max_xx), half(track.cov.yy, self.max_yy))
+    }
+
+    /// Fetches ahead what gating a batch of tracks will read.
+    #[inline]
+    pub fn touch(&self, batch: &[Predicted], gate: f64) {
+        let mut sum = 0u32;
+        for track in batch {
+            let (half_x, half_y) = self.half_sides(track, gate);
+            sum = sum.wrapping_add(self.grid.touch(track.x, track.y, half_x, half_y));
+        }
+        std::hint::black_box(sum);
+    }
+}
+
+fn refused(scan: &Scan, i: usize, d: &Detection, finite: bool) -> Error {
+    let what = if finite {
+        format!("covariance {:?} is not positive semi-definite", d.cov.as_slice())
+    } else {
+        format!("position {:?}, covariance {:?} or box is not finite", d.position.as_slice(), d.cov.as_slice())
+    };
+    Error::new(ErrorKind::Damaged, what)
+        .at(format!("frame {}, detection {i}", scan.index.0))
+        .hint("drop such detections before tracking, or mend the detector that makes them")
+}

@@ -1,0 +1,112 @@
+//! Delete: when a track's coasting budget is over, and when two tracks are one.
+//!
+//! Source: docs/theory/track-management.md. What the confirmation rule deletes (tentative tracks, fallen scores) is in
+//! [`confirm`](super::super::confirm); here is what holds whatever the rule.
+//! Method: a track without detections coasts for a budget in seconds, at least some usual scan intervals. On merged measurements that fit
+//! another track better it is kept on a budget counted from the last detection of its own: two tracks on one target would take turns for
+//! ever. Of two tracks that follow the same detections for long enough the younger ends.
+
+use super::super::config::TrackerConfig;
+use super::super::confirm::history::History;
+use super::super::scan_interval::ScanInterval;
+use super::super::single_track::{Outcome, Track};
+use crate::Timestamp;
+
+/// How long a confirmed track may go without a detection, s.
+pub(in crate::track) fn coast_budget_s(config: &TrackerConfig, interval: &ScanInterval) -> f64 {
+    config.coast_s.max(interval.span_s(config.coast_scans))
+}
+
+/// Whether a track's coasting budget had ended before the scan at `now`, that is in scans which are missing. `interval_s` is the usual
+/// interval between scans, above 0.
+pub(in crate::track) fn expired_in_gap(history: &History, now: Timestamp, budget_s: f64, interval_s: f64) -> bool {
+    let missed_s = now.seconds_since(Timestamp::from_ns(history.last_seen_ns()));
+    // The newest scan in which the track can still be seen ends the budget, not the gap itself.
+    missed_s > 1e-9 && missed_s - interval_s >= budget_s - 1e-9
+}
+
+/// Whether a track's budget is over after a scan: of coasting if it missed, of merged measurements if it was secondary in one.
+#[inline]
+pub(in crate::track) fn budget_is_over(
+    history: &History,
+    secondary: bool,
+    now: Timestamp,
+    coast_budget_s: f64,
+    secondary_budget_s: f64,
+) -> bool {
+    if history.misses == 0 && !secondary {
+        return false;
+    }
+    // Without any detection it coasts from the last, its own or merged.
+    let (since_ns, longest_s) = if secondary {
+        (history.last_hit_ns, coast_budget_s.max(secondary_budget_s))
+    } else {
+        (history.last_seen_ns(), coast_budget_s)
+    };
+    now.seconds_since(Timestamp::from_ns(since_ns)) >= longest_s - 1e-9
+}
+
+/// Whether the track has followed the same detections as an older one for `longest_s`; `owned` says which detections older tracks follow.
+pub(in crate::track) fn is_lasting_duplicate(
+    track: &mut Track,
+    owned: &mut [bool],
+    outcome: &Outcome,
+    now: Timestamp,
+    longest_s: f64,
+) -> bool {
+    let Some(j) = outcome.detection else { return false };
+    if !std::mem::replace(&mut owned[j as usize], true) {
+        track.duplicate_since_ns = None;
+        return false;
+    }
+    let since = *track.duplicate_since_ns.get_or_insert(now.ns);
+    now.seconds_since(Timestamp::from_ns(since)) >= longest_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::confirm::rule::ConfirmationConfig;
+    use super::*;
+
+    const S: i64 = 1_000_000_000;
+
+    /// A track last seen by itself at 1 s and in a merged measurement at 3 s, with `misses` since.
+    fn history(misses: u32) -> History {
+        let mut h = ConfirmationConfig::default().begin(1, 0, 1e-5, 1.0);
+        (h.last_hit_ns, h.last_merged_ns, h.misses) = (S, 3 * S, misses);
+        h
+    }
+
+    #[test]
+    fn a_missed_track_coasts_from_its_last_detection_merged_or_not() {
+        let over = |ns: i64| budget_is_over(&history(1), false, Timestamp::from_ns(ns), 2.0, 9.0);
+        assert!(!over(5 * S - 10) && over(5 * S));
+        assert!(!budget_is_over(&history(0), false, Timestamp::from_ns(99 * S), 2.0, 9.0), "seen in this scan");
+    }
+
+    #[test]
+    fn a_secondary_track_is_kept_from_its_last_own_detection_for_the_longer_budget() {
+        let over = |s: i64, coast_s, secondary_s| {
+            budget_is_over(&history(0), true, Timestamp::from_ns(s * S), coast_s, secondary_s)
+        };
+        assert!(!over(4, 2.0, 4.0) && over(5, 2.0, 4.0));
+        assert!(!over(6, 6.0, 4.0) && over(7, 6.0, 4.0));
+    }
+
+    #[test]
+    fn a_gap_ends_a_track_whose_budget_ended_before_its_last_scan() {
+        let expired = |s: f64| expired_in_gap(&history(0), Timestamp::from_secs_f64(s), 2.0, 0.5);
+        assert!(!expired(5.4) && expired(5.5));
+    }
+
+    #[test]
+    fn the_coasting_budget_is_the_longer_of_seconds_and_scans() {
+        let mut interval = ScanInterval::default();
+        (0..9).for_each(|_| interval.note(0.25));
+        let budget = |coast_s, coast_scans| {
+            coast_budget_s(&TrackerConfig { coast_s, coast_scans, ..TrackerConfig::default() }, &interval)
+        };
+        assert_eq!(budget(2.0, 4), 2.0);
+        assert!((budget(0.5, 4) - 1.0).abs() < 1e-8);
+    }
+}
