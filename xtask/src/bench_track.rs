@@ -79,23 +79,16 @@ fn scene(n: usize, clutter: f64) -> Result<Scene> {
             points.push(place(&mut rng));
         }
         points.shuffle(&mut rng);
-        let detection = |p: &Vector2<f64>| Detection {
-            position: *p,
-            cov: Matrix2::identity(),
-            extent: Extent { left_px: p.x - 10.0, top_px: p.y - 10.0, width_px: 20.0, height_px: 20.0 },
-            area_px: 400,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
+        let detection = |p: &Vector2<f64>| {
+            Detection::at(*p, Matrix2::identity())
+                .with_extent(Extent { left_px: p.x - 10.0, top_px: p.y - 10.0, width_px: 20.0, height_px: 20.0 })
+                .with_area_px(400)
         };
         truth.push(now);
-        scans.push(Scan {
-            index: FrameIndex(k as u64),
-            time: Timestamp::from_secs_f64(k as f64),
-            detections: points.iter().map(detection).collect(),
-            ..Scan::default()
-        });
+        scans.push(
+            Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(k as f64))
+                .with_detections(points.iter().map(detection).collect()),
+        );
     }
     Ok(Scene { truth, scans, clutter_density: clutter * n as f64 / (side * side) })
 }

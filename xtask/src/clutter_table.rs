@@ -9,7 +9,7 @@ use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
 use boresight::track::{
     self, ConfirmationConfig, ExistenceConfig, MOfNConfig, MergedMeasurementsConfig, MhtConfig, TrackerConfig,
 };
-use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackState};
+use boresight::{Detection, FrameIndex, Scan, Timestamp, TrackState};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -146,20 +146,6 @@ fn share_lost(config: &TrackerConfig, p_d: f64, lambda: f64, blackout: bool, arg
 }
 
 pub fn scan_of(k: u64, points: &[Vector2<f64>]) -> Scan {
-    let detection = |p: &Vector2<f64>| Detection {
-        position: *p,
-        cov: Matrix2::identity() * SIGMA * SIGMA,
-        extent: Extent::default(),
-        area_px: 1,
-        peak: 1.0,
-        sum: 1.0,
-        score: 1.0,
-        class: None,
-    };
-    Scan {
-        index: FrameIndex(k),
-        time: Timestamp::from_secs_f64(k as f64),
-        detections: points.iter().map(detection).collect(),
-        ..Scan::default()
-    }
+    let detection = |p: &Vector2<f64>| Detection::at(*p, Matrix2::identity() * SIGMA * SIGMA);
+    Scan::at(FrameIndex(k), Timestamp::from_secs_f64(k as f64)).with_detections(points.iter().map(detection).collect())
 }

@@ -10,7 +10,7 @@ use boresight::track::{
     self, ConfirmationConfig, FilterConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, ModelConfig,
     OnePointConfig, TrackerConfig,
 };
-use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};
+use boresight::{Detection, FrameIndex, Scan, Timestamp};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -65,22 +65,9 @@ fn link(frames: &Frames, config: &TrackerConfig, rate_hz: f64) -> Result<Vec<Vec
     let mut tracker = track::build(config)?;
     let mut out = Vec::new();
     for (k, rows) in frames.iter().enumerate() {
-        let detection = |r: &(u64, Vector2<f64>)| Detection {
-            position: r.1,
-            cov: Matrix2::identity() * 0.09,
-            extent: Extent::default(),
-            area_px: 1,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
-        };
-        let scan = Scan {
-            index: FrameIndex(k as u64),
-            time: Timestamp::from_secs_f64(k as f64 / rate_hz),
-            detections: rows.iter().map(detection).collect(),
-            ..Scan::default()
-        };
+        let detection = |r: &(u64, Vector2<f64>)| Detection::at(r.1, Matrix2::identity() * 0.09);
+        let scan = Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(k as f64 / rate_hz))
+            .with_detections(rows.iter().map(detection).collect());
         let mut ids = vec![0; rows.len()];
         for s in tracker.step(&scan)? {
             if let Some(j) = s.detection {

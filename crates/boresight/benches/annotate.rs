@@ -33,15 +33,11 @@ fn scenes(n: u64, width: usize, height: usize) -> Vec<Scene> {
                 let (w, h) = (width as f64, height as f64);
                 ((t as f64 * 137.0 + k as f64 * 3.0) % w, (t as f64 * 71.0 + k as f64 * 2.0) % h)
             };
-            let detection = |t| Detection {
-                position: Vector2::new(at(t).0, at(t).1),
-                cov: Matrix2::identity(),
-                extent: Extent::default(),
-                area_px: 9,
-                peak: 200.0,
-                sum: 1000.0,
-                score: 1.0,
-                class: None,
+            let detection = |t| {
+                Detection::at(Vector2::new(at(t).0, at(t).1), Matrix2::identity())
+                    .with_area_px(9)
+                    .with_peak(200.0)
+                    .with_sum(1000.0)
             };
             let track = |t| TrackState {
                 id: TrackId(t + 1),
@@ -57,12 +53,7 @@ fn scenes(n: u64, width: usize, height: usize) -> Vec<Scene> {
             };
             Scene {
                 frame: Frame { index: FrameIndex(k), time, pixels: pixels.unwrap() },
-                scan: Scan {
-                    index: FrameIndex(k),
-                    time,
-                    detections: (0..50).map(detection).collect(),
-                    ..Scan::default()
-                },
+                scan: Scan::at(FrameIndex(k), time).with_detections((0..50).map(detection).collect()),
                 tracks: (0..50).map(track).collect(),
             }
         })

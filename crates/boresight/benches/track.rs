@@ -37,22 +37,13 @@ fn scans(n: usize) -> Vec<Scan> {
                 *p += *v;
             }
             points.extend((0..n / 10).map(|_| Vector2::new(rng.random_range(0.0..side), rng.random_range(0.0..side))));
-            let detection = |p: &Vector2<f64>| Detection {
-                position: *p,
-                cov: Matrix2::identity(),
-                extent: Extent { left_px: p.x - 5.0, top_px: p.y - 5.0, width_px: 10.0, height_px: 10.0 },
-                area_px: 100,
-                peak: 1.0,
-                sum: 1.0,
-                score: 1.0,
-                class: None,
+            let detection = |p: &Vector2<f64>| {
+                Detection::at(*p, Matrix2::identity())
+                    .with_extent(Extent { left_px: p.x - 5.0, top_px: p.y - 5.0, width_px: 10.0, height_px: 10.0 })
+                    .with_area_px(100)
             };
-            Scan {
-                index: FrameIndex(k as u64),
-                time: Timestamp::from_secs_f64(k as f64),
-                detections: points.iter().map(detection).collect(),
-                ..Scan::default()
-            }
+            Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(k as f64))
+                .with_detections(points.iter().map(detection).collect())
         })
         .collect()
 }

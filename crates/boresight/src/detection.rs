@@ -20,8 +20,16 @@ pub struct Extent {
     pub height_px: f64,
 }
 
-/// One detected thing in one frame.
+impl Extent {
+    /// A box of this size (px) around a position.
+    pub fn around(centre: Vector2<f64>, width_px: f64, height_px: f64) -> Self {
+        Self { left_px: centre.x - 0.5 * width_px, top_px: centre.y - 0.5 * height_px, width_px, height_px }
+    }
+}
+
+/// One detected thing in one frame; [`Detection::at`] makes one.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Detection {
     /// Centroid (x, y), px; the centre of the top-left pixel is (0, 0).
     pub position: Vector2<f64>,
@@ -41,8 +49,56 @@ pub struct Detection {
     pub class: Option<ClassId>,
 }
 
-/// All detections of one frame.
+impl Detection {
+    /// A point at `position` (px) with its covariance (px²): no size, one pixel, peak, sum and score 1, no class.
+    ///
+    /// ```
+    /// use boresight::boresight_filters::nalgebra::{Matrix2, Vector2};
+    /// use boresight::{Detection, Extent};
+    ///
+    /// let position = Vector2::new(20.5, 7.25);
+    /// let d = Detection::at(position, Matrix2::identity() * 0.04).with_extent(Extent::around(position, 5.0, 3.0)).with_score(0.9);
+    /// assert_eq!((d.extent.left_px, d.area_px), (18.0, 1));
+    /// ```
+    pub fn at(position: Vector2<f64>, cov: Matrix2<f64>) -> Self {
+        let extent = Extent::around(position, 0.0, 0.0);
+        Self { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None }
+    }
+
+    /// With this bounding box.
+    pub fn with_extent(self, extent: Extent) -> Self {
+        Self { extent, ..self }
+    }
+
+    /// With this number of pixels.
+    pub fn with_area_px(self, area_px: u32) -> Self {
+        Self { area_px, ..self }
+    }
+
+    /// With this strongest pixel value, counts.
+    pub fn with_peak(self, peak: f32) -> Self {
+        Self { peak, ..self }
+    }
+
+    /// With this sum of the pixel weights, counts.
+    pub fn with_sum(self, sum: f64) -> Self {
+        Self { sum, ..self }
+    }
+
+    /// With this confidence.
+    pub fn with_score(self, score: f32) -> Self {
+        Self { score, ..self }
+    }
+
+    /// With this class, or none.
+    pub fn with_class(self, class: Option<ClassId>) -> Self {
+        Self { class, ..self }
+    }
+}
+
+/// All detections of one frame; [`Scan::at`] makes one.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Scan {
     /// Number of the frame.
     pub index: FrameIndex,
@@ -52,4 +108,21 @@ pub struct Scan {
     pub detections: Vec<Detection>,
     /// How far the background moved in the image since the scan before (camera motion), px; `None` if it was not looked at.
     pub camera_shift_px: Option<Vector2<f64>>,
+}
+
+impl Scan {
+    /// A scan without detections.
+    pub fn at(index: FrameIndex, time: Timestamp) -> Self {
+        Self { index, time, detections: Vec::new(), camera_shift_px: None }
+    }
+
+    /// With these detections.
+    pub fn with_detections(self, detections: Vec<Detection>) -> Self {
+        Self { detections, ..self }
+    }
+
+    /// With how far the background moved since the scan before, px.
+    pub fn with_camera_shift_px(self, camera_shift_px: Option<Vector2<f64>>) -> Self {
+        Self { camera_shift_px, ..self }
+    }
 }

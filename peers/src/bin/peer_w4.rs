@@ -31,15 +31,10 @@ impl Job for W4 {
             scan.index = FrameIndex(k as u64);
             scan.time = Timestamp::from_secs_f64(k as f64);
             scan.detections.clear();
-            scan.detections.extend(points.iter().map(|p| Detection {
-                position: *p,
-                cov: Matrix2::identity() * self.sigma * self.sigma,
-                extent: Extent { left_px: p.x - 10.0, top_px: p.y - 10.0, width_px: 20.0, height_px: 20.0 },
-                area_px: 400,
-                peak: 1.0,
-                sum: 1.0,
-                score: 1.0,
-                class: None,
+            scan.detections.extend(points.iter().map(|p| {
+                Detection::at(*p, Matrix2::identity() * self.sigma * self.sigma)
+                    .with_extent(Extent { left_px: p.x - 10.0, top_px: p.y - 10.0, width_px: 20.0, height_px: 20.0 })
+                    .with_area_px(400)
             }));
             let Ok(states) = tracker.step(&scan) else { return };
             for s in states.iter().filter(|s| s.status != TrackStatus::Tentative) {

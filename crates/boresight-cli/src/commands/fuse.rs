@@ -219,7 +219,7 @@ fn together(
 fn write(path: &Path, frames: &[(f64, Vec<TrackState>)], numbers: &[u64]) -> boresight::Result<()> {
     let mut out = TracksCsv::create(path)?;
     for (k, (time_s, tracks)) in numbers.iter().zip(frames) {
-        let scan = Scan { index: FrameIndex(*k), time: Timestamp::from_secs_f64(*time_s), ..Scan::default() };
+        let scan = Scan::at(FrameIndex(*k), Timestamp::from_secs_f64(*time_s));
         out.put(&View { frame: None, scan: &scan, tracks })?;
     }
     Box::new(out).finish()

@@ -93,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut n_frames, mut n_boxes) = (0u64, 0usize);
     while let Some(frame) = source.next_frame()? {
         frames.put(&frame)?;
-        let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
+        let scan = Scan::at(frame.index, frame.time);
         truth.put(&View { frame: None, scan: &scan, tracks: source.truth() })?;
         for t in source.truth() {
             let [l, top, w, h] = mot_box_of_extent(&t.extent);

@@ -108,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut out = TracksCsv::create(&args.output)?;
     for frame in frames.values() {
-        let scan = Scan { index: frame.index, time: frame.time, ..Scan::default() };
+        let scan = Scan::at(frame.index, frame.time);
         out.put(&View { frame: None, scan: &scan, tracks: &frame.tracks })?;
     }
     Box::new(out).finish()?;

@@ -82,7 +82,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Box::new(TracksCsv::create(&args.output)?)
     };
     for s in scans.iter().filter(|s| !s.tracks.is_empty()) {
-        let scan = Scan { index: s.index, time: s.time, ..Scan::default() };
+        let scan = Scan::at(s.index, s.time);
         out.put(&View { frame: None, scan: &scan, tracks: &s.tracks })?;
     }
     out.finish()?;

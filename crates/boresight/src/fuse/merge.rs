@@ -47,7 +47,7 @@ pub fn merge_scans(sensors: &[SensorScans<'_>]) -> (Vec<Scan>, Vec<usize>) {
                 .filter_map(|d| s.map.detection(d))
                 .map(|d| s.registration.detection(&d))
                 .collect();
-            all.push((time, i, Scan { time, detections, ..Scan::default() }));
+            all.push((time, i, Scan::at(FrameIndex::default(), time).with_detections(detections)));
         }
     }
     all.sort_by_key(|(time, i, _)| (*time, *i));
@@ -63,17 +63,11 @@ mod tests {
     use nalgebra::Matrix2;
 
     fn scans(times: &[f64], x: f64) -> Vec<Scan> {
-        let d = Detection {
-            position: Vector2::new(x, 0.0),
-            cov: Matrix2::new(4.0, 0.0, 0.0, 1.0),
-            extent: Extent { left_px: x - 1.0, top_px: -1.0, width_px: 2.0, height_px: 2.0 },
-            area_px: 4,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
-        };
-        let one = |t: &f64| Scan { time: Timestamp::from_secs_f64(*t), detections: vec![d.clone()], ..Scan::default() };
+        let d = Detection::at(Vector2::new(x, 0.0), Matrix2::new(4.0, 0.0, 0.0, 1.0))
+            .with_extent(Extent { left_px: x - 1.0, top_px: -1.0, width_px: 2.0, height_px: 2.0 })
+            .with_area_px(4);
+        let one =
+            |t: &f64| Scan::at(FrameIndex::default(), Timestamp::from_secs_f64(*t)).with_detections(vec![d.clone()]);
         times.iter().map(one).collect()
     }
 

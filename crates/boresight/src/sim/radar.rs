@@ -12,7 +12,7 @@
 
 use super::radar_config::{Measures, RadarConfig};
 use super::random::{Purpose, Seed};
-use crate::{Detection, Extent, FrameIndex, Result, Scan, Timestamp, TrackId, TrackState};
+use crate::{Detection, FrameIndex, Result, Scan, Timestamp, TrackId, TrackState};
 use boresight_filters::converted::{Polar, converted};
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
@@ -120,7 +120,7 @@ impl Radar {
         let (detections, plots) = found.into_iter().map(|(_, d, p)| (d, p)).unzip();
         let time = Timestamp::from_secs_f64(clock);
         Ok(RadarScan {
-            scan: Scan { index: FrameIndex(number), time, detections, ..Scan::default() },
+            scan: Scan::at(FrameIndex(number), time).with_detections(detections),
             plots,
             arrival: Timestamp::from_secs_f64(clock + self.config.delay_s),
         })
@@ -154,8 +154,7 @@ impl Radar {
                 (m.position, m.cov, [range, azimuth_rad])
             }
         };
-        let extent = Extent { left_px: position.x, top_px: position.y, width_px: 0.0, height_px: 0.0 };
-        Ok((Detection { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None }, polar))
+        Ok((Detection::at(position, cov), polar))
     }
 }
 
@@ -185,6 +184,7 @@ fn between(t0: f64, old: &[TrackState], t1: f64, new: &[TrackState], t: f64) -> 
 mod tests {
     use super::super::radar_config::PolarErrors;
     use super::*;
+    use crate::Extent;
     use crate::TrackStatus;
     use boresight_filters::Gaussian;
     use nalgebra::{Matrix4, Vector4};

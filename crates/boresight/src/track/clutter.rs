@@ -163,21 +163,12 @@ fn cell(x: f64, y: f64, side: f64) -> (i64, i64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Detection;
+    use crate::{Detection, FrameIndex, Timestamp};
     use nalgebra::{Matrix2, Vector2};
 
     fn scan(points: &[(f64, f64)]) -> Scan {
-        let detection = |p: &(f64, f64)| Detection {
-            position: Vector2::new(p.0, p.1),
-            cov: Matrix2::identity(),
-            extent: Default::default(),
-            area_px: 1,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
-        };
-        Scan { detections: points.iter().map(detection).collect(), ..Scan::default() }
+        let detection = |p: &(f64, f64)| Detection::at(Vector2::new(p.0, p.1), Matrix2::identity());
+        Scan::at(FrameIndex::default(), Timestamp::default()).with_detections(points.iter().map(detection).collect())
     }
 
     #[test]

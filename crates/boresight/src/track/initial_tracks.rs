@@ -76,25 +76,17 @@ impl InitialTrackConfig {
 mod tests {
     use super::*;
     use crate::track::{MhtConfig, TrackerConfig, build};
-    use crate::{Detection, Extent, Scan, Timestamp, TrackStatus};
+    use crate::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
     use nalgebra::{Matrix2, Vector2};
 
     fn scan(k: i64, at: Option<f64>) -> Scan {
-        let detections = at.map(|x| Detection {
-            position: Vector2::new(x, 5.0),
-            cov: Matrix2::identity() * 0.1,
-            extent: Extent { left_px: x - 2.0, top_px: 3.0, width_px: 4.0, height_px: 4.0 },
-            area_px: 16,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
+        let detections = at.map(|x| {
+            Detection::at(Vector2::new(x, 5.0), Matrix2::identity() * 0.1)
+                .with_extent(Extent { left_px: x - 2.0, top_px: 3.0, width_px: 4.0, height_px: 4.0 })
+                .with_area_px(16)
         });
-        Scan {
-            time: Timestamp::from_ns(k * 1_000_000_000),
-            detections: detections.into_iter().collect(),
-            ..Scan::default()
-        }
+        Scan::at(FrameIndex::default(), Timestamp::from_ns(k * 1_000_000_000))
+            .with_detections(detections.into_iter().collect())
     }
 
     fn config() -> TrackerConfig {

@@ -59,23 +59,17 @@ mod tests {
     fn scan(k: u64, points: &[(f64, f64)], shift: Option<(f64, f64)>) -> Scan {
         let detections = points
             .iter()
-            .map(|&(x, y)| Detection {
-                position: Vector2::new(x, y),
-                cov: Matrix2::identity() * 0.1,
-                extent: Extent { left_px: x - 2.0, top_px: y - 2.0, width_px: 4.0, height_px: 4.0 },
-                area_px: 16,
-                peak: 1.0,
-                sum: 16.0,
-                score: 10.0,
-                class: None,
+            .map(|&(x, y)| {
+                Detection::at(Vector2::new(x, y), Matrix2::identity() * 0.1)
+                    .with_extent(Extent { left_px: x - 2.0, top_px: y - 2.0, width_px: 4.0, height_px: 4.0 })
+                    .with_area_px(16)
+                    .with_sum(16.0)
+                    .with_score(10.0)
             })
             .collect();
-        Scan {
-            index: FrameIndex(k),
-            time: Timestamp::from_secs_f64(k as f64 * 0.04),
-            detections,
-            camera_shift_px: shift.map(|(x, y)| Vector2::new(x, y)),
-        }
+        Scan::at(FrameIndex(k), Timestamp::from_secs_f64(k as f64 * 0.04))
+            .with_detections(detections)
+            .with_camera_shift_px(shift.map(|(x, y)| Vector2::new(x, y)))
     }
 
     #[test]

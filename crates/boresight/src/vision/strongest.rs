@@ -46,21 +46,17 @@ impl Strongest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Extent;
     use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
 
     /// Detections of these scores whose area is their number.
     fn detections(scores: &[u8]) -> Vec<Detection> {
-        let one = |(i, s): (usize, &u8)| Detection {
-            position: Vector2::zeros(),
-            cov: Matrix2::identity(),
-            extent: Extent::default(),
-            area_px: i as u32,
-            peak: 0.0,
-            sum: 0.0,
-            score: f32::from(*s),
-            class: None,
+        let one = |(i, s): (usize, &u8)| {
+            Detection::at(Vector2::zeros(), Matrix2::identity())
+                .with_area_px(i as u32)
+                .with_peak(0.0)
+                .with_sum(0.0)
+                .with_score(f32::from(*s))
         };
         scores.iter().enumerate().map(one).collect()
     }

@@ -84,7 +84,7 @@ fn circling(k: u64) -> Scan {
     detections.push(round(1.0, 40.0, 400.0, 300.0));
     detections.push(round(-1.0, 40.0, 404.0, 300.0));
     detections.extend((0..5).map(|i| detection(f64::from(i) * 211.0, 500.0 + 31.0 * ((k + i as u64) % 3) as f64)));
-    Scan { index: FrameIndex(k), time: Timestamp::from_ns(k as i64 * 40_000_000), detections, ..Scan::default() }
+    Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64 * 40_000_000)).with_detections(detections)
 }
 
 #[test]
@@ -119,12 +119,7 @@ fn a_living_track_takes_no_memory_whatever_its_filter() {
         let mut tracker = track::build(&config).unwrap();
         let scan = |k: u64| {
             let detections = vec![detection(10.0 + 0.2 * k as f64, 20.0 + 0.1 * k as f64)];
-            Scan {
-                index: FrameIndex(k),
-                time: Timestamp::from_ns(k as i64 * 40_000_000),
-                detections,
-                ..Scan::default()
-            }
+            Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64 * 40_000_000)).with_detections(detections)
         };
         let scans: Vec<Scan> = (0..100).map(scan).collect();
         for scan in &scans[..60] {

@@ -42,8 +42,7 @@ fn at(path: &[[f64; 3]], t: f64) -> Option<Vector2<f64>> {
 }
 
 fn point(position: Vector2<f64>, cov: nalgebra::Matrix2<f64>) -> Detection {
-    let extent = Extent { left_px: position.x, top_px: position.y, width_px: 0.0, height_px: 0.0 };
-    Detection { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None }
+    Detection::at(position, cov)
 }
 
 fn run(config: &TrackerConfig, scans: &[Scan]) -> Vec<Timeline> {
@@ -64,7 +63,7 @@ fn the_solent_radars_azimuth_bias_is_found_from_ais_and_taken_away() {
         let k = ((t - start) / 2.4).floor();
         if scans.last().is_none_or(|s| s.index.0 != k as u64) {
             let time = Timestamp::from_secs_f64(start + 2.4 * (k + 0.5));
-            scans.push(Scan { index: FrameIndex(k as u64), time, ..Scan::default() });
+            scans.push(Scan::at(FrameIndex(k as u64), time));
         }
         // Azimuth runs clockwise from north.
         let polar = Polar {

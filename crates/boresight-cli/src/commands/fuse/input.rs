@@ -63,7 +63,10 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
     let scans: Vec<Scan> = table
         .scans
         .into_iter()
-        .map(|s| Scan { detections: s.detections.iter().filter_map(|d| map.detection(d)).collect(), ..s })
+        .map(|s| {
+            let detections = s.detections.iter().filter_map(|d| map.detection(d)).collect();
+            s.with_detections(detections)
+        })
         .collect();
     let config = tracker_of(&scans, table.rate_hz, config);
     let states = run_tracker(&config, &scans)?;

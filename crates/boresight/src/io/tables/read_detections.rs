@@ -243,16 +243,12 @@ mod tests {
             |(x, y, vx, vy, rho, size, area_px, peak, sum)| {
                 let xy = rho * (vx * vy).sqrt();
                 let peak = if peak.is_finite() { peak } else { 0.0 };
-                Detection {
-                    position: Vector2::new(x, y),
-                    cov: Matrix2::new(vx, xy, xy, vy),
-                    extent: Extent { left_px: x - 0.3, top_px: y - 0.7, width_px: size, height_px: size / 3.0 },
-                    area_px,
-                    peak,
-                    sum,
-                    score: peak,
-                    class: None,
-                }
+                Detection::at(Vector2::new(x, y), Matrix2::new(vx, xy, xy, vy))
+                    .with_extent(Extent { left_px: x - 0.3, top_px: y - 0.7, width_px: size, height_px: size / 3.0 })
+                    .with_area_px(area_px)
+                    .with_peak(peak)
+                    .with_sum(sum)
+                    .with_score(peak)
             },
         )
     }
@@ -270,7 +266,7 @@ mod tests {
                 .into_iter()
                 .enumerate()
                 .map(|(i, detections)| {
-                    Scan { index: FrameIndex(i as u64), time: Timestamp::from_ns(i as i64 * step), detections, ..Scan::default() }
+                    Scan::at(FrameIndex(i as u64), Timestamp::from_ns(i as i64 * step)).with_detections(detections)
                 })
                 .collect();
             for scan in &scans {

@@ -178,7 +178,7 @@ fn best_share(shares: &[Share]) -> Option<Share> {
 mod tests {
     use crate::associate::AssociatorConfig;
     use crate::track::{InitialTrackConfig, TrackerConfig, build};
-    use crate::{Detection, Extent, Scan, Timestamp};
+    use crate::{Detection, FrameIndex, Scan, Timestamp};
     use nalgebra::{Matrix2, Vector2};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -211,18 +211,10 @@ mod tests {
                 let mut places = if seen { vec![own] } else { Vec::new() };
                 let mut clutter = || truth[0] + Vector2::from_fn(|_, _| 40.0 * rng.random::<f64>() - 20.0);
                 places.extend((0..n_clutter).map(|_| clutter()));
-                let detection = |position: &Vector2<f64>| Detection {
-                    position: *position,
-                    cov: Matrix2::identity(),
-                    extent: Extent::default(),
-                    area_px: 1,
-                    peak: 1.0,
-                    sum: 1.0,
-                    score: 1.0,
-                    class: None,
-                };
+                let detection = |position: &Vector2<f64>| Detection::at(*position, Matrix2::identity());
                 let time = Timestamp::from_secs_f64(f64::from(k));
-                let scan = Scan { time, detections: places.iter().map(detection).collect(), ..Scan::default() };
+                let scan =
+                    Scan::at(FrameIndex::default(), time).with_detections(places.iter().map(detection).collect());
                 let states = tracker.step(&scan).unwrap();
                 if let Some(i) = states.first().and_then(|s| s.innovation.as_ref()).filter(|_| k > 2) {
                     sum += i.nis;

@@ -6,21 +6,12 @@ use boresight::track::{
     self, ConfirmationConfig, MOfNConfig, TrackerConfig, filter::constant_velocity::ConstantVelocityKf, scan_table,
     step::gate,
 };
-use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
+use boresight::{Detection, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 fn detection(x: f64, y: f64, cov: Matrix2<f64>) -> Detection {
-    Detection {
-        position: Vector2::new(x, y),
-        cov,
-        extent: Extent::default(),
-        area_px: 1,
-        peak: 1.0,
-        sum: 1.0,
-        score: 1.0,
-        class: None,
-    }
+    Detection::at(Vector2::new(x, y), cov)
 }
 
 #[test]
@@ -57,12 +48,8 @@ fn the_tracker_keeps_the_golden_tracks() {
         let mut tracker = track::build(&config).unwrap();
         assert_eq!(i["scans"].as_array().unwrap().len(), case["outputs"].as_array().unwrap().len(), "case {n}: scans");
         for (k, points) in i["scans"].as_array().unwrap().iter().enumerate() {
-            let scan = Scan {
-                index: FrameIndex(k as u64),
-                time: Timestamp::from_secs_f64(k as f64 * dt),
-                detections: rows(points).iter().map(|p| detection(p[0], p[1], Matrix2::identity() * r)).collect(),
-                ..Scan::default()
-            };
+            let scan = Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(k as f64 * dt))
+                .with_detections(rows(points).iter().map(|p| detection(p[0], p[1], Matrix2::identity() * r)).collect());
             let states = tracker.step(&scan).unwrap();
             let expected = case["outputs"][k].as_array().unwrap();
             let place = format!("case {n}, scan {k}");
@@ -114,8 +101,8 @@ fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
     for (n, case) in golden.cases.iter().enumerate() {
         let i = &case["inputs"];
         let r = square(&i["R"]);
-        let scan =
-            Scan { detections: rows(&i["Z"]).iter().map(|z| detection(z[0], z[1], r)).collect(), ..Scan::default() };
+        let scan = Scan::at(FrameIndex::default(), Timestamp::default())
+            .with_detections(rows(&i["Z"]).iter().map(|z| detection(z[0], z[1], r)).collect());
         let p = ConstantVelocityKf::new(&belief(i), 1.0).predicted();
         let track = scan_table::Predicted {
             x: p.mean.x,

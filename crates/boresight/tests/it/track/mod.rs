@@ -16,26 +16,18 @@ use nalgebra::{Matrix2, Vector2};
 
 /// A detection with a box of 8 px and a score that tells it from its neighbours.
 pub fn detection(x: f64, y: f64) -> Detection {
-    Detection {
-        position: Vector2::new(x, y),
-        cov: Matrix2::identity() * 0.25,
-        extent: Extent { left_px: x - 4.0, top_px: y - 4.0, width_px: 8.0, height_px: 8.0 },
-        area_px: 64,
-        peak: 100.0,
-        sum: 6400.0,
-        score: 0.9,
-        class: None,
-    }
+    Detection::at(Vector2::new(x, y), Matrix2::identity() * 0.25)
+        .with_extent(Extent { left_px: x - 4.0, top_px: y - 4.0, width_px: 8.0, height_px: 8.0 })
+        .with_area_px(64)
+        .with_peak(100.0)
+        .with_sum(6400.0)
+        .with_score(0.9)
 }
 
 /// A scan at 25 scans a second.
 pub fn scan(k: u64, points: &[(f64, f64)]) -> Scan {
-    Scan {
-        index: FrameIndex(k),
-        time: Timestamp::from_ns(k as i64 * 40_000_000),
-        detections: points.iter().map(|p| detection(p.0, p.1)).collect(),
-        ..Scan::default()
-    }
+    Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64 * 40_000_000))
+        .with_detections(points.iter().map(|p| detection(p.0, p.1)).collect())
 }
 
 /// Every associator.

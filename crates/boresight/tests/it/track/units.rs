@@ -5,7 +5,7 @@ use boresight::track::{
     ConfirmationConfig, ExistenceConfig, InitiationConfig, MergedMeasurementsConfig, MhtConfig, OnePointConfig,
     SprtConfig, TrackerConfig, build,
 };
-use boresight::{Detection, FrameIndex, Scan, Timestamp, TrackStatus};
+use boresight::{FrameIndex, Scan, Timestamp, TrackStatus};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -33,14 +33,12 @@ fn scans(u: Units) -> Vec<Scan> {
         places.extend((0..4).map(|_| Vector2::from_fn(|_, _| 100.0 * rng.random::<f64>())));
         let detection = |p: &Vector2<f64>| {
             let at = (p + Vector2::repeat(u.origin)) * u.length;
-            Detection { position: at, cov, ..super::detection(at.x, at.y) }
+            let mut d = super::detection(at.x, at.y);
+            d.cov = cov;
+            d
         };
-        Scan {
-            index: FrameIndex(k),
-            time: Timestamp::from_secs_f64(t * u.time),
-            detections: places.iter().map(detection).collect(),
-            ..Scan::default()
-        }
+        Scan::at(FrameIndex(k), Timestamp::from_secs_f64(t * u.time))
+            .with_detections(places.iter().map(detection).collect())
     };
     (0..30).map(one).collect()
 }
