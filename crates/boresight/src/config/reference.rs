@@ -2,7 +2,8 @@
 //!
 //! `cargo xtask docs` writes it to `docs/parameters.md`; a test fails when that file is out of date.
 
-use super::explain::{children, describe, is_choice, resolve, schema};
+use super::schema_tree::{children, describe, is_choice, resolve};
+use super::whole::schema;
 use serde_json::Value;
 use std::fmt::Write;
 
