@@ -231,3 +231,145 @@ where
 
     crate::filter::belief_of_the_filter_inside!();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Kf;
+    use crate::model::ConstantVelocity;
+    use nalgebra::Vector2;
+
+    fn predicted() -> Gaussian<2> {
+        Gaussian::new(Vector2::new(10.0, 20.0), Matrix2::new(1.0, 0.0, 0.0, 2.0))
+    }
+
+    fn seen(nu: [f64; 2], variance: f64) -> Measurement {
+        Measurement::new(predicted().mean + Vector2::from(nu), Matrix2::identity() * variance)
+    }
+
+    fn taught<const W: usize>(memory: Memory) -> [Option<Matrix2<f64>>; 3] {
+        let mut learner = NoiseLearner::<W>::new(AdaptiveConfig::measurement_noise(memory)).unwrap();
+        [[2.0, 1.0], [0.0, 3.0], [1.0, 1.0]].map(|nu| {
+            learner.learn(&predicted(), &seen(nu, 1.0)).unwrap();
+            learner.measurement_noise()
+        })
+    }
+
+    /// Samples ν νᵀ - P: [[3, 2], [2, -1]], [[-1, 0], [0, 7]], [[0, 1], [1, -1]].
+    #[test]
+    fn the_learnt_covariance_is_the_mean_of_the_samples() {
+        let first_two = Some(Matrix2::new(1.0, 1.0, 1.0, 3.0));
+        assert_eq!(taught::<0>(Memory::Recursive(2.0)), [None, first_two, Some(Matrix2::new(0.5, 1.0, 1.0, 1.0))]);
+        assert_eq!(taught::<2>(Memory::Windowed), [None, first_two, Some(Matrix2::new(-0.5, 0.5, 0.5, 3.0))]);
+        assert_eq!(taught::<0>(Memory::Recursive(2.5))[1], None);
+    }
+
+    fn used(nus: &[[f64; 2]], given: &Measurement) -> Measurement {
+        let mut learner = NoiseLearner::<0>::new(AdaptiveConfig::measurement_noise(Memory::Recursive(2.0))).unwrap();
+        for nu in nus {
+            learner.learn(&predicted(), &seen(*nu, 1.0)).unwrap();
+        }
+        learner.with_learnt_noise(given)
+    }
+
+    #[test]
+    fn the_learnt_covariance_keeps_a_floor_and_stays_regular() {
+        let given = seen([0.0, 0.0], 2.0);
+        assert_eq!(used(&[[2.0, 1.0]], &given), given, "too early");
+        let free = used(&[[2.0, 1.0], [0.0, 3.0]], &given).cov;
+        assert_eq!(free, Matrix2::new(1.0, 1.0, 1.0, 3.0));
+        // ν = 0 twice: the mean is -P; a tenth of 2 is the least.
+        assert_eq!(used(&[[0.0, 0.0]; 2], &given).cov, Matrix2::new(0.2, 0.0, 0.0, 0.2));
+        // ν = ±(3, 3): [[8, 9], [9, 7]] would be indefinite; 0.9 sqrt(56) is the most.
+        for sign in [1.0, -1.0] {
+            let tight = used(&[[3.0, sign * 3.0]; 2], &given).cov;
+            let most = sign * 0.9 * 56.0_f64.sqrt();
+            assert_eq!((tight[(0, 0)], tight[(1, 1)]), (8.0, 7.0));
+            assert!((tight[(0, 1)] - most).abs() < 1e-15 && tight[(0, 1)] == tight[(1, 0)]);
+        }
+    }
+
+    /// S = diag(2, 3); e^{γ} = 1.781072417990198.
+    #[test]
+    fn the_scale_moves_by_the_centred_logarithm_of_half_the_distance() {
+        let scale = |nu: [f64; 2], n: usize| {
+            let mut learner = NoiseLearner::<0>::new(AdaptiveConfig::process_noise(Memory::Recursive(2.0))).unwrap();
+            for _ in 0..n {
+                learner.learn(&predicted(), &seen(nu, 1.0)).unwrap();
+            }
+            assert_eq!(learner.with_learnt_noise(&seen(nu, 5.0)), seen(nu, 5.0), "R is not learnt");
+            learner.noise_scale()
+        };
+        let euler = 1.781_072_417_990_198_f64;
+        assert_eq!(scale([1.0, 1.0], 0), 1.0);
+        assert!((scale([2.0, 0.0], 1) - euler.powf(0.1)).abs() < 1e-15);
+        assert!((scale([2.0, 0.0], 2) - euler.powf(0.2)).abs() < 1e-15);
+        // d² counts up to 9 and half of it from 1e-6; the scale stays in 1e-6..=1e6.
+        assert!((scale([50.0, 0.0], 1) - (4.5 * euler).powf(0.1)).abs() < 1e-15);
+        assert!((scale([0.0, 0.0], 1) - (1e-6 * euler).powf(0.1)).abs() < 1e-15);
+        assert_eq!((scale([50.0, 0.0], 99), scale([0.0, 0.0], 99)), (1e6, 1e-6));
+    }
+
+    #[test]
+    fn a_configuration_out_of_range_is_refused() {
+        let with = |change: fn(&mut AdaptiveConfig)| {
+            let mut config = AdaptiveConfig::default();
+            change(&mut config);
+            (NoiseLearner::<0>::new(config).is_ok(), NoiseLearner::<1>::new(config).is_ok())
+        };
+        assert_eq!(with(|_| ()), (true, true));
+        assert_eq!(with(|c| c.memory = Memory::Windowed), (false, true));
+        assert_eq!(with(|c| (c.floor, c.scale_rate) = (0.0, 1.0)), (true, true));
+        assert_eq!(with(|c| (c.floor, c.scale_rate) = (1.0, 0.0)), (true, true));
+        let wrong: [fn(&mut AdaptiveConfig); 7] = [
+            |c| c.memory = Memory::Recursive(1.0),
+            |c| c.memory = Memory::Recursive(f64::INFINITY),
+            |c| c.memory = Memory::Recursive(f64::NAN),
+            |c| c.floor = -0.1,
+            |c| c.floor = 1.1,
+            |c| c.scale_rate = -0.1,
+            |c| c.scale_rate = 1.1,
+        ];
+        for change in wrong {
+            assert_eq!(with(change), (false, false));
+        }
+    }
+
+    #[test]
+    fn a_weighted_update_uses_the_learnt_noise_and_teaches_nothing() {
+        let first = Measurement::isotropic(0.0, 0.0, 1.0);
+        let model = Scaled::new(ConstantVelocity::discrete(0.5).unwrap());
+        let kf = Kf::<_, 4>::from_point(model, &first, 1.0).unwrap();
+        let mut f = Adaptive::<_, 0>::new(kf, AdaptiveConfig::measurement_noise(Memory::Recursive(2.0))).unwrap();
+        for x in [0.5, -2.0, 1.0] {
+            f.predict(0.5).unwrap();
+            f.correct(&Measurement::isotropic(x, x, 1.0)).unwrap();
+        }
+        let doubtful = Weighted { measurement: first, weight: 0.4 };
+        let mut twin = *f.inner();
+        let measurement = f.learner().with_learnt_noise(&first);
+        assert_ne!(measurement.cov, first.cov);
+        twin.correct_weighted([Weighted { measurement, ..doubtful }].into_iter()).unwrap();
+        let before = *f.learner();
+        f.correct_weighted([doubtful].into_iter()).unwrap();
+        assert_eq!((f.belief(), *f.learner()), (twin.belief(), before));
+    }
+
+    #[test]
+    fn an_update_sets_the_scale_of_the_next_prediction() {
+        let model = Scaled::new(ConstantVelocity::discrete(0.5).unwrap());
+        let kf = Kf::<_, 4>::from_point(model, &Measurement::isotropic(0.0, 0.0, 1.0), 1.0).unwrap();
+        let mut f = Adaptive::<_, 0>::new(kf, AdaptiveConfig::process_noise(Memory::Recursive(2.0))).unwrap();
+        f.predict(1.0).unwrap();
+        f.correct(&Measurement::isotropic(30.0, 0.0, 1.0)).unwrap();
+        let scale = f.learner().noise_scale();
+        assert!(scale > 1.2, "{scale}");
+        let (mut scaled, mut plain) = (f, *f.inner());
+        plain.model_mut().set_scale(1.0).unwrap();
+        scaled.predict(1.0).unwrap();
+        plain.predict(1.0).unwrap();
+        // Q of the velocity is 0.25 px²/s² a second.
+        let more = scaled.belief().cov[(1, 1)] - plain.belief().cov[(1, 1)];
+        assert!((more - 0.25 * (scale - 1.0)).abs() < 1e-12, "{more}");
+    }
+}

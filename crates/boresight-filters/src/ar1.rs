@@ -166,3 +166,77 @@ impl Filter for Ar1 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// α after the worked example of `docs/theory/adaptive.md`: 100, then 104.
+    const ALPHA: f64 = 108.159_584_041_6 / 104.0;
+
+    fn started() -> Ar1 {
+        Ar1::new(&Measurement::isotropic(100.0, 200.0, 0.5), 0.04).unwrap()
+    }
+
+    fn sure(x: f64, y: f64, std: f64) -> Weighted {
+        Weighted::sure(Measurement::isotropic(x, y, std))
+    }
+
+    #[test]
+    fn a_start_knows_the_measurement_and_no_velocity() {
+        let k = started().kinematics();
+        assert_eq!(k.mean, Vector4::new(100.0, 0.0, 200.0, 0.0));
+        // Two measurements 0.04 s apart: 2 r / dt².
+        assert!((k.cov[(1, 1)] - 0.5 / 0.0016).abs() < 1e-12 && k.cov[(0, 0)] == 0.25 && k.cov[(2, 2)] == 0.25);
+        let m = Measurement::isotropic(0.0, 0.0, 1.0);
+        for wrong in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            assert!(Ar1::new(&m, wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_prediction_is_a_mean_over_ten_and_grows_by_a_missed_frame() {
+        let mut f = started();
+        f.predict(0.04).unwrap();
+        // 4 r - r before anything is known.
+        assert_eq!(f.predicted().cov, Matrix2::from_diagonal_element(0.75));
+        assert_eq!(f.predicted().mean, Vector2::new(100.0, 200.0));
+        f.predict(0.04).unwrap();
+        assert_eq!(f.predicted().cov, Matrix2::from_diagonal_element(1.0));
+        f.update(&[sure(104.0, 200.0, 0.5)]).unwrap();
+        assert_eq!(f.predicted(), Gaussian::new(Vector2::new(104.0, 200.0), Matrix2::from_diagonal_element(0.25)));
+        let k = f.kinematics();
+        assert!((k.mean[1] - (ALPHA - 1.0) * 104.0 / 0.04).abs() < 1e-7, "{}", k.mean[1]);
+        f.predict(0.08).unwrap();
+        let k = f.kinematics();
+        assert!((k.mean[0] - 108.159_584_041_6).abs() < 1e-9);
+        assert!((k.mean[1] - (108.159_584_041_6 - 104.0) / 0.08).abs() < 1e-7);
+        assert!((k.cov[(1, 1)] - 0.5 / 0.0064).abs() < 1e-12);
+        // 5 r = 1.25, then a tenth of the way to 4²: 2.725, less r.
+        assert!((k.cov[(0, 0)] - 2.475).abs() < 1e-14, "{}", k.cov[(0, 0)]);
+        // No error at all: 1.25 - 0.125 - 0.25.
+        assert!((k.cov[(2, 2)] - 0.875).abs() < 1e-14, "{}", k.cov[(2, 2)]);
+    }
+
+    #[test]
+    fn doubtful_measurements_are_mixed_with_the_prediction() {
+        let mut f = started();
+        f.predict(0.04).unwrap();
+        let [near, far] = [sure(104.0, 200.0, 0.5), sure(110.0, 200.0, 1.0)];
+        f.update(&[Weighted { weight: 0.5, ..near }, Weighted { weight: 0.25, ..far }]).unwrap();
+        // 0.25 * 100 + 0.5 * 104 + 0.25 * 110, variance (0.5 * 0.25 + 0.25 * 1)/0.75.
+        assert_eq!(f.predicted().mean, Vector2::new(104.5, 200.0));
+        assert!((f.predicted().cov[(0, 0)] - 0.5).abs() < 1e-15);
+        let mut twin = Ar1Axis::new(100.0);
+        twin.observe(104.5);
+        assert_eq!(f.axes[0], twin);
+    }
+
+    #[test]
+    fn a_step_that_overflows_is_refused() {
+        let mut f = Ar1::new(&Measurement::isotropic(1e300, 0.0, 1.0), 0.04).unwrap();
+        let before = f;
+        assert!(f.update(&[sure(-1e300, 0.0, 1.0)]).is_err());
+        assert_eq!(f, before);
+    }
+}

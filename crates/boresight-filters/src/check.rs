@@ -87,3 +87,85 @@ pub(crate) fn check_weighted<T: Real>(
 pub(crate) fn check_strength<T: Real>(value: T, what: &'static str) -> Result<T, FilterError> {
     if value >= T::zero() && value <= T::MAX { Ok(value) } else { Err(FilterError::OutOfRange(what)) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+
+    fn measured(cov: Matrix2<f64>) -> Result<(), FilterError> {
+        check_measurement(&Measurement::new(Vector2::new(1.0, 2.0), cov))
+    }
+
+    #[test]
+    fn a_time_step_is_any_ordinary_number_of_at_least_0() {
+        assert!(check_dt(0.0).is_ok() && check_dt(f64::MAX).is_ok());
+        assert!(matches!(check_dt(-1e-300), Err(FilterError::OutOfRange(_))));
+        assert!(matches!(check_dt(f64::NEG_INFINITY), Err(FilterError::OutOfRange(_))));
+        assert!(matches!(check_dt(f64::INFINITY), Err(FilterError::NotFinite(_))));
+        assert!(matches!(check_dt(f64::NAN), Err(FilterError::NotFinite(_))));
+    }
+
+    #[test]
+    fn a_measurement_covariance_may_be_singular_but_not_indefinite() {
+        for fine in [Matrix2::zeros(), Matrix2::new(4.0, 6.0, 6.0, 9.0), Matrix2::new(4.0, -6.0, -6.0, 9.0)] {
+            assert!(measured(fine).is_ok(), "{fine}");
+        }
+        // 6 is sqrt(4 * 9): a part in 1e13 more is no rounding error.
+        let more = 6.0 * (1.0 + 1e-13);
+        let wrong = [
+            Matrix2::new(4.0, more, more, 9.0),
+            Matrix2::new(4.0, -more, -more, 9.0),
+            Matrix2::new(-4.0, 0.0, 0.0, 9.0),
+            Matrix2::new(4.0, 0.0, 0.0, -9.0),
+            Matrix2::new(-4.0, 1.0, 1.0, -9.0),
+            Matrix2::new(4.0, 1.0, 0.0, 9.0),
+            Matrix2::new(4.0, 0.0, 1.0, 9.0),
+        ];
+        for cov in wrong {
+            assert!(matches!(measured(cov), Err(FilterError::NotPositiveDefinite(_))), "{cov}");
+        }
+        assert!(matches!(measured(Matrix2::repeat(f64::NAN)), Err(FilterError::NotFinite(_))));
+        let nowhere = Measurement::isotropic(f64::NAN, 0.0, 1.0);
+        assert_eq!(check_measurement(&nowhere), Err(FilterError::NotFinite("the measured position")));
+    }
+
+    #[test]
+    fn a_belief_is_refused_for_the_part_that_is_wrong() {
+        let good = Gaussian::<2>::new(Vector2::new(1.0, 2.0), Matrix2::new(2.0, 0.5, 0.5, 0.0));
+        assert!(check_belief(&good).is_ok());
+        let mean = Gaussian { mean: Vector2::new(1.0, f64::INFINITY), ..good };
+        assert_eq!(check_belief(&mean), Err(FilterError::NotFinite("the state")));
+        let cov = Gaussian { cov: good.cov * f64::NAN, ..good };
+        assert_eq!(check_belief(&cov), Err(FilterError::NotFinite("the state covariance")));
+        for cov in [Matrix2::new(2.0, 0.5, 0.4, 1.0), Matrix2::new(2.0, 0.0, 0.0, -1e-12)] {
+            assert!(
+                matches!(check_belief(&Gaussian { cov, ..good }), Err(FilterError::NotPositiveDefinite(_))),
+                "{cov}"
+            );
+        }
+    }
+
+    #[test]
+    fn weights_sum_to_at_most_1_and_those_of_0_do_not_count() {
+        let of = |weights: &[f64]| {
+            let m = Measurement::isotropic(0.0, 0.0, 1.0);
+            check_weighted(weights.iter().map(|&weight| Weighted { measurement: m, weight }))
+        };
+        assert_eq!(of(&[]), Ok((0.0, 0)));
+        assert_eq!(of(&[0.25, 0.0, 0.5]), Ok((0.75, 2)));
+        assert!(of(&[1.0 + 32.0 * f64::EPSILON]).is_ok(), "a rounding error above 1");
+        for wrong in [&[1.0 + 1e-12][..], &[-1e-12], &[f64::NAN], &[0.5, 0.5, 1e-12]] {
+            assert!(matches!(of(wrong), Err(FilterError::OutOfRange(_))), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_strength_is_a_finite_number_of_at_least_0() {
+        assert_eq!(check_strength(0.0, "a strength"), Ok(0.0));
+        assert_eq!(check_strength(f64::MAX, "a strength"), Ok(f64::MAX));
+        for wrong in [-1e-300, f64::INFINITY, f64::NAN] {
+            assert_eq!(check_strength(wrong, "a strength"), Err(FilterError::OutOfRange("a strength")));
+        }
+    }
+}

@@ -133,3 +133,78 @@ impl<T: Real> GaussianFilter<4> for Displacement<T> {
         Gaussian { mean, cov }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+    fn kinematics() -> Gaussian<4> {
+        let cov = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 9.0, 0.0));
+        Gaussian::new(Vector4::new(10.0, 2.0, -5.0, 0.0), cov)
+    }
+
+    /// The place a frame ago is p - v dt: variance 4 + 0.5² and covariance 4 with the place now.
+    #[test]
+    fn velocity_becomes_the_place_a_frame_ago_and_back() {
+        let f = Displacement::from_kinematics(&kinematics(), 0.3, 0.5).unwrap();
+        let b = f.belief();
+        assert_eq!(b.mean, Vector4::new(10.0, 9.0, -5.0, -5.0));
+        assert_eq!((b.cov[(0, 0)], b.cov[(0, 1)], b.cov[(1, 1)], b.cov[(3, 3)]), (4.0, 4.0, 4.25, 9.0));
+        assert_eq!(f.kinematics(), kinematics());
+        assert_eq!(f.predicted(), Gaussian::new(Vector2::new(10.0, -5.0), Matrix2::new(4.0, 0.0, 0.0, 9.0)));
+        assert_eq!(f.position_at(), [0, 2]);
+    }
+
+    /// Two frames' time after one of 0.5 s: x + v, variance 4 + 1 + q.
+    #[test]
+    fn a_step_of_another_length_goes_on_with_the_same_velocity() {
+        let mut f = Displacement::from_kinematics(&kinematics(), 0.3, 0.5).unwrap();
+        f.predict(1.0).unwrap();
+        let b = f.belief();
+        assert!((b.mean - Vector4::new(12.0, 10.0, -5.0, -5.0)).norm() < 1e-14);
+        assert!((b.cov[(0, 0)] - 5.3).abs() < 1e-13 && (b.cov[(0, 1)] - 4.0).abs() < 1e-13 && b.cov[(1, 1)] == 4.0);
+        assert!((f.kinematics().mean[1] - 2.0).abs() < 1e-14);
+        f.predict(0.5).unwrap();
+        assert!((f.belief().mean[0] - 13.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn a_sure_measurement_corrects_by_the_gain_of_its_variance() {
+        let mut f = Displacement::from_kinematics(&kinematics(), 0.3, 0.5).unwrap();
+        let mut weighted = f;
+        let m = Measurement::new(Vector2::new(14.0, -5.0), Matrix2::new(4.0, 0.0, 0.0, 9.0));
+        f.correct(&m).unwrap();
+        // Gain 4/8 on the place now and 4/8 on the one before.
+        let b = f.belief();
+        assert!((b.mean - Vector4::new(12.0, 11.0, -5.0, -5.0)).norm() < 1e-14);
+        assert!((b.cov[(0, 0)] - 2.0).abs() < 1e-14 && (b.cov[(1, 1)] - 2.25).abs() < 1e-14);
+        weighted.correct_weighted([Weighted { measurement: m, weight: 0.5 }].into_iter()).unwrap();
+        assert!((weighted.belief().mean[0] - 11.0).abs() < 1e-14);
+        // Half of 4, half of 2, and the spread of the means 10 and 12.
+        assert!((weighted.belief().cov[(0, 0)] - 4.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_start_out_of_range_is_refused() {
+        let start = |noise: f64, frame_s: f64| Displacement::from_kinematics(&kinematics(), noise, frame_s).is_ok();
+        assert!(start(0.0, 1e-9));
+        for (noise, frame_s) in [(-0.1, 0.5), (f64::INFINITY, 0.5), (0.3, 0.0), (0.3, -0.5), (0.3, f64::INFINITY)] {
+            assert!(!start(noise, frame_s), "{noise} {frame_s}");
+        }
+        let indefinite = Gaussian { cov: Matrix4::from_fn(|r, c| if r == c { 1.0 } else { 2.0 }), ..kinematics() };
+        assert!(Displacement::start(indefinite, 0.3, 0.5).is_err());
+        let mut f = Displacement::from_kinematics(&kinematics(), 0.3, 0.5).unwrap();
+        assert!(f.set_belief(&Gaussian { cov: -kinematics().cov, ..kinematics() }).is_err());
+        f.set_belief(&kinematics()).unwrap();
+        assert_eq!(f.belief(), kinematics());
+    }
+
+    #[test]
+    fn a_step_that_overflows_is_refused() {
+        let far = Gaussian { mean: Vector4::new(1e300, -1e300, 0.0, 0.0), ..kinematics() };
+        let mut f = Displacement::start(far, 0.3, 1e-6).unwrap();
+        assert!(f.predict(1e6).is_err());
+        assert_eq!(f.belief(), far);
+    }
+}

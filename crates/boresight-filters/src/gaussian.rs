@@ -90,3 +90,35 @@ pub(crate) fn log_likelihood<T: Real>(p: &Gaussian<2, T>, m: &Measurement<T>) ->
     let s = invert_pair(&(p.cov + m.cov), "the innovation covariance")?;
     Ok(s.log_likelihood(&(m.position - p.mean)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix4, Vector4};
+
+    #[test]
+    fn a_measurement_of_a_deviation_has_its_square_as_variance() {
+        let m = Measurement::isotropic(3.0, -4.0, 0.5);
+        assert_eq!(m, Measurement::new(Vector2::new(3.0, -4.0), Matrix2::new(0.25, 0.0, 0.0, 0.25)));
+        assert_eq!(Weighted::sure(m), Weighted { measurement: m, weight: 1.0 });
+        assert_eq!(Weighted::sure(m).cast::<f32>().cast::<f64>(), Weighted::sure(m));
+    }
+
+    #[test]
+    fn the_marginal_takes_the_rows_and_columns_of_the_position() {
+        let cov = Matrix4::from_fn(|r, c| (10 * r + c) as f64);
+        let p = position_of(&Gaussian::new(Vector4::new(1.0, 2.0, 3.0, 4.0), cov), [0, 2]);
+        assert_eq!(p, Gaussian::new(Vector2::new(1.0, 3.0), Matrix2::new(0.0, 2.0, 20.0, 22.0)));
+    }
+
+    /// ln N(ν; 0, S) for S = 2 I: -ln(2π) - ln 2 - |ν|²/4.
+    #[test]
+    fn the_likelihood_is_the_density_of_the_innovation() {
+        let p = Gaussian::<2>::new(Vector2::new(10.0, 20.0), Matrix2::identity());
+        let at = |x: f64, y: f64| log_likelihood(&p, &Measurement::isotropic(x, y, 1.0)).unwrap();
+        assert!((at(10.0, 20.0) + 2.531_024_246_969_290_7).abs() < 1e-14);
+        assert!((at(12.0, 23.0) + 2.531_024_246_969_290_7 + 3.25).abs() < 1e-14);
+        let sure = Gaussian { cov: Matrix2::zeros(), ..p };
+        assert!(log_likelihood(&sure, &Measurement::isotropic(0.0, 0.0, 0.0)).is_err());
+    }
+}

@@ -118,3 +118,90 @@ impl<const S: usize> Filter for Lms<S> {
         crate::gaussian::log_likelihood(&self.predicted(), measurement)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn start() -> Gaussian<4> {
+        let mut cov = Matrix4::from_diagonal(&Vector4::new(0.5, 0.3, 0.6, 0.2));
+        (cov[(0, 1)], cov[(1, 0)]) = (0.1, 0.1);
+        Gaussian::new(Vector4::new(10.0, 1.0, 20.0, -2.0), cov)
+    }
+
+    fn filter() -> Lms<5> {
+        Lms::from_kinematics(&start(), 3.0, LmsRule::Guarded).unwrap()
+    }
+
+    fn at(x: f64, y: f64, variance: f64, weight: f64) -> Weighted {
+        let cov = Matrix2::from_diagonal_element(variance);
+        Weighted { measurement: Measurement::new(Vector2::new(x, y), cov), weight }
+    }
+
+    #[test]
+    fn a_start_has_the_acceleration_of_its_deviation() {
+        let f = filter();
+        let [x, y] = f.axes();
+        assert_eq!((x.state[0], x.state[1], y.state[0], y.state[1]), (10.0, 1.0, 20.0, -2.0));
+        assert_eq!(
+            (x.cov[(0, 0)], x.cov[(1, 1)], x.cov[(2, 2)], y.cov[(1, 1)], y.cov[(4, 4)]),
+            (0.5, 0.3, 9.0, 0.2, 9.0)
+        );
+        let point = Lms::<5>::from_point(&Measurement::isotropic(10.0, 20.0, 0.5), 4.0, 3.0, LmsRule::Guarded).unwrap();
+        assert_eq!(point.kinematics().cov, Matrix4::from_diagonal(&Vector4::new(0.25, 16.0, 0.25, 16.0)));
+    }
+
+    /// Two axes by hand, with the time since the last measured sample.
+    #[test]
+    fn the_filter_is_two_axes_and_the_time_between_their_samples() {
+        let mut f = filter();
+        let mut axes = *f.axes();
+        for (k, steps) in [1, 2, 1, 1, 3, 1].into_iter().enumerate() {
+            let (x, y) = (10.5 + k as f64, 20.0 - 1.7 * k as f64);
+            for _ in 0..steps {
+                f.predict(0.5).unwrap();
+                axes.iter_mut().for_each(|a| a.predict(0.5).unwrap());
+            }
+            f.update(&[at(x, y, 0.4, 1.0)]).unwrap();
+            axes[0].correct(x, 0.4, 0.5 * f64::from(steps)).unwrap();
+            axes[1].correct(y, 0.4, 0.5 * f64::from(steps)).unwrap();
+            assert_eq!(*f.axes(), axes, "update {k}");
+        }
+        let k = f.kinematics();
+        for (place, axis) in [(0, &axes[0]), (2, &axes[1])] {
+            assert_eq!((k.mean[place], k.mean[place + 1]), (axis.state[0], axis.state[1]));
+            for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                assert_eq!(k.cov[(place + r, place + c)], axis.cov[(r, c)]);
+            }
+        }
+        assert_eq!((k.cov[(0, 2)], k.cov[(1, 3)]), (0.0, 0.0));
+        assert_eq!(f.predicted().cov, Matrix2::new(axes[0].cov[(0, 0)], 0.0, 0.0, axes[1].cov[(0, 0)]));
+        let m = at(9.0, 9.0, 1.0, 1.0).measurement;
+        assert_eq!(f.log_likelihood(&m), crate::gaussian::log_likelihood(&f.predicted(), &m));
+    }
+
+    #[test]
+    fn several_hypotheses_are_one_measurement_of_their_mean_and_spread() {
+        let update = |hypotheses: &[Weighted]| {
+            let mut f = filter();
+            f.predict(0.5).unwrap();
+            f.update(hypotheses).unwrap();
+            f.kinematics()
+        };
+        let close = |a: Gaussian<4>, b: Gaussian<4>| (a.mean - b.mean).norm() + (a.cov - b.cov).norm() < 1e-12;
+        // Half a weight: twice the variance.
+        assert!(close(update(&[at(11.0, 19.0, 0.4, 0.5)]), update(&[at(11.0, 19.0, 0.8, 1.0)])));
+        // Two halves 2 px apart in both axes: their middle, and 1 px² more.
+        let two = [at(10.0, 18.0, 0.4, 0.5), at(12.0, 20.0, 0.4, 0.5)];
+        assert!(close(update(&two), update(&[at(11.0, 19.0, 1.4, 1.0)])));
+    }
+
+    #[test]
+    fn two_updates_of_one_instant_are_refused() {
+        let mut f = filter();
+        assert!(matches!(f.update(&[at(10.0, 20.0, 0.4, 1.0)]), Err(FilterError::OutOfRange(_))));
+        f.predict(0.5).unwrap();
+        f.update(&[at(10.0, 20.0, 0.4, 1.0)]).unwrap();
+        assert!(f.update(&[at(10.0, 20.0, 0.4, 1.0)]).is_err());
+    }
+}

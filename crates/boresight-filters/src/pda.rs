@@ -72,7 +72,8 @@ pub fn association_probabilities<T: Real>(
         return Ok(T::one());
     }
     // Weighed against e^largest; if that overflows, clutter explains everything.
-    let b = none * (-largest).exp();
+    // Without clutter nothing else explains them, and 0 * e^∞ would be no number.
+    let b = if none > T::zero() { none * (-largest).exp() } else { T::zero() };
     if !(b <= T::MAX) {
         out.fill(T::zero());
         return Ok(T::one());
@@ -86,4 +87,66 @@ pub fn association_probabilities<T: Real>(
         *o /= sum;
     }
     Ok(b / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+
+    const CLUTTER: Clutter = Clutter { density: 0.02, detection_probability: 0.9, gate_probability: 0.99 };
+
+    fn predicted() -> Gaussian<2> {
+        Gaussian::new(Vector2::new(30.0, 20.0), Matrix2::new(1.0, 0.3, 0.3, 2.0))
+    }
+
+    fn probabilities(z: &[Measurement], clutter: &Clutter) -> Result<(f64, [f64; 2]), FilterError> {
+        let mut p = [0.5; 2];
+        association_probabilities(&predicted(), z, clutter, &mut p[..z.len()]).map(|p0| (p0, p))
+    }
+
+    /// The sum that Bayes' rule gives, with the densities themselves.
+    #[test]
+    fn measurements_of_different_covariance_are_weighed_by_their_densities() {
+        let z = [Measurement::isotropic(30.8, 19.6, 0.7), Measurement::isotropic(28.9, 21.2, 1.5)];
+        let density = |m: &Measurement| {
+            let (s, nu) = (predicted().cov + m.cov, m.position - predicted().mean);
+            let d2 = (s.try_inverse().unwrap() * nu).dot(&nu);
+            (-0.5 * d2).exp() / (core::f64::consts::TAU * s.determinant().sqrt())
+        };
+        let none = 0.02 * (1.0 - 0.9 * 0.99) / 0.9;
+        let sum = none + density(&z[0]) + density(&z[1]);
+        let (p0, p) = probabilities(&z, &CLUTTER).unwrap();
+        assert!((p0 - none / sum).abs() < 1e-14);
+        assert!((p[0] - density(&z[0]) / sum).abs() < 1e-14 && (p[1] - density(&z[1]) / sum).abs() < 1e-14);
+    }
+
+    #[test]
+    fn without_clutter_one_of_the_measurements_is_the_target_however_far() {
+        let z = [Measurement::isotropic(1e5, 0.0, 1.0), Measurement::isotropic(-1e6, 0.0, 1.0)];
+        let (p0, p) = probabilities(&z, &Clutter { density: 0.0, ..CLUTTER }).unwrap();
+        assert_eq!((p0, p), (0.0, [1.0, 0.0]));
+    }
+
+    #[test]
+    fn clutter_explains_what_is_too_far() {
+        let (p0, p) = probabilities(&[Measurement::isotropic(1e5, 0.0, 1.0); 2], &CLUTTER).unwrap();
+        assert_eq!((p0, p), (1.0, [0.0, 0.0]));
+        assert_eq!(probabilities(&[], &CLUTTER).unwrap().0, 1.0);
+    }
+
+    #[test]
+    fn probabilities_lie_above_0_up_to_1_and_densities_at_least_at_0() {
+        let z = [Measurement::isotropic(30.0, 20.0, 1.0)];
+        assert!(probabilities(&z, &Clutter { detection_probability: 1.0, gate_probability: 1.0, ..CLUTTER }).is_ok());
+        for wrong in [0.0, -0.1, 1.1, f64::NAN] {
+            assert!(probabilities(&z, &Clutter { detection_probability: wrong, ..CLUTTER }).is_err(), "P_D {wrong}");
+            assert!(probabilities(&z, &Clutter { gate_probability: wrong, ..CLUTTER }).is_err(), "P_G {wrong}");
+        }
+        for wrong in [-1e-9, f64::INFINITY, f64::NAN] {
+            assert!(probabilities(&z, &Clutter { density: wrong, ..CLUTTER }).is_err(), "density {wrong}");
+        }
+        let mut short = [0.0; 0];
+        assert!(association_probabilities(&predicted(), &z, &CLUTTER, &mut short).is_err());
+    }
 }

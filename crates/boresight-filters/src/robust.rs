@@ -132,6 +132,7 @@ mod tests {
     use super::*;
     use crate::model::ConstantVelocity;
     use crate::{Kf, Start};
+    use nalgebra::Matrix2;
 
     fn kf() -> Kf<ConstantVelocity, 4> {
         let cv = ConstantVelocity::discrete(0.5).unwrap();
@@ -166,5 +167,35 @@ mod tests {
         let w = rule.weight(100.0 / 2.0);
         let soft = rule.soften(&p, &m).unwrap();
         assert!(((p.cov + soft.cov) - (p.cov + m.cov) / w).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_weights_are_those_of_the_sources() {
+        let huber = InnovationRule::Huber { threshold: 2.0 };
+        for (d2, w) in [(0.0, 1.0), (4.0, 1.0), (16.0, 0.5), (100.0, 0.2)] {
+            assert_eq!(huber.weight(d2), w, "Huber at {d2}");
+        }
+        let student = InnovationRule::StudentT { degrees_of_freedom: 4.0 };
+        for (d2, w) in [(0.0, 1.0), (2.0, 1.0), (8.0, 0.5), (26.0, 0.2)] {
+            assert_eq!(student.weight(d2), w, "Student-t at {d2}");
+        }
+        assert_eq!(InnovationRule::Plain.weight(1e9), 1.0);
+    }
+
+    #[test]
+    fn a_parameter_is_above_0() {
+        assert!(InnovationRule::<f64>::Plain.validate().is_ok());
+        for (v, fine) in [(0.5, true), (0.0, false), (-1.0, false), (f64::NAN, false), (f64::INFINITY, false)] {
+            assert_eq!(InnovationRule::Huber { threshold: v }.validate().is_ok(), fine, "threshold {v}");
+            assert_eq!(InnovationRule::StudentT { degrees_of_freedom: v }.validate().is_ok(), fine, "degrees {v}");
+            assert_eq!(Robust::new(kf(), InnovationRule::Huber { threshold: v }).is_ok(), fine);
+        }
+    }
+
+    #[test]
+    fn a_measurement_infinitely_far_is_refused() {
+        let far = Measurement::isotropic(1e200, 0.0, 1e-100);
+        let sharp = Gaussian { cov: Matrix2::identity() * 1e-200, ..kf().predicted() };
+        assert!(InnovationRule::Huber { threshold: 2.0 }.soften(&sharp, &far).is_err());
     }
 }
