@@ -53,6 +53,7 @@ fn all(data: &Path) -> Result<Vec<String>> {
 fn name(detector: &DetectorConfig) -> String {
     match &detector.threshold {
         ThresholdConfig::Isolated(c) => format!("isolated {:?}", c.polarity),
+        ThresholdConfig::Cfar(c) => format!("cfar {:?}", c.polarity),
         ThresholdConfig::Spot(c) => format!("spot {:?} {} px", c.polarity, c.size_px),
         ThresholdConfig::Colour(c) => format!("colour {:?}", c.reference),
         ThresholdConfig::Moving(_) => "moving".to_string(),

@@ -5,6 +5,8 @@ mod bench_track;
 mod choices;
 mod clutter_table;
 mod crossing_table;
+mod detect_exam;
+mod detect_scenes;
 mod docs;
 mod filter_table;
 mod ir_exam;
@@ -39,6 +41,8 @@ enum Chore {
     ClutterTable(clutter_table::Args),
     /// Crossing targets: share tracked and identity switches of each method.
     CrossingTable(crossing_table::Args),
+    /// The detector of a stated false-alarm rate: alarms, detection, bounds, time.
+    DetectExam(detect_exam::Args),
     /// Every filter by name over the sample clip: held, error, NIS.
     FilterTable(filter_table::Args),
     /// Links against trackpy's and btrack's published ones.
@@ -66,6 +70,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Choices(args) => choices::run(&args),
         Chore::ClutterTable(args) => clutter_table::run(&args),
         Chore::CrossingTable(args) => crossing_table::run(&args),
+        Chore::DetectExam(args) => detect_exam::run(&args),
         Chore::FilterTable(args) => filter_table::table(&args),
         Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),

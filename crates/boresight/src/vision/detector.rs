@@ -1,6 +1,7 @@
 //! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
 
 use super::background::BitImage;
+use super::cfar::CfarDetector;
 use super::centroid::{Surroundings, centroid};
 use super::cluster::Clusterer;
 use super::colour::{ColourMask, grey_image};
@@ -74,6 +75,7 @@ struct ThresholdDetector {
     strongest: Strongest,
     isolated: IsolatedDetector,
     spots: Option<SpotDetector>,
+    cfar: Option<CfarDetector>,
     colour: Option<ColourMask>,
     /// One per pixel type, so that a frame keeps its type.
     stage8: Stage<u8>,
@@ -93,7 +95,12 @@ impl ThresholdDetector {
             ThresholdConfig::Spot(c) => Some(SpotDetector::new(c)),
             _ => None,
         };
+        let cfar = match &config.threshold {
+            ThresholdConfig::Cfar(c) => Some(CfarDetector::new(c)),
+            _ => None,
+        };
         Ok(Self {
+            cfar,
             colour: match &config.threshold {
                 ThresholdConfig::Colour(c) => Some(ColourMask::new(*c)?),
                 _ => None,
@@ -128,7 +135,10 @@ impl ThresholdDetector {
                 ThresholdConfig::Band(_) => false,
                 ThresholdConfig::Level(LevelConfig { side, .. }) => *side == Side::Dark,
                 ThresholdConfig::Otsu(c) => c.side == Side::Dark,
-                ThresholdConfig::Local(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Isolated(_) => true,
+                ThresholdConfig::Local(_)
+                | ThresholdConfig::Spot(_)
+                | ThresholdConfig::Cfar(_)
+                | ThresholdConfig::Isolated(_) => true,
                 // Their pixels may be brighter or darker than the ground, so they count alike, see `method`.
                 ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => false,
             },
@@ -137,8 +147,8 @@ impl ThresholdDetector {
 
     /// Variance of one pixel at intensity 0, counts², and its growth with intensity.
     fn pixel_noise<T: Pixel>(&mut self, image: &Image<T>) -> (f64, f64) {
-        if matches!(self.config.threshold, ThresholdConfig::Isolated(_)) {
-            // It measures the noise of the pixels that it sees, itself.
+        if matches!(self.config.threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Cfar(_)) {
+            // They measure the noise of the pixels that they see, themselves.
             return (0.0, 0.0);
         }
         match &self.config.noise {
@@ -195,6 +205,13 @@ impl ThresholdDetector {
             self.strongest.keep(&mut scan.detections, self.config.max_detections);
             return;
         }
+        if let Some(cfar) = &mut self.cfar {
+            cfar.detect(image, &mut scan.detections);
+            let extra = nalgebra::Matrix2::identity() * self.config.centroid.extra_sd_px.powi(2);
+            scan.detections.iter_mut().for_each(|d| d.cov += extra);
+            self.strongest.keep(&mut scan.detections, self.config.max_detections);
+            return;
+        }
         if let Some(spots) = &mut self.spots {
             spots.detect(image, (variance, gain), &mut scan.detections);
             let extra = nalgebra::Matrix2::identity() * self.config.centroid.extra_sd_px.powi(2);
@@ -232,7 +249,7 @@ impl ThresholdDetector {
                 }
             }
             // Ran above: they have no rows of bits of their own.
-            ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) => {}
+            ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Cfar(_) => {}
             ThresholdConfig::Local(c) => {
                 for y in 0..image.height() {
                     let row = image.row(y);

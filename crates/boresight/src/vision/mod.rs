@@ -5,6 +5,7 @@
 
 pub mod background;
 pub mod centroid;
+pub mod cfar;
 pub mod cluster;
 pub mod colour;
 pub mod config;

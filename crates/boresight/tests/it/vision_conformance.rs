@@ -4,6 +4,7 @@
 use boresight::vision::colour::ColourMatchConfig;
 use boresight::vision::config::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
 use boresight::vision::spatial::{SpatialConfig, WindowConfig};
+use boresight::vision::cfar::CfarConfig;
 use boresight::vision::threshold::{
     BandConfig, LevelConfig, LocalConfig, OtsuConfig, Polarity, Side, SpotConfig, ThresholdConfig,
 };
@@ -15,6 +16,9 @@ use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, T
 pub fn thresholds() -> Vec<ThresholdConfig> {
     let local = |polarity| ThresholdConfig::Local(LocalConfig { k: 2.0, polarity, cell_px: 8, min_contrast: 0.0 });
     let spot = |polarity| ThresholdConfig::Spot(SpotConfig { size_px: 5.0, k: 2.0, polarity, ..Default::default() });
+    let cfar = |polarity| {
+        ThresholdConfig::Cfar(CfarConfig { false_alarms_per_frame: 10.0, polarity, ..Default::default() })
+    };
     let all = vec![
         ThresholdConfig::Band(BandConfig { low: 100.0, high: 60_000.0 }),
         ThresholdConfig::Level(LevelConfig { level: 99.5, side: Side::Bright, exclusive: false }),
@@ -27,6 +31,8 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
         spot(Polarity::Bright),
         spot(Polarity::Both),
         ThresholdConfig::Isolated(Default::default()),
+        cfar(Polarity::Bright),
+        cfar(Polarity::Both),
         ThresholdConfig::Moving(Default::default()),
         ThresholdConfig::Difference(Default::default()),
         ThresholdConfig::Colour(ColourMatchConfig { reference: [200, 100, 55], ..Default::default() }),
@@ -39,6 +45,7 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
             | ThresholdConfig::Local(_)
             | ThresholdConfig::Spot(_)
             | ThresholdConfig::Isolated(_)
+            | ThresholdConfig::Cfar(_)
             | ThresholdConfig::Moving(_)
             | ThresholdConfig::Difference(_)
             | ThresholdConfig::Colour(_) => {}

@@ -9,6 +9,7 @@ pub mod otsu;
 pub mod spot;
 
 use super::background::{BackgroundConfig, DifferenceConfig};
+use super::cfar::CfarConfig;
 use super::colour::ColourMatchConfig;
 use super::isolated::IsolatedConfig;
 pub use super::polarity::{Polarity, Side};
@@ -39,6 +40,8 @@ pub enum ThresholdConfig {
     Isolated(IsolatedConfig),
     /// Small targets by their contrast to what surrounds them: one detection for each peak, no clusters.
     Spot(SpotConfig),
+    /// Small targets of any size that stand out more than a stated number of false alarms a frame would; no clusters.
+    Cfar(CfarConfig),
 }
 
 impl Default for ThresholdConfig {
@@ -187,6 +190,7 @@ impl ThresholdConfig {
             Self::Colour(c) => c.validate(&format!("{at}.colour"))?,
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
+            Self::Cfar(c) => c.validate(&format!("{at}.cfar"))?,
             Self::Local(c) => {
                 if !(c.k > 0.0 && c.k.is_finite()) {
                     return Err(wrong(

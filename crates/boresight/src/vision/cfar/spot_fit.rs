@@ -1,0 +1,169 @@
+//! A Gaussian spot fitted by least squares: position, its covariance, and whether it is a spot at all.
+//!
+//! Model: I(x, y) = b + A exp(-((x - x0)² + (y - y0)²) / (2 σ²)), five unknowns, Levenberg's form of Gauss-Newton. Covariance of the
+//! position: s² (JᵀJ)⁻¹, the Cramér-Rao bound for normal noise of the deviation s of the residuals (at least the rounding noise). The
+//! residuals hold what the ground adds, so the covariance does too. Source: K. Mortensen et al., Nat. Methods 7, 377 (2010).
+//! Limits: the pixel's own width is taken into σ, right for σ above 0.5 px; a spot cut by the border is fitted to what is seen.
+//! Symbols: A height (counts), b ground (counts), σ deviation of the spot (px).
+
+use super::pyramid::Level;
+use nalgebra::{Matrix2, Matrix5, Vector2, Vector5};
+
+const STEPS: usize = 8;
+/// Half side of the window, in deviations of the spot expected.
+const WINDOW: f64 = 2.7;
+
+/// A fitted spot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    /// Position, px of the level.
+    pub(super) position: Vector2<f64>,
+    /// Covariance of the position, px².
+    pub(super) cov: Matrix2<f64>,
+    /// Height above the ground, counts; negative for a dark spot.
+    pub(super) height: f64,
+    /// Deviation, px.
+    pub(super) sigma: f64,
+}
+
+/// Where a fit starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guess {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) height: f64,
+    pub(super) ground: f64,
+    pub(super) sigma: f64,
+}
+
+/// Normal equations and cost at a state [x0, y0, A, b, σ].
+struct Sums {
+    normal: Matrix5<f64>,
+    gradient: Vector5<f64>,
+    cost: f64,
+    n: usize,
+}
+
+/// Largest half side of a window, px.
+const MOST: usize = 16;
+
+fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &Vector5<f64>) -> Sums {
+    let (x0, y0, a, b, s) = (p[0], p[1], p[2], p[3], p[4]);
+    let scale = -0.5 / (s * s);
+    let mut gx = [0.0; 2 * MOST + 1];
+    for (g, x) in gx.iter_mut().zip(left..=right) {
+        *g = (scale * (x as f64 - x0).powi(2)).exp();
+    }
+    let mut m = [0.0f64; 15];
+    let mut v = [0.0f64; 5];
+    let (mut cost, mut n) = (0.0, 0);
+    for y in top..=bottom {
+        let dy = y as f64 - y0;
+        let gy = (scale * dy * dy).exp();
+        for ((&pixel, &gx), x) in on.row(y)[left..=right].iter().zip(&gx).zip(left..) {
+            let dx = x as f64 - x0;
+            let g = gx * gy;
+            let ag = a * g / (s * s);
+            let j = [ag * dx, ag * dy, g, 1.0, ag * (dx * dx + dy * dy) / s];
+            let r = f64::from(pixel) - b - a * g;
+            let mut at = 0;
+            for i in 0..5 {
+                v[i] += j[i] * r;
+                for k in i..5 {
+                    m[at] += j[i] * j[k];
+                    at += 1;
+                }
+            }
+            cost += r * r;
+            n += 1;
+        }
+    }
+    let mut normal = Matrix5::zeros();
+    let mut at = 0;
+    for i in 0..5 {
+        for k in i..5 {
+            normal[(i, k)] = m[at];
+            normal[(k, i)] = m[at];
+            at += 1;
+        }
+    }
+    Sums { normal, gradient: Vector5::from(v), cost, n }
+}
+
+/// Fits a spot on a level near a guess; `least_variance` is that of a pixel at least, counts². `None` if what is there is no spot.
+pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot> {
+    let half = ((WINDOW * guess.sigma).ceil() as usize).clamp(3, MOST);
+    let (cx, cy) = (guess.x.round().max(0.0) as usize, guess.y.round().max(0.0) as usize);
+    let window = [
+        cx.saturating_sub(half),
+        cy.saturating_sub(half),
+        (cx + half).min(on.width - 1),
+        (cy + half).min(on.height - 1),
+    ];
+    let mut p = Vector5::new(guess.x, guess.y, guess.height, guess.ground, guess.sigma);
+    let mut now = sums(on, window, &p);
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let mut normal = now.normal;
+        for i in 0..5 {
+            normal[(i, i)] *= 1.0 + damping;
+        }
+        let step = normal.cholesky()?.solve(&now.gradient);
+        let mut tried = p + step;
+        tried[4] = tried[4].clamp(0.3, 3.0 * guess.sigma);
+        let then = sums(on, window, &tried);
+        if then.cost < now.cost {
+            let small = step[0].abs() + step[1].abs() < 1e-3;
+            (p, now, damping) = (tried, then, damping * 0.2);
+            if small {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+        }
+    }
+    let reach = 1.5 * guess.sigma + 0.7;
+    let near = (p[0] - guess.x).abs() <= reach && (p[1] - guess.y).abs() <= reach;
+    let sized = p[4] > 0.3001 && p[4] < 2.5 * guess.sigma;
+    if !near || !sized || p[2] * guess.height <= 0.0 || now.n < 12 {
+        return None;
+    }
+    let variance = (now.cost / (now.n - 5) as f64).max(least_variance);
+    let inverse = now.normal.cholesky()?.inverse();
+    let cov = inverse.fixed_view::<2, 2>(0, 0) * variance;
+    let cov = 0.5 * (cov + cov.transpose());
+    // A height lost in the residuals, or a position unknown by more than the spot, is no spot.
+    let known = cov.trace() < p[4] * p[4] && cov.iter().all(|c| c.is_finite()) && p[2].powi(2) > variance;
+    known.then(|| Spot { position: Vector2::new(p[0], p[1]), cov, height: p[2], sigma: p[4] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pyramid::Pyramid;
+    use super::*;
+    use crate::Image;
+
+    #[test]
+    fn a_clean_spot_is_found_to_a_thousandth_of_a_pixel() {
+        for (x0, y0, height, sigma) in [(10.3, 9.6, 40.0, 1.3), (9.8, 10.45, -25.0, 2.0), (1.2, 10.0, 30.0, 1.0)] {
+            let value = |i: usize| {
+                let (x, y) = ((i % 21) as f64, (i / 21) as f64);
+                100.0 + height * (-((x - x0).powi(2) + (y - y0).powi(2)) / (2.0 * sigma * sigma)).exp()
+            };
+            let image = Image::from_vec(21, 21, (0..441).map(|i| value(i) as f32).collect()).unwrap();
+            let mut pyramid = Pyramid::default();
+            let on = &pyramid.fill(&image, 1)[0];
+            let guess = Guess { x: f64::round(x0), y: f64::round(y0), height: height * 0.6, ground: 98.0, sigma: 1.6 };
+            let spot = fit(on, &guess, 1e-6).unwrap();
+            assert!((spot.position - Vector2::new(x0, y0)).norm() < 1e-3, "{spot:?}");
+            assert!((spot.sigma - sigma).abs() < 1e-2 && (spot.height - height).abs() < 0.1);
+        }
+    }
+
+    #[test]
+    fn an_even_ground_is_no_spot() {
+        let mut pyramid = Pyramid::default();
+        let on = &pyramid.fill(&Image::filled(21, 21, 7u8), 1)[0];
+        assert_eq!(fit(on, &Guess { x: 10.0, y: 10.0, height: 3.0, ground: 7.0, sigma: 1.5 }, 1.0 / 12.0), None);
+    }
+}
