@@ -55,7 +55,7 @@ pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
 ///
 /// `base` says how the input is read; its other parts are where the choice starts from.
 /// ```
-/// use boresight::{Config, Scan, auto};
+/// use boresight::{Config, Scan, TrackStatus, auto};
 ///
 /// # fn main() -> boresight::Result<()> {
 /// let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
@@ -64,7 +64,7 @@ pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
 /// for _ in 0..10 {
 ///     let Some(frame) = run.frames.next_frame()? else { break };
 ///     run.detector.detect(&frame, &mut scan)?;
-///     confirmed = run.tracker.step(&scan)?.len();
+///     confirmed = run.tracker.step(&scan)?.iter().filter(|t| t.status == TrackStatus::Confirmed).count();
 /// }
 /// assert_eq!(confirmed, 1); // one drone before sky and trees
 /// # Ok(())

@@ -1,6 +1,7 @@
-//! One scan's step, part by part: predict, gate, associate, update, delete, initiate, report.
+//! One scan's step, part by part: predict, gate, associate, update, delete, report, initiate.
 //!
-//! Free functions over explicit state; [`super::tracker`] calls them in this order. A part reads what it needs from
+//! Free functions over explicit state; the order of their calls stands in [`super::tracker`]: confirmed tracks are gated while they are
+//! predicted, tentative ones once the confirmed have chosen; confirmation ([`super::confirm`]), deletion and report follow each update. A part reads what it needs from
 //! [`context::Context`] and keeps its memory in a struct of its own.
 
 pub(super) mod associate;
