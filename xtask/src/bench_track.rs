@@ -6,8 +6,8 @@
 //! fifth born and a fifth ended on the way, P_D 0.9, noise 1 px, clutter of 10 % or 100 % of N, 100 scans, side 60 √N px.
 
 use anyhow::Result;
-use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
-use boresight::metrics::overlap::Similarity;
+use boresight::associate::{AssociatorConfig, JpdaConfig};
+use boresight::metrics::Similarity;
 use boresight::metrics::set::{SetDistance, SetOptions};
 use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::track::{

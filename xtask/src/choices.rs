@@ -5,7 +5,7 @@
 use anyhow::Result;
 use boresight::Config;
 use boresight::auto;
-use boresight::vision::config::DetectorConfig;
+use boresight::vision::DetectorConfig;
 use boresight::vision::threshold::ThresholdConfig;
 use std::path::{Path, PathBuf};
 

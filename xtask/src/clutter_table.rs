@@ -5,7 +5,7 @@
 //! moves with the target; a few clean scans to start, then 50 scans; lost: more than 5 px off at the end.
 
 use anyhow::Result;
-use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
+use boresight::associate::{AssociatorConfig, JpdaConfig};
 use boresight::track::{
     self, ConfirmationConfig, ExistenceConfig, MOfNConfig, MergedMeasurementsConfig, MhtConfig, TrackerConfig,
 };

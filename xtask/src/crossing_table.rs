@@ -6,13 +6,13 @@
 //! track that is on it.
 
 use anyhow::Result;
-use boresight::associate::{AssociatorConfig, jpda::JpdaConfig};
-use boresight::sim::{Seed, named::named};
+use boresight::associate::{AssociatorConfig, JpdaConfig};
+use boresight::sim::{Seed, named};
 use boresight::track::{
     self, ConfirmationConfig, ExistenceConfig, MOfNConfig, MergedMeasurementsConfig, MhtConfig, TrackerConfig,
 };
-use boresight::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::vision::{self, DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
+use boresight::vision::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::{FrameSource, Scan, TrackStatus};
 
 #[derive(clap::Args)]

@@ -103,7 +103,7 @@ struct Count {
     either: usize,
 }
 
-fn score(frame: &Labelled, found: &[(&Detection, &[boresight::vision::cfar::detector::Cell])], count: &mut Count) {
+fn score(frame: &Labelled, found: &[(&Detection, &[boresight::vision::cfar::Cell])], count: &mut Count) {
     let (w, h) = (frame.image.width(), frame.image.height());
     count.pixels += w * h;
     count.targets += frame.targets.len();

@@ -5,7 +5,7 @@
 //! neither result is certain.
 
 use anyhow::{Context, Result};
-use boresight::track::filter::model::RandomWalkConfig;
+use boresight::track::filter::RandomWalkConfig;
 use boresight::track::{
     self, ConfirmationConfig, FilterConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, ModelConfig,
     OnePointConfig, TrackerConfig,

@@ -5,8 +5,8 @@
 //! Scores are those of `boresight::metrics`, which equal TrackEval's; `--out DIR` writes MOT files for TrackEval itself.
 
 use anyhow::{Context, Result};
-use boresight::io::tables::{TableOptions, mot_box_of_extent, read_detections};
 use boresight::io::tracks::{ReadOptions, mot};
+use boresight::io::{TableOptions, mot_box_of_extent, read_detections};
 use boresight::metrics::{MatchOptions, MotScores, Rules, hota, mot_scores, preprocess};
 use boresight::track::{self, TrackerConfig, TwoStageConfig};
 use boresight::{PixelOrigin, TrackRow, TrackStatus, TrackTable};

@@ -6,11 +6,11 @@
 //! Result: RMSE from frame 5 on, px; lost if the last error is above 5 px. Coordinates from 0.
 
 use boresight::sim::{Seed, named};
-use boresight::vision::centroid::{Surroundings, centroid};
-use boresight::vision::cluster::Clusterer;
-use boresight::vision::config::{CentroidMethod, ClusterConfig};
+use boresight::vision::Clusterer;
 use boresight::vision::spatial::{Border, SpatialConfig, SpatialFilter, WindowConfig};
-use boresight::vision::threshold::band::{band_bits, words};
+use boresight::vision::threshold::{band_bits, words};
+use boresight::vision::{CentroidMethod, ClusterConfig};
+use boresight::vision::{Surroundings, centroid};
 use boresight::{FrameSource, Image, Pixels, Result};
 use boresight_filters::Gaussian;
 use boresight_filters::linear::{correct_linear, predict_linear};

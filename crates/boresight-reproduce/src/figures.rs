@@ -10,7 +10,7 @@ use super::item::{Figure, Line, Output};
 use super::scene_study::{READING_A, READING_B, READING_C, SceneRun, run_scene};
 use super::study::{FilterKind, Job, Options, estimates};
 use boresight::sim::Seed;
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 use boresight::{FrameSource, Pixels, Result};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{GaussianFilter, Kf, Measurement, Start};

@@ -10,7 +10,7 @@ use super::scene_study::{READING_A, run_scene};
 use super::sensor_fusion::{F1, F2, run, truth};
 use boresight::Result;
 use boresight::sim::Seed;
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{GaussianFilter, Kf, Measurement, Start};
 use nalgebra::{Matrix2, Vector2, Vector4};

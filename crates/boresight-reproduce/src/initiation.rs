@@ -8,10 +8,10 @@
 use super::item::{Output, Row, Section};
 use super::score::{MEASURES, four_numbers, spread};
 use super::study::{LOST_PX, Options, monte_carlo};
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 use boresight::sim::{SceneConfig, Seed};
 use boresight::track::{ConfirmationConfig, InitialTrackConfig, MOfNConfig, MergedMeasurementsConfig, TrackerConfig};
-use boresight::vision::config::{ClusterConfig, GivenNoise, NoiseConfig};
+use boresight::vision::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::vision::{DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
 use boresight::{FrameSource, Result, Scan, TrackId, TrackStatus};
 use nalgebra::Vector4;

@@ -6,10 +6,10 @@
 //! Units: px, px/scan. Cost: one 64 x 64 frame of data set II about 20 µs a reading.
 
 use boresight::sim::{SceneConfig, SceneSource, Seed};
-use boresight::vision::centroid::{Surroundings, centroid};
-use boresight::vision::cluster::Clusterer;
-use boresight::vision::config::{CentroidMethod, ClusterConfig};
-use boresight::vision::threshold::band::{band_bits, words};
+use boresight::vision::Clusterer;
+use boresight::vision::threshold::{band_bits, words};
+use boresight::vision::{CentroidMethod, ClusterConfig};
+use boresight::vision::{Surroundings, centroid};
 use boresight::{Error, ErrorKind, FrameSource, Pixels, Result};
 use nalgebra::{Vector2, Vector4};
 

@@ -8,8 +8,8 @@
 use super::item::{Figure, Output, Row, Section};
 use super::score::spread;
 use super::study::{Options, monte_carlo};
+use boresight::sim::Purpose;
 use boresight::sim::Seed;
-use boresight::sim::random::Purpose;
 use boresight::vision::spatial::{Border, mean_exact, median_exact};
 use boresight::{Image, Result};
 use rand::RngExt;

@@ -15,7 +15,7 @@ use super::study::{FilterKind, Job, Options, Outcome, Scored, monte_carlo, study
 use super::tracking::words;
 use boresight::Result;
 use boresight::sim::Seed;
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{GaussianFilter, Measurement, Srif, Start};
 use nalgebra::{Matrix2, Vector4};

@@ -9,7 +9,7 @@ use super::printed::four_rows;
 use super::scene_study::{READING_A, READING_B, READING_C, Reading};
 use super::study::{FilterKind, Job, Options, study};
 use boresight::Result;
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 
 const GOOD: Tuning = Tuning { r: 0.5, q: 1e-5, start: StartAt::KNOWN };
 

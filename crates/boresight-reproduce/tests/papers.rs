@@ -1,7 +1,7 @@
 //! The papers' numbers, in runs reduced for CI: they must agree with an independent Monte Carlo
 //! (`docs/theory/papers.md`).
 
-use boresight::sim::named::{PAPER_START, paper_scene};
+use boresight::sim::{PAPER_START, paper_scene};
 use boresight_reproduce::follow::{StartAt, Tuning};
 use boresight_reproduce::initiation::{Start, study_ds2};
 use boresight_reproduce::scene_study::READING_A;

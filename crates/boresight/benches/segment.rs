@@ -3,12 +3,12 @@
 //! Run: `cargo bench -p boresight --bench segment`. Fixed seeds; one thread. The scenes have the numbers of the peers' workload W1:
 //! `sparse` 50 targets of 9x9, `particles` 5 000 spots of sigma 3, `noisy` N(50, 50²) with every tenth pixel set.
 
-use boresight::vision::cluster::Clusterer;
-use boresight::vision::config::{CentroidMethod, ClusterConfig, DetectorConfig};
-use boresight::vision::threshold::band::{band_bits, words};
-use boresight::vision::threshold::grid::BackgroundGrid;
+use boresight::vision::Clusterer;
+use boresight::vision::threshold::BackgroundGrid;
 use boresight::vision::threshold::{BandConfig, LocalConfig, SpotConfig, ThresholdConfig};
-use boresight::vision::{build, threshold::otsu::otsu_level};
+use boresight::vision::threshold::{band_bits, words};
+use boresight::vision::{CentroidMethod, ClusterConfig, DetectorConfig};
+use boresight::vision::{build, threshold::otsu_level};
 use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
 use divan::{Bencher, black_box, counter::BytesCount};
 use rand::{RngExt, SeedableRng};

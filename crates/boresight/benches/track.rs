@@ -3,8 +3,8 @@
 //! Targets lie in a square whose side grows with their number (60 √N px), 90 % are detected, clutter is 10 % of N, fixed
 //! seed. The long table with memory and quality is `cargo run --release -p xtask -- bench-track`.
 
-use boresight::associate::assignment::{dense::Dense, murty::k_best};
-use boresight::associate::jpda::JpdaConfig;
+use boresight::associate::JpdaConfig;
+use boresight::associate::assignment::{Dense, k_best};
 use boresight::associate::{AssociatorConfig, Gates, Pair, Prior};
 use boresight::track::{self, MhtConfig, TrackerConfig};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp};

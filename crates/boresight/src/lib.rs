@@ -69,26 +69,26 @@ pub mod associate;
 pub mod auto;
 pub mod camera;
 pub mod config;
-pub mod detection;
+mod detection;
 #[cfg(feature = "draw")]
 pub mod draw;
-pub mod error;
-pub mod frame;
+mod error;
+mod frame;
 pub mod fuse;
-pub mod image;
+mod image;
 pub mod io;
 pub mod metrics;
 pub mod pipeline;
-pub mod record;
+mod record;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;
-pub mod time;
+mod time;
 pub mod track;
-pub mod tracks;
+mod tracks;
 mod union_find;
 mod validate;
-pub mod view;
+mod view;
 pub mod vision;
 
 pub use config::Config;
@@ -96,13 +96,18 @@ pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
-pub use record::{TrackFrame, TrackId, TrackState, TrackStatus};
+pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use time::{FrameIndex, Timestamp};
 pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 
 /// The filters, and with them the matrices (`boresight_filters::nalgebra`), in the version that this crate is built with.
 pub use boresight_filters;
+
+/// Golden vectors, for the tests of parts that are not public.
+#[cfg(test)]
+#[path = "../tests/it/golden/file.rs"]
+mod golden_file;
 
 /// The README's examples are compiled with the tests.
 #[cfg(doctest)]

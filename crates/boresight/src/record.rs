@@ -23,7 +23,7 @@ pub enum TrackStatus {
 
 /// The innovation of one update: measured minus predicted position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Innovation {
+pub struct TrackInnovation {
     /// Measured minus predicted (weighted by the hypotheses), px.
     pub residual: Vector2<f64>,
     /// Its covariance S = H P Hᵀ + R, px².
@@ -46,7 +46,7 @@ pub struct TrackState {
     /// Number of the detection in this scan that the track took, if one was taken.
     pub detection: Option<u32>,
     /// Innovation of this scan's update, if there was one.
-    pub innovation: Option<Innovation>,
+    pub innovation: Option<TrackInnovation>,
     /// Confidence (existence probability or score mapped to 0..=1).
     pub score: f32,
 }

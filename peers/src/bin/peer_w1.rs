@@ -4,9 +4,9 @@
 //! `{"name": "boresight", "workload": "W1", "kind": "worker", "command": "target/release/peer_w1"}`.
 
 use boresight::Image;
-use boresight::vision::cluster::Clusterer;
-use boresight::vision::config::ClusterConfig;
-use boresight::vision::threshold::band::{band_bits, words};
+use boresight::vision::ClusterConfig;
+use boresight::vision::Clusterer;
+use boresight::vision::threshold::{band_bits, words};
 use peers::{Fault, Job, serve};
 use serde_json::Value;
 

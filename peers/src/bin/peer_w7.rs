@@ -1,6 +1,6 @@
 //! Benchmark worker for peerbench W7 (linear assignment, dense and sparse): kind `worker` of its PLUGIN.md.
 
-use boresight::associate::assignment::{csr::Csr, dense::Dense};
+use boresight::associate::assignment::{Csr, Dense};
 use peers::{Fault, Job};
 
 struct DenseJob {

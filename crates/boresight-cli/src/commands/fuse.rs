@@ -5,7 +5,7 @@ mod input;
 use boresight::fuse::{
     FuseConfig, PlaneMap, Registration, RegistrationConfig, Rule, SensorScans, Timeline, fuse_tables, merge_scans,
 };
-use boresight::io::tables::TracksCsv;
+use boresight::io::TracksCsv;
 use boresight::{Config, FrameIndex, Scan, Sink, Timestamp, TrackState, View};
 use input::{MapSpec, Sensor};
 use std::path::{Path, PathBuf};

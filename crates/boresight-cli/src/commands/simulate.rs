@@ -6,7 +6,7 @@ mod plots;
 use crate::frame_writer::{FrameFormat, FrameWriter};
 use crate::progress;
 use boresight::io::Output;
-use boresight::io::tables::{TableOptions, TracksCsv, mot_box_of_extent, read_tracks};
+use boresight::io::{TableOptions, TracksCsv, mot_box_of_extent, read_tracks};
 use boresight::sim::{SceneConfig, SceneSource, Seed, named, scene::Background};
 use boresight::{Error, ErrorKind, FrameSource, Scan, Sink, View};
 use std::fmt::Write as _;

@@ -1,6 +1,6 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
-use boresight::io::tables::{TRACKS_HEADER, TableOptions, TracksCsv, read_tracks};
+use boresight::io::{TRACKS_HEADER, TableOptions, TracksCsv, read_tracks};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod, filter_track, predict, smooth_track};
 use boresight::{Config, Extent, FrameIndex, Scan, Sink, Timestamp, TrackFrame, TrackState, TrackStatus, View};
 use boresight_filters::Gaussian;

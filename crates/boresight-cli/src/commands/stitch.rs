@@ -1,6 +1,6 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
-use boresight::io::tables::{MotWriter, TableOptions, TracksCsv, read_tracks};
+use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks};
 use boresight::track::{StitchConfig, join};
 use boresight::{FrameIndex, Scan, Sink, Timestamp, TrackFrame, View};
 use std::path::PathBuf;

@@ -40,16 +40,6 @@ impl UniformGrid {
         Self::default()
     }
 
-    /// Number of points held.
-    pub fn len(&self) -> usize {
-        self.points.len()
-    }
-
-    /// Whether no point is held.
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
-
     /// Sorts the points anew; their numbers are their places in the list.
     pub fn build(&mut self, points: impl ExactSizeIterator<Item = (f64, f64)> + Clone) {
         let n = points.len();

@@ -27,7 +27,7 @@ opaque_debug!(AnnotatedVideo);
 impl AnnotatedVideo {
     /// Will write to `path`.
     /// # Errors
-    /// [`ErrorKind::Config`] if an option is out of range.
+    /// [`crate::ErrorKind::Config`] if an option is out of range.
     pub fn create(path: impl Into<PathBuf>, draw: DrawOptions, options: Mp4Options) -> Result<Self> {
         let (path, annotator) = (path.into(), Annotator::new(draw)?);
         Ok(Self { path, annotator, options, writer: None, large: Image::default() })

@@ -3,6 +3,8 @@
 //! Between and after its points the track is predicted with constant velocity from the last point before (white acceleration of
 //! power density q, px²/s³), so that nothing of the future is used and gaps widen the covariance honestly. For registration,
 //! where both sides of a point may be used, [`Timeline::between`] interpolates (cubic Hermite of positions and velocities).
+//! Times are seconds, not [`crate::Timestamp`], because a registration shifts a clock by any real number of seconds. Equal nanoseconds
+//! give equal seconds; different ones stay different within 48 days of the zero (at 1.7e9 s, since 1970, from 0.24 µs apart).
 //! Units: s, px, px/s (or m). Limits: points must be in order of time.
 
 use crate::{Extent, TrackId, TrackState, TrackStatus};

@@ -10,7 +10,7 @@
 
 use crate::{Error, ErrorKind, Result};
 use boresight_filters::Gaussian;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
 /// Fuses two beliefs with independent errors.
 ///
@@ -60,21 +60,6 @@ pub fn fuse_correlated<const N: usize>(
         return Err(Error::new(ErrorKind::Numeric, "the fused belief is not finite").at("track fusion"));
     }
     Ok(fused)
-}
-
-/// Squared Mahalanobis distance of two beliefs, χ² with N degrees of freedom if they are of one target (no unit).
-/// # Errors
-/// As [`fuse_correlated`].
-pub fn distance2<const N: usize>(i: &Gaussian<N>, j: &Gaussian<N>, cross: &SMatrix<f64, N, N>) -> Result<f64> {
-    let d: SVector<f64, N> = j.mean - i.mean;
-    let s = difference_cov(i, j, cross)
-        .cholesky()
-        .ok_or_else(|| not_definite("the covariance of the tracks' difference"))?;
-    let white = s
-        .l_dirty()
-        .solve_lower_triangular(&d)
-        .ok_or_else(|| not_definite("the covariance of the tracks' difference"))?;
-    Ok(white.norm_squared())
 }
 
 fn difference_cov<const N: usize>(i: &Gaussian<N>, j: &Gaussian<N>, cross: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {

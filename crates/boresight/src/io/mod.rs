@@ -21,10 +21,11 @@ mod stack;
 #[cfg(feature = "images")]
 mod still;
 mod stream;
-pub mod tables;
+pub(crate) mod tables;
 pub mod tracks;
 #[cfg(any(feature = "video", feature = "encode"))]
 pub mod video;
+pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 
 pub use atomic::{AtomicFile, Output};
 #[cfg(feature = "images")]

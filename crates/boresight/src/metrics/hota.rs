@@ -109,7 +109,7 @@ impl Hota {
 
 /// First pass: adds a frame's share of the alignment of each pair. `number[k]` is the number of the pair of overlap k.
 #[derive(Debug, Default)]
-pub struct Alignment {
+pub(crate) struct Alignment {
     /// Sum of the normalised similarities of each pair.
     pub potential: Vec<f64>,
     row_sum: Vec<f64>,
@@ -200,7 +200,7 @@ fn blocked_sum(first: u32, n: u32, entries: &[(u32, f64)]) -> f64 {
 
 /// Second pass: matches frame by frame.
 #[derive(Debug)]
-pub struct HotaCounter {
+pub(crate) struct HotaCounter {
     levels: [f64; N_ALPHA],
     loc: Curve,
     /// For each pair its place in `reached`, or NONE.

@@ -3,31 +3,37 @@
 //! [`evaluate`] judges a result by all of them ([`evaluation`]); [`mot_scores`] gives CLEAR, identity and HOTA alone, and each
 //! other module one family of measures.
 
-pub mod assignment;
-pub mod bootstrap;
+pub(crate) mod assignment;
+pub(crate) mod bootstrap;
 pub mod cells;
-pub mod clear;
-pub mod clear_classic;
+pub(crate) mod clear;
+pub(crate) mod clear_classic;
 pub mod consistency;
-pub mod detection;
+pub(crate) mod detection;
 pub mod evaluation;
 pub mod hota;
-pub mod identity;
+pub(crate) mod identity;
 pub mod image;
-pub mod multi_object;
+pub(crate) mod multi_object;
 mod near;
-pub mod ospa2;
-pub mod overlap;
-pub mod pairs;
-pub mod particle;
+pub(crate) mod ospa2;
+pub(crate) mod overlap;
+pub(crate) mod pairs;
+pub(crate) mod particle;
 pub mod pcrlb;
-pub mod preprocess;
-pub mod sanity;
+pub(crate) mod preprocess;
+pub(crate) mod sanity;
 pub mod set;
 pub mod siap;
 pub mod state;
 pub mod trajectory_gospa;
 mod value;
+pub use bootstrap::{Compared, Interval};
+pub use clear::{Clear, Empty};
+pub use detection::{DetectionScores, OperatingPoint};
+pub use identity::Identity;
+pub use particle::ParticleScores;
+pub use sanity::{Mismatch, SanityWarning};
 
 pub use clear_classic::{ClearClassic, clear_classic};
 pub use evaluation::{EvaluateOptions, Evaluation, evaluate};

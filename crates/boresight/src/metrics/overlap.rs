@@ -51,7 +51,8 @@ fn centre(b: &[f64; 4]) -> [f64; 2] {
 }
 
 /// Intersection over union of two boxes (left, top, width, height), 0..=1.
-pub fn iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+#[cfg(test)]
+fn iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let (a, b) = (corners(a), corners(b));
     iou_of_corners(&a, area(&a), &b, area(&b))
 }

@@ -6,18 +6,22 @@
 
 mod draw;
 pub mod motion;
-pub mod named;
-pub mod radar;
-pub mod radar_config;
-pub mod random;
-pub mod render;
+pub(crate) mod named;
+pub(crate) mod radar;
+pub(crate) mod radar_config;
+pub(crate) mod random;
+pub(crate) mod render;
 pub mod scene;
 mod scene_check;
 mod source;
+pub use motion::Mover;
+pub use named::{NAMES, PAPER_START, paper_scene};
+pub use radar_config::{Measures, PolarErrors, PositionErrors};
+pub use random::Purpose;
 
 pub use motion::MotionConfig;
 pub use named::named;
-pub use radar::{Radar, RadarScan};
+pub use radar::{PlotTruth, Radar, RadarScan};
 pub use radar_config::RadarConfig;
 pub use random::{LevelNoise, LevelTable, Seed};
 pub use render::{PaperTarget, quantise, render_from_normals};

@@ -102,7 +102,7 @@ pub struct WayPoint {
 impl MotionConfig {
     /// Checks the parameters; `at` names the place in messages.
     /// # Errors
-    /// [`ErrorKind::Config`] that names the parameter.
+    /// [`crate::ErrorKind::Config`] that names the parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
         let bad = |key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(false, at, key, value, want);
         match self {

@@ -112,7 +112,7 @@ impl Default for PolarErrors {
 impl RadarConfig {
     /// Checks all values; `at` names the place in the configuration.
     /// # Errors
-    /// [`ErrorKind::Config`] that names the first wrong parameter.
+    /// [`crate::ErrorKind::Config`] that names the first wrong parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
         let check =
             |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(ok, at, key, value, want);

@@ -9,7 +9,7 @@ use crate::validate::check_shown;
 impl SceneConfig {
     /// Checks every parameter; `at` names the place in messages.
     /// # Errors
-    /// [`ErrorKind::Config`] that names the first wrong parameter.
+    /// [`crate::ErrorKind::Config`] that names the first wrong parameter.
     pub fn validate(&self, at: &str) -> Result<()> {
         let check =
             |ok: bool, key: &str, value: &dyn std::fmt::Debug, want: &str| check_shown(ok, at, key, value, want);

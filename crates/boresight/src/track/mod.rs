@@ -1,29 +1,29 @@
 //! From detections to tracks; never sees pixels.
 //!
-//! [`build()`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the tracks come out. [`tracker`] is the order of a step,
+//! [`build()`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the tracks come out. `tracker` is the order of a step,
 //! `step/` its parts (predict, gate, associate, update, delete, initiate, report), `confirm/` the confirmation rules.
 
 mod appearance;
-pub mod association_cost;
+pub(crate) mod association_cost;
 mod build;
 mod clock;
-pub mod clutter;
-pub mod config;
-pub mod confirm;
+pub(crate) mod clutter;
+pub(crate) mod config;
+pub(crate) mod confirm;
 pub mod filter;
-pub mod initial_tracks;
-pub mod initiation;
-pub mod join;
-pub mod merged_measurements;
-pub mod mht;
+pub(crate) mod initial_tracks;
+pub(crate) mod initiation;
+pub(crate) mod join;
+pub(crate) mod merged_measurements;
+pub(crate) mod mht;
 mod scan_interval;
-pub mod scan_table;
+pub(crate) mod scan_table;
 mod single_track;
 pub mod smooth;
-pub mod stabilised;
-pub mod step;
-pub mod stitch;
-pub mod tracker;
+pub(crate) mod stabilised;
+pub(crate) mod step;
+pub(crate) mod stitch;
+pub(crate) mod tracker;
 mod tracking;
 
 pub use appearance::Appearance;

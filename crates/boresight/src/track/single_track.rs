@@ -6,7 +6,7 @@ use super::confirm::history::History;
 use super::filter::Belief;
 use super::scan_table::Noise;
 use crate::Detection;
-use crate::record::Innovation;
+use crate::record::TrackInnovation;
 
 /// Tracks whose neighbourhoods are fetched together, so that the waits for memory overlap.
 pub(super) const BATCH: usize = 16;
@@ -38,7 +38,7 @@ pub(super) struct Outcome {
     pub detection: Option<u32>,
     /// Λ of the scan.
     pub likelihood_ratio: f64,
-    pub innovation: Option<Innovation>,
+    pub innovation: Option<TrackInnovation>,
 }
 
 impl Track {

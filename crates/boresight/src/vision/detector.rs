@@ -1,8 +1,8 @@
 //! The threshold detector: rows of pixels -> rows of bits -> regions -> detections, in one pass over the frame.
 
 use super::background::BitImage;
-use super::cfar::CfarDetector;
 use super::centroid::{Surroundings, centroid};
+use super::cfar::CfarDetector;
 use super::cluster::Clusterer;
 use super::colour::{ColourMask, grey_image};
 use super::config::{CentroidMethod, DetectorConfig, NoiseConfig, Weight};

@@ -4,27 +4,36 @@
 //! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
 
 pub mod background;
-pub mod centroid;
+pub(crate) mod centroid;
 pub mod cfar;
-pub mod cluster;
+pub(crate) mod cluster;
 pub mod colour;
-pub mod config;
-pub mod detector;
-pub mod isolated;
-pub mod llr;
+pub(crate) mod config;
+pub(crate) mod detector;
+pub(crate) mod isolated;
+pub(crate) mod llr;
 pub mod noise;
-pub mod noise_level;
-pub mod pixel;
+pub(crate) mod noise_level;
+pub(crate) mod pixel;
 mod polarity;
 pub mod probability;
-pub mod region;
+pub(crate) mod region;
 mod runs;
 pub mod spatial;
 mod stage;
 mod strongest;
-pub mod tbd;
+pub(crate) mod tbd;
 pub mod threshold;
-pub mod window;
+pub(crate) mod window;
+pub use centroid::{Centroid, Surroundings, centroid};
+pub use cluster::{Clusterer, segment};
+pub use config::{CentroidConfig, CentroidMethod, ClusterConfig, GivenNoise, NoiseConfig, Weight};
+pub use isolated::IsolatedConfig;
+pub use llr::{LlrTable, ScoreImage};
+pub use pixel::Pixel;
+pub use region::Region;
+pub use tbd::{GridEstimate, TrackBeforeDetect};
+pub use window::{FollowConfig, Follower, dark_box, search_window};
 
 pub use config::DetectorConfig;
 pub use detector::build;

@@ -5,6 +5,7 @@ use super::threshold::band;
 
 /// Sums over the pixels of a run.
 #[derive(Clone, Copy, Debug)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
 pub struct RunSums {
     /// Σ I.
     pub sum: f64,

@@ -1,10 +1,10 @@
 //! Fusion of two sensors: never worse than the better one, consistent without known correlation, registration recovered.
 
-use boresight::fuse::covariance_intersection::covariance_intersection;
-use boresight::fuse::track_to_track::fuse_independent;
+use boresight::fuse::covariance_intersection;
+use boresight::fuse::fuse_independent;
 use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables};
+use boresight::sim::Purpose;
 use boresight::sim::Seed;
-use boresight::sim::random::Purpose;
 use boresight::{TrackId, TrackStatus};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{Gaussian, GaussianFilter, Kf, Measurement, Start};

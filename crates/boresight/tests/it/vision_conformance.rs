@@ -1,14 +1,14 @@
 //! Every detector, whatever its threshold: odd sizes, empty and full frames, NaN, the whole range of u16; finite positions
 //! inside the frame, covariances that can be inverted, the same answer twice.
 
-use boresight::vision::colour::ColourMatchConfig;
-use boresight::vision::config::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
-use boresight::vision::spatial::{SpatialConfig, WindowConfig};
+use boresight::vision::FollowConfig;
 use boresight::vision::cfar::CfarConfig;
+use boresight::vision::colour::ColourMatchConfig;
+use boresight::vision::spatial::{SpatialConfig, WindowConfig};
 use boresight::vision::threshold::{
     BandConfig, LevelConfig, LocalConfig, OtsuConfig, Polarity, Side, SpotConfig, ThresholdConfig,
 };
-use boresight::vision::window::FollowConfig;
+use boresight::vision::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
 use boresight::vision::{Detector, build};
 use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
 
@@ -16,9 +16,8 @@ use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, T
 pub fn thresholds() -> Vec<ThresholdConfig> {
     let local = |polarity| ThresholdConfig::Local(LocalConfig { k: 2.0, polarity, cell_px: 8, min_contrast: 0.0 });
     let spot = |polarity| ThresholdConfig::Spot(SpotConfig { size_px: 5.0, k: 2.0, polarity, ..Default::default() });
-    let cfar = |polarity| {
-        ThresholdConfig::Cfar(CfarConfig { false_alarms_per_frame: 10.0, polarity, ..Default::default() })
-    };
+    let cfar =
+        |polarity| ThresholdConfig::Cfar(CfarConfig { false_alarms_per_frame: 10.0, polarity, ..Default::default() });
     let all = vec![
         ThresholdConfig::Band(BandConfig { low: 100.0, high: 60_000.0 }),
         ThresholdConfig::Level(LevelConfig { level: 99.5, side: Side::Bright, exclusive: false }),

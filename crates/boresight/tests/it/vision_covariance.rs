@@ -1,9 +1,9 @@
 //! The covariance of a centroid is honest: the normalised error over 10 000 rendered targets has mean square 2.
 
 use boresight::Image;
-use boresight::vision::centroid::{Surroundings, centroid};
-use boresight::vision::cluster::segment;
-use boresight::vision::config::{CentroidMethod, ClusterConfig};
+use boresight::vision::segment;
+use boresight::vision::{CentroidMethod, ClusterConfig};
+use boresight::vision::{Surroundings, centroid};
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -4,7 +4,7 @@
 
 use crate::needs::{data, real_tests};
 use boresight::fuse::{FuseConfig, RegistrationConfig, Rule, Timeline, fuse_tables, timelines};
-use boresight::sim::radar_config::{Measures, PolarErrors};
+use boresight::sim::{Measures, PolarErrors};
 use boresight::sim::{Radar, RadarConfig, Seed};
 use boresight::track::{self, ConfirmationConfig, MOfNConfig, MergedMeasurementsConfig, TrackerConfig};
 use boresight::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackId, TrackState, TrackStatus};

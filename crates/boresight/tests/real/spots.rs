@@ -2,8 +2,8 @@
 
 use crate::needs::{data, real_tests};
 use boresight::vision::build;
-use boresight::vision::config::{DetectorConfig, NoiseConfig};
 use boresight::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
+use boresight::vision::{DetectorConfig, NoiseConfig};
 use boresight::{PixelKind, Scan};
 
 real_tests! {

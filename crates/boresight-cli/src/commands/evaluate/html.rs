@@ -3,8 +3,8 @@
 use super::Judged;
 use super::plot::{Line, label, plot};
 use super::table::{comparison as comparison_table, state};
+use boresight::metrics::OperatingPoint;
 use boresight::metrics::consistency::Consistency;
-use boresight::metrics::detection::OperatingPoint;
 use boresight::metrics::evaluation::{Comparison, Evaluation, ResultEvaluation, Value, nees_over_runs};
 use boresight::metrics::hota::alphas;
 use boresight::metrics::set::Gospa;

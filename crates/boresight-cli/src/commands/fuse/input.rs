@@ -1,8 +1,8 @@
 //! What `fuse` reads: tracks as they are, detections through the tracker, and each table's frame of reference.
 
-use boresight::fuse::plane::{PlaneMap, common_points};
 use boresight::fuse::{MapKind, Timeline, timelines};
-use boresight::io::tables::{TableOptions, read_detections, read_tracks};
+use boresight::fuse::{PlaneMap, common_points};
+use boresight::io::{TableOptions, read_detections, read_tracks};
 use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, track};
 use nalgebra::Vector2;
 use std::path::Path;

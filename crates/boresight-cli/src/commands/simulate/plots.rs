@@ -1,6 +1,6 @@
 //! Radars of a scene to disk: `NAME.csv` (a table of detections) and `NAME-plots.csv` (range, azimuth, arrival, origin).
 
-use boresight::io::tables::DetectionsCsv;
+use boresight::io::DetectionsCsv;
 use boresight::sim::{Radar, RadarConfig, Seed};
 use boresight::{Error, ErrorKind, Sink, TrackState, View};
 use std::fmt::Write as _;

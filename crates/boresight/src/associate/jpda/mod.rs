@@ -7,9 +7,9 @@
 //! states stay within `max_states`, else loopy belief propagation ([`loopy`]); coalescence may be countered by JPDA*
 //! ([`star`]). A track alone in its group is PDA.
 
-pub mod exact;
-pub mod loopy;
-pub mod star;
+pub(crate) mod exact;
+pub(crate) mod loopy;
+pub(crate) mod star;
 
 use super::groups::Groups;
 use super::{Assignment, Associator, Gates};

@@ -15,9 +15,9 @@ mod seqinfo;
 mod tracks_csv;
 
 pub use columns::Columns;
-pub use detections_csv::{DETECTIONS_HEADER, DetectionsCsv};
+pub use detections_csv::DetectionsCsv;
 pub use json_lines::JsonLines;
-pub use mot::{MotWriter, extent_of_mot_box, mot_box_of_extent};
+pub use mot::{MotWriter, mot_box_of_extent};
 pub(crate) use number::parse_seconds;
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};

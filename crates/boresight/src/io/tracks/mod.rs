@@ -6,10 +6,10 @@ pub mod ctc;
 #[cfg(feature = "images")]
 pub mod ctc_write;
 pub mod kitti;
-pub mod lines;
+pub(crate) mod lines;
 pub mod mot;
-pub mod named;
-pub mod named_write;
+pub(crate) mod named;
+pub(crate) mod named_write;
 
 pub use lines::{BadRows, ReadOptions};
 pub use named::Dialect;

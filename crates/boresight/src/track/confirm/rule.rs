@@ -44,7 +44,7 @@ impl ConfirmationConfig {
     /// History of a track initiated from `n_points` detections (1 or 2).
     ///
     /// `clutter_density` is in 1/px²; `likelihood_ratio` is P_D l / λ of the second point given the first (1 for one point).
-    pub fn begin(&self, n_points: u32, now_ns: i64, clutter_density: f64, likelihood_ratio: f64) -> History {
+    pub(crate) fn begin(&self, n_points: u32, now_ns: i64, clutter_density: f64, likelihood_ratio: f64) -> History {
         let first = |new_target_density: f64| {
             (new_target_density / clutter_density.max(1e-300) * likelihood_ratio).clamp(ODDS.0, ODDS.1)
         };
@@ -72,7 +72,7 @@ impl ConfirmationConfig {
     }
 
     /// Probability that a target stays in view for `dt_s`; 1 where the rule knows none.
-    pub fn survival(&self, dt_s: f64) -> f64 {
+    pub(crate) fn survival(&self, dt_s: f64) -> f64 {
         match self {
             Self::Existence(c) => c.survival(dt_s),
             _ => 1.0,
@@ -81,7 +81,7 @@ impl ConfirmationConfig {
 
     /// Predicts existence to the scan; `survival` is the probability to have stayed in view since the last.
     #[inline]
-    pub fn predict_existence(&self, history: &mut History, survival: f64) {
+    pub(crate) fn predict_existence(&self, history: &mut History, survival: f64) {
         if let Self::Existence(c) = self {
             c.predict(history, survival);
         }
@@ -89,7 +89,7 @@ impl ConfirmationConfig {
 
     /// Existence probability that weighs in the association: ψ, or 1 where the rule has none.
     #[inline]
-    pub fn existence(&self, history: &History) -> f64 {
+    pub(crate) fn existence(&self, history: &History) -> f64 {
         match self {
             Self::Existence(_) => probability_of(history.value),
             _ => 1.0,
@@ -98,7 +98,7 @@ impl ConfirmationConfig {
 
     /// Score of a track, 0..=1: share of hits, or probability.
     #[inline]
-    pub fn score(&self, history: &History) -> f32 {
+    pub(crate) fn score(&self, history: &History) -> f32 {
         match self {
             Self::MOfN(c) => c.score(history),
             Self::Sprt(c) => c.score(history),
@@ -108,7 +108,7 @@ impl ConfirmationConfig {
 
     /// Takes the evidence of a scan in and decides; the coasting budget is the tracker's.
     #[inline]
-    pub fn decide(&self, history: &mut History, evidence: Evidence, now_ns: i64) -> Decision {
+    pub(crate) fn decide(&self, history: &mut History, evidence: Evidence, now_ns: i64) -> Decision {
         history.record(evidence, now_ns);
         match self {
             Self::MOfN(c) => c.decide(history, now_ns),

@@ -2,20 +2,25 @@
 
 mod belief;
 mod conditioned;
-pub mod config;
-pub mod constant_velocity;
-pub mod form;
-pub mod innovation;
-pub mod learning;
-pub mod model;
-pub mod own_model;
-pub mod presets;
+pub(crate) mod config;
+pub(crate) mod constant_velocity;
+pub(crate) mod form;
+pub(crate) mod innovation;
+pub(crate) mod learning;
+pub(crate) mod model;
+pub(crate) mod own_model;
+pub(crate) mod presets;
+pub use constant_velocity::ConstantVelocityKf;
+pub use own_model::{Ar1Config, AsPrintedConfig, DisplacementConfig, ImmConfig, ImmForm, LmsConfig, LmsRuleConfig};
 
 pub(super) use belief::Belief;
 pub use belief::TrackFilter;
 pub use config::FilterConfig;
 pub use form::FormConfig;
-pub use innovation::InnovationConfig;
+pub use innovation::{CorrelatorConfig, HuberConfig, InnovationConfig, StudentTConfig};
 pub use learning::LearningConfig;
-pub use model::ModelConfig;
+pub use model::{
+    ConstantTurnConfig, ModelConfig, NearlyConstantTurnConfig, OrnsteinUhlenbeckConfig, RandomWalkConfig, SingerConfig,
+    WhiteNoiseConfig,
+};
 pub use presets::{PRESETS, Preset};

@@ -70,3 +70,63 @@ pub fn normalised_square(nu: &Vector2<f64>, s: &Matrix2<f64>) -> f64 {
     let det = s.determinant();
     (nu.x * (s[(1, 1)] * nu.x - s[(0, 1)] * nu.y) + nu.y * (s[(0, 0)] * nu.y - s[(0, 1)] * nu.x)) / det
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::associate::{Assignment, AssociatorConfig, Prior};
+    use crate::golden_file::{load, number, numbers, rows};
+    use crate::track::filter::ConstantVelocityKf;
+    use crate::{Detection, Scan};
+    use boresight_filters::{Filter, Gaussian};
+    use nalgebra::{Matrix4, Vector4};
+
+    fn belief(i: &serde_json::Value) -> Gaussian<4> {
+        let p: Vec<f64> = rows(&i["P"]).concat();
+        Gaussian { mean: Vector4::from_vec(numbers(&i["x"])), cov: Matrix4::from_row_slice(&p) }
+    }
+
+    fn square(v: &serde_json::Value) -> Matrix2<f64> {
+        Matrix2::from_row_slice(&rows(v).concat())
+    }
+
+    #[test]
+    fn gate_and_nearest_neighbour_agree_with_the_golden_vectors() {
+        let golden = load("gate_nn");
+        for (n, case) in golden.cases.iter().enumerate() {
+            let i = &case["inputs"];
+            let r = square(&i["R"]);
+            let scan = Scan {
+                detections: rows(&i["Z"]).iter().map(|z| Detection::at(Vector2::new(z[0], z[1]), r)).collect(),
+                ..Scan::default()
+            };
+            let p = ConstantVelocityKf::new(&belief(i), 1.0).predicted();
+            let track = Predicted {
+                x: p.mean.x,
+                y: p.mean.y,
+                cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
+                reach: f64::INFINITY,
+            };
+            let mut table = ScanTable::default();
+            table.read(&scan, 0.0, 0.0).unwrap();
+            table.sort(&scan);
+            let gamma = number(&i["gamma"]);
+            let gates_to = |threshold: f64| {
+                let mut gates = Gates::new();
+                gates.reset(scan.detections.len(), 1.0);
+                gate_row(&table, &track, threshold, 64, true, |_| true, |_| 0.0, &mut gates);
+                gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: threshold });
+                gates
+            };
+            let all = gates_to(1e9);
+            let ours: Vec<f64> = all.row(0).iter().map(|p| p.cost).collect();
+            golden.all_close(&ours, &numbers(&case["outputs"]["d2"]), &format!("case {n}: d2"));
+            let s = innovation_cov(&track, &Noise { xx: r[(0, 0)], xy: r[(0, 1)], yy: r[(1, 1)] });
+            golden.all_close(s.transpose().as_slice(), &rows(&case["outputs"]["S"]).concat(), &format!("case {n}: S"));
+            let mut answer = Assignment::new();
+            AssociatorConfig::Nearest(Default::default()).build().associate(&gates_to(gamma), &mut answer);
+            let nearest = answer.row(0).first().map_or(-1.0, |s| f64::from(s.detection));
+            assert_eq!(nearest, number(&case["outputs"]["nearest"]), "case {n}");
+        }
+    }
+}

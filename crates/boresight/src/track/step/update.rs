@@ -13,7 +13,7 @@ use super::associate::Association;
 use super::context::Context;
 use super::gate::{innovation_cov, normalised_square};
 use crate::associate::{Gates, Share};
-use crate::record::Innovation;
+use crate::record::TrackInnovation;
 use boresight_filters::{Filter, Measurement, Weighted};
 use nalgebra::{Matrix2, Vector2};
 
@@ -107,7 +107,7 @@ fn soft(
     };
 
     weighted.clear();
-    let mut innovation = Innovation { residual: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
+    let mut innovation = TrackInnovation { residual: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
     for share in shares {
         let noise = context.table.noise(share.detection);
         let position = context.scan.detections[share.detection as usize].position;
@@ -165,9 +165,9 @@ pub(in crate::track) fn innovation_of(
     position: &Vector2<f64>,
     predicted: &Predicted,
     cov: &Matrix2<f64>,
-) -> Innovation {
+) -> TrackInnovation {
     let residual = position - Vector2::new(predicted.x, predicted.y);
-    Innovation { residual, cov: *cov, nis: normalised_square(&residual, cov) }
+    TrackInnovation { residual, cov: *cov, nis: normalised_square(&residual, cov) }
 }
 
 fn best_share(shares: &[Share]) -> Option<Share> {

@@ -1,25 +1,25 @@
 //! Moving pixels of a fixed camera: a running background with shadows, changing light, ghosts and slight shake.
 //!
-//! [`Background`] keeps mean and deviation of every pixel ([`model`]) and gives one bit a pixel: moving or not. In a frame:
+//! [`Background`] keeps mean and deviation of every pixel (`model`) and gives one bit a pixel: moving or not. In a frame:
 //! 1. the light of the frame against the model's is estimated on a grid and taken off (`light`);
 //! 2. a pixel moves if it is farther than `threshold-sd` deviations from its mean;
-//! 3. moving pixels that are shadow ([`shadow`]) or, with `shake`, fit a neighbour's background, are background after all;
+//! 3. moving pixels that are shadow (`shadow`) or, with `shake`, fit a neighbour's background, are background after all;
 //! 4. the model follows: still pixels with `time-constant-s`, moving ones with `standing-time-s`, so that a standing
 //!    target stays one; moving pixels that look like the still background beside them with `ghost-time-s`: the hole that
 //!    a departed target leaves fills from its edge (the idea of O. Barnich, M. Van Droogenbroeck, "ViBe", IEEE Trans.
 //!    Image Processing 20(6), 2011, here without chance);
-//! 5. the bits are cleaned ([`morphology`]).
+//! 5. the bits are cleaned (`morphology`).
 //!
-//! All times are in seconds of real time. A row is updated as seldom as its rate allows (see [`model`]), with the time that
+//! All times are in seconds of real time. A row is updated as seldom as its rate allows (see `model`), with the time that
 //! has passed. Limits: the camera stands still but for a pixel; the first `start-s` seconds learn.
 
 mod config;
-pub mod difference;
+pub(crate) mod difference;
 mod light;
-pub mod model;
-pub mod morphology;
+pub(crate) mod model;
+pub(crate) mod morphology;
 mod rows;
-pub mod shadow;
+pub(crate) mod shadow;
 
 pub use config::BackgroundConfig;
 pub use difference::{DifferenceConfig, FrameDifference};

@@ -10,6 +10,7 @@ use super::super::spatial::SpatialPixel;
 
 /// What the comparison of one frame with the model needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
 pub struct Coefficients {
     /// Light of this frame against the model's: factor.
     pub gain: f32,
@@ -23,6 +24,7 @@ pub struct Coefficients {
 
 /// Rates of one update, each in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
 pub struct Rates {
     /// Of pixels that are background.
     pub still: f32,
@@ -54,7 +56,7 @@ pub trait BackgroundPixel: SpatialPixel {
     fn counts(level: Self::Level) -> f32;
     /// Whether the pixel is farther from the model than `factor` deviations.
     fn moves(self, mean: Self::Level, deviation: Self::Level, t: &Self::Terms) -> bool;
-    /// The model after this pixel; `state` is [`STILL`], [`MOVING`] or [`GHOST`].
+    /// The model after this pixel; `state` is `STILL`, `MOVING` or `GHOST`.
     fn adapt(
         self,
         mean: Self::Level,
@@ -74,6 +76,7 @@ pub const GHOST: u8 = 2;
 
 /// Coefficients of the fixed-point model.
 #[derive(Clone, Copy, Debug)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
 pub struct FixedTerms {
     /// gain in 2¹⁴ths.
     gain: i16,
@@ -85,6 +88,7 @@ pub struct FixedTerms {
 
 /// Rates in 2¹⁵ths.
 #[derive(Clone, Copy, Debug)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
 pub struct FixedSteps {
     still: i16,
     moving: i16,

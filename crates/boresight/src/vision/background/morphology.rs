@@ -122,17 +122,20 @@ pub fn clean(image: &mut BitImage, how: CleanUp, work: &mut BitImage) {
 }
 
 /// Sets a pixel if all of its 3x3 window is set (pixels outside are not).
-pub fn erode(image: &BitImage, out: &mut BitImage) {
+#[cfg(test)]
+fn erode(image: &BitImage, out: &mut BitImage) {
     window3(image, out, erosion);
 }
 
 /// Sets a pixel if any of its 3x3 window is set.
-pub fn dilate(image: &BitImage, out: &mut BitImage) {
+#[cfg(test)]
+fn dilate(image: &BitImage, out: &mut BitImage) {
     window3(image, out, dilation);
 }
 
 /// Sets a pixel if at least 5 of its 3x3 window are set.
-pub fn majority3(image: &BitImage, out: &mut BitImage) {
+#[cfg(test)]
+fn majority3(image: &BitImage, out: &mut BitImage) {
     window3(image, out, majority);
 }
 

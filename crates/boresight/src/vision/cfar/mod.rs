@@ -7,9 +7,9 @@
 //! ([`merge`]), with its region ([`region`]) and, for spots, a Gaussian's position and covariance ([`spot_fit`]).
 //! Derivation and every constant: `docs/theory/detection-cfar.md`.
 
-pub mod config;
+pub(crate) mod config;
 mod contrast;
-pub mod detector;
+pub(crate) mod detector;
 mod merge;
 mod noise;
 mod pyramid;
@@ -18,4 +18,4 @@ mod spot_fit;
 mod tail;
 
 pub use config::CfarConfig;
-pub use detector::CfarDetector;
+pub use detector::{Cell, CfarDetector};

@@ -1,12 +1,15 @@
 //! Thresholds: which pixels belong to targets. Each turns one row of native pixels into one row of bits.
 
-pub mod band;
+pub(crate) mod band;
 mod box_mean;
-pub mod grid;
+pub(crate) mod grid;
 pub(crate) mod level;
-pub mod local;
-pub mod otsu;
-pub mod spot;
+pub(crate) mod local;
+pub(crate) mod otsu;
+pub(crate) mod spot;
+pub use band::{band_bits, words};
+pub use grid::BackgroundGrid;
+pub use otsu::otsu_level;
 
 use super::background::{BackgroundConfig, DifferenceConfig};
 use super::cfar::CfarConfig;

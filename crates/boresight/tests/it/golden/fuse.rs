@@ -1,7 +1,7 @@
 //! Golden vectors of the room `fuse`: track-to-track fusion.
 
-use super::{Golden, load, numbers, rows};
-use boresight::fuse::track_to_track::{fuse_correlated, fuse_independent};
+use super::file::{Golden, load, numbers, rows};
+use boresight::fuse::{fuse_correlated, fuse_independent};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix4, Vector4};
 use serde_json::Value;

@@ -2,6 +2,7 @@
 //! rel_tol |b|. The folder is the repository's `golden/`; `BORESIGHT_GOLDEN` names another of the same form. A missing
 //! file fails. One submodule a room; each reads its own files with [`load`].
 
+pub mod file;
 mod fuse;
 mod sim;
 mod spatial;
@@ -9,31 +10,8 @@ mod track;
 mod track_metrics;
 mod vision;
 
-use serde_json::Value;
-use std::path::{Path, PathBuf};
-
-/// One file of golden vectors: its tolerances and its cases.
-pub struct Golden {
-    pub rel_tol: f64,
-    pub abs_tol: f64,
-    pub cases: Vec<Value>,
-}
-
-/// The repository's folder of golden vectors.
-fn repository_folder() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../golden")
-}
-
-/// Reads `NAME.json`.
-pub fn load(name: &str) -> Golden {
-    let folder = std::env::var_os("BORESIGHT_GOLDEN").map_or_else(repository_folder, PathBuf::from);
-    let path = folder.join(format!("{name}.json"));
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("golden vectors {}: {e}", path.display()));
-    let v: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let cases = v["cases"].as_array().expect("cases").clone();
-    assert!(!cases.is_empty(), "{name}: no cases");
-    Golden { rel_tol: v["rel_tol"].as_f64().expect("rel_tol"), abs_tol: v["abs_tol"].as_f64().expect("abs_tol"), cases }
-}
+use file::repository_folder;
+use std::path::Path;
 
 /// All Rust text of a folder of tests.
 fn sources(dir: &Path) -> String {
@@ -56,6 +34,7 @@ fn every_golden_file_is_read_by_a_test_and_described() {
     let tests = ["crates/boresight/tests/it/golden", "crates/boresight-filters/tests/it/golden"]
         .map(|dir| sources(&root.join(dir)))
         .concat();
+    let tests = tests + &sources(&root.join("crates/boresight/src/track/step"));
     let readme = std::fs::read_to_string(repository_folder().join("README.md")).unwrap();
     let mut n_files = 0;
     for entry in std::fs::read_dir(repository_folder()).unwrap() {
@@ -66,43 +45,4 @@ fn every_golden_file_is_read_by_a_test_and_described() {
         n_files += 1;
     }
     assert!(n_files > 0, "no golden files");
-}
-
-/// A number of a golden file; non-finite values are the strings "inf", "-inf", "nan".
-pub fn number(v: &Value) -> f64 {
-    match v {
-        Value::String(s) => s.parse().expect("a number"),
-        _ => v.as_f64().unwrap_or_else(|| panic!("expected a number, found {v}")),
-    }
-}
-
-/// A list of numbers.
-pub fn numbers(v: &Value) -> Vec<f64> {
-    v.as_array().unwrap_or_else(|| panic!("expected a list, found {v}")).iter().map(number).collect()
-}
-
-/// A list of rows of numbers.
-pub fn rows(v: &Value) -> Vec<Vec<f64>> {
-    v.as_array().unwrap_or_else(|| panic!("expected rows, found {v}")).iter().map(numbers).collect()
-}
-
-impl Golden {
-    /// Asserts |a - b| <= abs_tol + rel_tol |b|.
-    #[track_caller]
-    pub fn close(&self, ours: f64, golden: f64, what: &str) {
-        let same = ours == golden || (ours.is_nan() && golden.is_nan());
-        assert!(
-            same || (ours - golden).abs() <= self.abs_tol + self.rel_tol * golden.abs(),
-            "{what}: {ours} instead of {golden}"
-        );
-    }
-
-    /// Asserts that two lists agree.
-    #[track_caller]
-    pub fn all_close(&self, ours: &[f64], golden: &[f64], what: &str) {
-        assert_eq!(ours.len(), golden.len(), "{what}: length");
-        for (i, (a, b)) in ours.iter().zip(golden).enumerate() {
-            self.close(*a, *b, &format!("{what}[{i}]"));
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Golden vectors of the room `sim`: rendering from supplied normals.
 
-use super::{load, number, numbers, rows};
+use super::file::{load, number, numbers, rows};
 use boresight::Image;
 use boresight::sim::{PaperTarget, quantise, render_from_normals};
 

@@ -1,6 +1,6 @@
 //! Golden vectors of the spatial filters, noise generators, image metrics and colours.
 
-use super::{load, number, rows};
+use super::file::{load, number, rows};
 use boresight::Image;
 use boresight::metrics::image::{compare, pfe_spectral};
 use boresight::vision::colour::{ColourMatch, ColourMatchConfig, distance, grey, hsi, matches};

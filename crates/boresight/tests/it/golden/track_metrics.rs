@@ -1,6 +1,6 @@
 //! PFE, RMSPE, RMSVE and their halved variants; the posterior bounds.
 
-use super::{load, number, numbers, rows};
+use super::file::{load, number, numbers, rows};
 use boresight::metrics::pcrlb::{LinearModel, pcrlb, rmspe_without_prior};
 use boresight::metrics::state::state_errors;
 use nalgebra::{Matrix1, Matrix1x2, Matrix2};

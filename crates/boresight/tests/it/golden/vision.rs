@@ -1,15 +1,15 @@
 //! Golden vectors of `vision`: segmentation, probabilities, likelihood ratio, track before detect, dark box and window.
 
-use super::{load, number, numbers, rows};
+use super::file::{load, number, numbers, rows};
 use boresight::Image;
-use boresight::vision::centroid::{Surroundings, centroid};
-use boresight::vision::cluster::Clusterer;
-use boresight::vision::config::{CentroidMethod, ClusterConfig};
-use boresight::vision::llr::{LlrTable, ScoreImage};
+use boresight::vision::Clusterer;
+use boresight::vision::TrackBeforeDetect;
 use boresight::vision::probability::{Level, PixelRect, pixel_probability, proximity_range, rounded_probability};
-use boresight::vision::tbd::TrackBeforeDetect;
-use boresight::vision::threshold::band::{band_bits, words};
-use boresight::vision::window::{dark_box, search_window};
+use boresight::vision::threshold::{band_bits, words};
+use boresight::vision::{CentroidMethod, ClusterConfig};
+use boresight::vision::{LlrTable, ScoreImage};
+use boresight::vision::{Surroundings, centroid};
+use boresight::vision::{dark_box, search_window};
 use nalgebra::Vector2;
 use serde_json::Value;
 

@@ -6,7 +6,7 @@ mod merged;
 mod random_scans;
 mod units;
 
-use boresight::associate::{AssociatorConfig, jpda::Coalescence, jpda::JpdaConfig};
+use boresight::associate::{AssociatorConfig, Coalescence, JpdaConfig};
 use boresight::track::{
     AssociationCostConfig, ClutterConfig, ConfirmationConfig, ExistenceConfig, InitiationConfig, MhtConfig,
     OverlapConfig, SprtConfig, TrackerConfig, TwoStageConfig,
@@ -32,7 +32,7 @@ pub fn scan(k: u64, points: &[(f64, f64)]) -> Scan {
 
 /// Every associator.
 pub fn associators() -> Vec<AssociatorConfig> {
-    use boresight::associate::global_nearest::{CostKind, GlobalNearestConfig};
+    use boresight::associate::{CostKind, GlobalNearestConfig};
     vec![
         AssociatorConfig::Nearest(Default::default()),
         AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Distance }),
