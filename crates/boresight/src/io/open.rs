@@ -131,33 +131,37 @@ fn has_image_name(path: &Path) -> bool {
     path.extension().is_some_and(|e| NAMES.iter().any(|n| e.eq_ignore_ascii_case(n)))
 }
 
+#[cfg_attr(not(feature = "images"), allow(unused_variables))]
 fn open_images(input: &str, files: Vec<PathBuf>, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "images")]
     return Ok(Box::new(super::folder::ImageFiles::open(input, files, options)?));
     #[cfg(not(feature = "images"))]
-    return Err(not_built(&(input, files, options).0, "images", "images"));
+    return Err(not_built(input, "images", "images"));
 }
 
+#[cfg_attr(not(feature = "images"), allow(unused_variables))]
 fn open_gif(input: &str, whole: impl Read + Send + 'static, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "images")]
     return Ok(Box::new(super::stack::gif::GifFrames::open(input, whole, options)?));
     #[cfg(not(feature = "images"))]
-    return Err(not_built((input, whole, options).0, "GIF", "images"));
+    return Err(not_built(input, "GIF", "images"));
 }
 
+#[cfg_attr(not(feature = "video"), allow(unused_variables))]
 fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "video")]
     return super::video::open_mp4(path, options);
     #[cfg(not(feature = "video"))]
-    return Err(not_built(&(path, options).0.to_string_lossy(), "video", "video"));
+    return Err(not_built(&path.to_string_lossy(), "video", "video"));
 }
 
 /// What is neither image nor MP4: through `ffmpeg`.
+#[cfg_attr(not(feature = "video"), allow(unused_variables))]
 fn open_other_video(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "video")]
     return super::video::open_ffmpeg(input, options);
     #[cfg(not(feature = "video"))]
-    return Err(not_built((input, options).0, "video", "video"));
+    return Err(not_built(input, "video", "video"));
 }
 
 #[cfg(not(all(feature = "images", feature = "video")))]
