@@ -285,10 +285,10 @@ impl Crate {
                 m.words.iter().map(|w| [glob.as_slice(), std::slice::from_ref(w)].concat()).collect::<Vec<_>>()
             });
             for target in by_use.map(|(_, target)| target.clone()).chain(by_glob).chain(m.paths.iter().cloned()) {
-                if let Some(file) = self.defined_in(path, &target, 0) {
-                    if file != m.file {
-                        from.insert(file.to_path_buf());
-                    }
+                if let Some(file) = self.defined_in(path, &target, 0)
+                    && file != m.file
+                {
+                    from.insert(file.to_path_buf());
                 }
             }
         }
