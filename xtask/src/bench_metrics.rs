@@ -4,7 +4,7 @@
 //! MOTChallenge tables. Peers run through `scripts/metrics_peers.py` with a Python that has them.
 
 use anyhow::{Context, Result};
-use boresight::io::tracks::{ReadOptions, mot};
+use boresight::io::tracks::{Format, ReadOptions, read};
 use boresight::metrics::hota::mean;
 use boresight::metrics::set::{SetDistance, SetOptions};
 use boresight::metrics::{MatchOptions, mot_scores};
@@ -98,8 +98,8 @@ pub fn run(args: &Args) -> Result<()> {
     let mut row = String::new();
     for _ in 0..args.runs.max(1) {
         let begin = Instant::now();
-        let (t, _) = mot::read(&truth, ReadOptions::default())?;
-        let (r, _) = mot::read(&result, ReadOptions::default())?;
+        let t = read(&truth, Some(Format::Mot), ReadOptions::default(), false)?.table;
+        let r = read(&result, Some(Format::Mot), ReadOptions::default(), false)?.table;
         let s = mot_scores(&t, &r, &MatchOptions::default())?;
         best = best.min(begin.elapsed().as_secs_f64());
         row = format!("{:.6} | {:.6} | {:.6}", s.clear.mota(), s.identity.idf1(), mean(&s.hota.hota()));

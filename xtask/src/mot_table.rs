@@ -5,7 +5,7 @@
 //! Scores are those of `boresight::metrics`, which equal TrackEval's; `--out DIR` writes MOT files for TrackEval itself.
 
 use anyhow::{Context, Result};
-use boresight::io::tracks::{ReadOptions, mot};
+use boresight::io::tracks::{Format, ReadOptions, read};
 use boresight::io::{TableOptions, mot_box_of_extent, read_detections};
 use boresight::metrics::{MatchOptions, MotScores, Rules, hota, mot_scores, preprocess};
 use boresight::track::{self, TrackerConfig, TwoStageConfig};
@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<()> {
         let (mut ours, mut peers) = (Vec::new(), Vec::new());
         for folder in &folders {
             let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let truth = mot::read(&folder.join("gt.txt"), ReadOptions::default())?.0;
+            let truth = read(&folder.join("gt.txt"), Some(Format::Mot), ReadOptions::default(), false)?.table;
             let result = tracked(&config, &folder.join(detections)).with_context(|| name.clone())?;
             if let Some(out) = &args.out {
                 write(&out.join(format!("{name}.txt")), &result)?;
@@ -68,7 +68,8 @@ pub fn run(args: &Args) -> Result<()> {
             print_row(&format!("{name:16} boresight"), &ours[ours.len() - 1]);
             let beside = peer.map(|p| folder.join(p)).or_else(|| Some(args.sort.as_ref()?.join(format!("{name}.txt"))));
             if let Some(peer) = beside {
-                let result = mot::read(&peer, ReadOptions::default()).with_context(|| peer.display().to_string())?.0;
+                let result = read(&peer, Some(Format::Mot), ReadOptions::default(), false);
+                let result = result.with_context(|| peer.display().to_string())?.table;
                 peers.push(judged(&truth, &result, rules)?);
                 print_row(&format!("{:16} SORT", ""), &peers[peers.len() - 1]);
             }

@@ -54,6 +54,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(first) = &file.bad.first {
         eprintln!("note: {} malformed rows left out; the first: {first}", file.bad.count);
     }
+    if file.bad.without_track > 0 {
+        eprintln!("note: {} rows belong to no track and were left out", file.bad.without_track);
+    }
     let mut bytes = Vec::new();
     let to_folder = args.to == Format::Ctc;
     let dropped = if to_folder { to_ctc(&args, &file)? } else { write(&file.table, args.to, &mut bytes)? };

@@ -1,12 +1,11 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
-use boresight::io::{TRACKS_HEADER, TableOptions, TracksCsv, read_tracks};
+use boresight::io::{TableOptions, TracksCsv, read_tracks};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod, filter_track, predict, smooth_track};
 use boresight::{Config, Extent, FrameIndex, Scan, Sink, Timestamp, TrackFrame, TrackState, TrackStatus, View};
 use boresight_filters::Gaussian;
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// How smoothing is computed.
@@ -76,7 +75,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let table = read_tracks(&args.tracks, &options)?;
     table.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
-    let own = first_line(&args.tracks) == TRACKS_HEADER;
+    let own = table.has_states;
     let config = settings(&args, own)?;
     if !own {
         eprintln!("rows are positions of deviation {} px where the table has none: filtered first", args.std_px);
@@ -147,13 +146,6 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     };
     config.validate("smooth")?;
     Ok(config)
-}
-
-fn first_line(path: &Path) -> String {
-    let mut line = String::new();
-    // A file that cannot be read here could not be read as a table either.
-    let _ = std::fs::File::open(path).and_then(|f| BufReader::new(f).read_line(&mut line));
-    line.trim_end().to_string()
 }
 
 /// Puts predicted rows into the frames between a track's rows in which it has none; returns how many.

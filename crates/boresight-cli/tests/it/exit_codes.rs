@@ -77,7 +77,7 @@ fn every_failure_has_its_documented_code_and_names_a_mend() {
         case(&["track", "empty"], 3, &["holds no image files"]),
         case(&["track", "none/*.png"], 3, &["none/*.png"]),
         case(&["track", "huge.pgm"], 3, &["huge.pgm"]),
-        case(&["track", "bad.csv"], 3, &["bad.csv", "line 3", "column x", "'a'", "hint:"]),
+        case(&["track", "bad.csv"], 3, &["bad.csv", "line 3", "column x", "\"a\"", "hint:"]),
         case(&["track", "wide.csv"], 3, &["wide.csv", "line 2", "5 fields, expected 3", "decimal commas"]),
         case(&["track", "zero.txt"], 3, &["line 1", "first-frame=0", "--skip-bad-rows"]),
         case(&["track", "utf16.csv"], 3, &["UTF-16", "hint:"]),

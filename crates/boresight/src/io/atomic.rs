@@ -3,6 +3,8 @@
 //! A run that is killed leaves nothing under the final name, and under `NAME.part` all that was written up to the last
 //! whole frame (the text writers hand over whole frames, each in one write). The part file is locked while it is
 //! written, so that two runs cannot mix their lines in it.
+//! Why not `tempfile`: what it keeps has a random name, and a killed run's table must be found; it neither locks, nor follows a
+//! link to the file that is to be replaced, nor refuses to replace a device.
 
 use crate::{Error, ErrorKind, Result};
 use std::fs::{File, OpenOptions, TryLockError};

@@ -13,6 +13,8 @@ mod options;
 #[cfg(feature = "images")]
 mod pattern;
 mod pixels;
+#[cfg(test)]
+mod same_rows;
 #[cfg(feature = "images")]
 mod samples;
 mod sniff;

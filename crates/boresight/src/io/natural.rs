@@ -2,6 +2,8 @@
 //!
 //! Runs of ASCII digits compare as whole numbers of any length; everything else compares by Unicode scalar value. Names
 //! that differ only in leading zeros are ordered by their text, so the order is total.
+//! Why not `natord` 1.0.9: it leaves out blanks (`a 1` equals `a1`) and compares numbers with leading zeros as fractions (`f_0010`
+//! before `f_01`); both tests below fail with it.
 
 use std::cmp::Ordering;
 

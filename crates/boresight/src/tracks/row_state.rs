@@ -48,6 +48,12 @@ impl TrackTable {
         }
     }
 
+    /// The name of a row's class, where the table names its classes.
+    pub fn class_name(&self, row: usize) -> Option<&str> {
+        let at = usize::try_from(self.class.get(row)).ok()?.checked_sub(1)?;
+        self.class_names.get(at).map(String::as_str)
+    }
+
     /// Whether any row has a velocity.
     pub fn has_velocity(&self) -> bool {
         self.states.velocity != Column::Constant(None)

@@ -3,7 +3,7 @@
 
 use crate::lcg::Lcg;
 use crate::needs::{data, real_tests};
-use boresight::io::tracks::{ReadOptions, kitti};
+use boresight::io::tracks::{Format, ReadOptions, read as read_table};
 use boresight::metrics::hota::mean;
 use boresight::metrics::{KittiClass, MatchOptions, Rules, mot_scores, preprocess};
 use std::collections::HashMap;
@@ -56,8 +56,9 @@ fn kitti_results_score_as_in_trackeval() {
         let (t, r) = (folder.path().join("t.txt"), folder.path().join("r.txt"));
         std::fs::write(&t, &labels).unwrap();
         std::fs::write(&r, result(&labels, &detections, seq.parse().unwrap())).unwrap();
-        let (truth, _) = kitti::read(&t, ReadOptions::default()).unwrap();
-        let (result, _) = kitti::read(&r, ReadOptions::default()).unwrap();
+        let of = |path| read_table(path, Some(Format::Kitti), ReadOptions::default(), false).unwrap().table;
+        let truth = of(&t);
+        let result = of(&r);
         let class = if class == "car" { KittiClass::Car } else { KittiClass::Pedestrian };
         let (truth, result) = preprocess(&truth, &result, Rules::Kitti(class)).unwrap();
         let s = mot_scores(&truth, &result, &MatchOptions::default()).unwrap();

@@ -3,7 +3,8 @@
 //! The data are non-commercial and stay outside the repository; the reference files beside them were made by these tools.
 
 use crate::needs::{data, real_tests};
-use boresight::io::tracks::{ReadOptions, mot};
+use boresight::TrackTable;
+use boresight::io::tracks::{Format, ReadOptions, read};
 use boresight::metrics::hota::{N_ALPHA, mean};
 use boresight::metrics::{MatchOptions, MotScores, Rules, clear_classic, mot_scores, preprocess};
 use std::collections::HashMap;
@@ -15,6 +16,11 @@ real_tests! {
     mot17_with_distractors_scores_as_in_trackeval needs ["mot17_text"];
     the_surveillance_clip_scores_as_in_trackeval_for_both_results needs ["pets09_vtest"];
     mot15_with_the_cem_tracker_scores_as_in_py_motmetrics needs ["mot15_text"];
+}
+
+/// A table of MOTChallenge.
+fn read_mot(path: &Path) -> TrackTable {
+    read(path, Some(Format::Mot), ReadOptions::default(), false).unwrap().table
 }
 
 /// Every number of TrackEval's detailed table by its column's name.
@@ -104,9 +110,9 @@ fn sequence_length(folder: &Path) -> usize {
 }
 
 fn score(folder: &Path, result: &str, rules: Rules) -> MotScores {
-    let (mut truth, _) = mot::read(&folder.join("gt.txt"), ReadOptions::default()).unwrap();
+    let mut truth = read_mot(&folder.join("gt.txt"));
     truth.extend_to(sequence_length(folder));
-    let (result, _) = mot::read(&folder.join(result), ReadOptions::default()).unwrap();
+    let result = read_mot(&folder.join(result));
     let (truth, result) = preprocess(&truth, &result, rules).unwrap();
     mot_scores(&truth, &result, &MatchOptions::default()).unwrap()
 }
@@ -173,9 +179,9 @@ fn mot15_with_the_cem_tracker_scores_as_in_py_motmetrics() {
     let data = data("mot15_text");
     let reference = reference(&data.join("expected_cem_motmetrics.csv"));
     for seq in MOT15 {
-        let (mut truth, _) = mot::read(&data.join(seq).join("gt.txt"), ReadOptions::default()).unwrap();
+        let mut truth = read_mot(&data.join(seq).join("gt.txt"));
         truth.extend_to(sequence_length(&data.join(seq)));
-        let (result, _) = mot::read(&data.join(seq).join("result_cem.txt"), ReadOptions::default()).unwrap();
+        let result = read_mot(&data.join(seq).join("result_cem.txt"));
         let (truth, result) = preprocess(&truth, &result, Rules::Mot15).unwrap();
         let c = clear_classic(&truth, &result, &MatchOptions::default()).unwrap();
         let s = mot_scores(&truth, &result, &MatchOptions::default()).unwrap();

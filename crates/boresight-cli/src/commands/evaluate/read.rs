@@ -19,8 +19,7 @@ fn open(args: &Args, path: &Path, truth: bool) -> Result<TrackFile> {
     };
     let options = ReadOptions {
         skip_bad_rows: args.skip_bad_rows,
-        // Velocities and covariances are read where the table has them.
-        keep_extra: matches!(format, Format::Named(_)) && !args.mot_only,
+        keep_extra: false,
         frames_from_zero: if truth { args.truth_from_zero } else { args.result_from_zero },
     };
     let mut file = read(path, Some(format), options, args.tentative).map_err(|e| {

@@ -1,7 +1,8 @@
 //! PNM: PBM, PGM and PPM, plain and binary (P1 to P6), and float PFM (Pf, PF).
 //!
-//! Own reader, since the crates at hand read neither plain files nor any depth between 8 and 16 bits. Values stay what
-//! the file says (a 12-bit image with maxval 4095 holds 0..=4095); maxval up to 255 gives 8 bits, above 16 bits.
+//! Values stay what the file says (a 12-bit image with maxval 4095 holds 0..=4095); maxval up to 255 gives 8 bits, above 16 bits.
+//! Why no crate: `zune-ppm` 0.5.1 reads no plain files and no PBM; `image` 0.25.10 rescales what is not 8 or 16 bits deep (1 of
+//! maxval 4095 becomes 16) and reads no float PFM.
 //! Source: netpbm's format pages pbm(5), pgm(5), ppm(5), pfm(5). A PBM's black (1) becomes 0, white (0) becomes 255.
 
 use crate::io::guard::damaged;

@@ -30,12 +30,76 @@ pub(crate) enum Field {
     Sum,
     Score,
     Class,
+    Visibility,
+    Truncation,
+    Occlusion,
+    Status,
+    Detection,
+    Vx,
+    Vy,
+    CovXVx,
+    CovXVy,
+    VarVx,
+    CovVxY,
+    CovVxVy,
+    CovYVy,
+    VarVy,
 }
 
 /// Number of [`Field`]s.
-pub(crate) const N_FIELDS: usize = Field::Class as usize + 1;
+pub(crate) const N_FIELDS: usize = Field::VarVy as usize + 1;
 
-/// Field, its key in [`Columns`], and the names it goes by in the order of preference.
+impl Field {
+    /// The velocity, px/s.
+    pub const VELOCITY: [Self; 2] = [Self::Vx, Self::Vy];
+    /// The covariance of `[x, vx, y, vy]`: its upper triangle, row by row.
+    pub const COV: [Self; 10] = [
+        Self::VarX,
+        Self::CovXVx,
+        Self::CovXy,
+        Self::CovXVy,
+        Self::VarVx,
+        Self::CovVxY,
+        Self::CovVxVy,
+        Self::VarY,
+        Self::CovYVy,
+        Self::VarVy,
+    ];
+
+    /// What is expected in its cells.
+    pub fn expected(self) -> &'static str {
+        match self {
+            Self::Frame => "a frame number",
+            Self::TimeS => "a time in seconds",
+            Self::Id => "a track id",
+            Self::X => "a position x",
+            Self::Y => "a position y",
+            Self::Left => "a left edge",
+            Self::Top => "a top edge",
+            Self::Right => "a right edge",
+            Self::Bottom => "a bottom edge",
+            Self::Width => "a width",
+            Self::Height => "a height",
+            Self::Score => "a confidence",
+            Self::Class => "a class",
+            Self::Visibility => "a visible share",
+            Self::Truncation => "a truncation",
+            Self::Occlusion => "an occlusion",
+            Self::Status => "a status",
+            Self::Detection => "a detection's number",
+            Self::Vx | Self::Vy => "a velocity",
+            Self::VarX | Self::VarY | Self::VarVx | Self::VarVy => "a variance",
+            Self::StdX | Self::StdY => "a standard deviation",
+            Self::CovXy | Self::CovXVx | Self::CovXVy | Self::CovVxY | Self::CovVxVy | Self::CovYVy => "a covariance",
+            Self::Area | Self::Peak | Self::Sum => "a number",
+        }
+    }
+}
+
+/// Field, its key in [`Columns`] (empty: only by its own name), and the names it goes by in the order of preference.
+///
+/// Units: px, px², s; velocities and their covariances are taken only from columns that name px and s, for in other programs'
+/// tables they count per frame. Other units are told by the user or the program's own lines (TrackMate).
 const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (
         Field::Frame,
@@ -128,6 +192,20 @@ const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (Field::Sum, "sum", &["sum", "mass", "totalintensity", "integratedintensity", "totalintensitych1", "rawintden"]),
     (Field::Score, "score", &["score", "conf", "confidence", "prob", "probability", "quality"]),
     (Field::Class, "class", &["class", "classid", "classname", "category", "categoryid"]),
+    (Field::Visibility, "", &["visibility"]),
+    (Field::Truncation, "", &["truncation"]),
+    (Field::Occlusion, "", &["occlusion"]),
+    (Field::Status, "", &["status"]),
+    (Field::Detection, "", &["detection"]),
+    (Field::Vx, "", &["vxpxpers"]),
+    (Field::Vy, "", &["vypxpers"]),
+    (Field::CovXVx, "", &["covxvxpx2pers"]),
+    (Field::CovXVy, "", &["covxvypx2pers"]),
+    (Field::VarVx, "", &["varvxpx2pers2"]),
+    (Field::CovVxY, "", &["covvxypx2pers"]),
+    (Field::CovVxVy, "", &["covvxvypx2pers2"]),
+    (Field::CovYVy, "", &["covyvypx2pers"]),
+    (Field::VarVy, "", &["varvypx2pers2"]),
 ];
 
 /// Column names given by the user; what is not given is found by common names.
@@ -159,7 +237,7 @@ impl Columns {
             let known =
                 pair.split_once('=').is_some_and(|(k, v)| !v.trim().is_empty() && field_of_key(k.trim()).is_some());
             if !known {
-                let keys: Vec<_> = KNOWN.iter().map(|(_, key, _)| *key).collect();
+                let keys: Vec<_> = KNOWN.iter().map(|(_, key, _)| *key).filter(|key| !key.is_empty()).collect();
                 return Err(Error::new(ErrorKind::Config, "expected meaning=column, such as x=cx")
                     .at(format!("{at} = {pair}"))
                     .hint(format!("meanings: {}", keys.join(", "))));
@@ -169,8 +247,14 @@ impl Columns {
     }
 }
 
+/// The names that a field goes by, best first.
+#[cfg(test)]
+pub(crate) fn names_of(field: Field) -> &'static [&'static str] {
+    KNOWN[field as usize].2
+}
+
 fn field_of_key(key: &str) -> Option<Field> {
-    KNOWN.iter().find(|(_, k, _)| *k == key).map(|(field, _, _)| *field)
+    KNOWN.iter().find(|(_, k, _)| !k.is_empty() && *k == key).map(|(field, _, _)| *field)
 }
 
 /// A name without case and punctuation.
@@ -179,22 +263,25 @@ fn plain(name: &str) -> String {
 }
 
 /// The column of each field in one table.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
     at: [Option<usize>; N_FIELDS],
     /// Factor from the time column to seconds.
     pub time_scale: Option<f64>,
 }
 
+impl Default for Layout {
+    fn default() -> Self {
+        Self { at: [None; N_FIELDS], time_scale: None }
+    }
+}
+
 impl Layout {
-    /// The columns of MOTChallenge text.
-    pub fn mot() -> Self {
+    /// Columns in a fixed order.
+    pub fn fixed(columns: impl IntoIterator<Item = (Field, usize)>) -> Self {
         let mut layout = Self::default();
-        for (i, field) in [Field::Frame, Field::Id, Field::Left, Field::Top, Field::Width, Field::Height, Field::Score]
-            .into_iter()
-            .enumerate()
-        {
-            layout.at[field as usize] = Some(i);
+        for (field, at) in columns {
+            layout.at[field as usize] = Some(at);
         }
         layout
     }
@@ -245,6 +332,14 @@ impl Layout {
     /// Whether all of these fields are there.
     pub fn has(&self, fields: &[Field]) -> bool {
         fields.iter().all(|f| self.column(*f).is_some())
+    }
+
+    /// Whether rows are states of a filter: identity, status, position, velocity, the whole covariance, and a box.
+    pub fn has_states(&self) -> bool {
+        use Field::{Frame, Height, Id, Status, TimeS, Width, X, Y};
+        self.has(&[Frame, TimeS, Id, Status, X, Y, Width, Height])
+            && self.has(&Field::VELOCITY)
+            && self.has(&Field::COV)
     }
 
     /// Whether rows say where things are: centre or box.

@@ -2,6 +2,7 @@
 //!
 //! Numbers that JSON cannot hold (infinite, not a number) become `null`. Covariances are rows of the upper triangle as
 //! in the CSV tables: `[x,x] [x,y] [y,y]`, and the ten entries of `[x, vx, y, vy]`.
+//! Why not `serde_json`: it writes 2.0 and 1e+21 where the CSV tables have 2 and 1e21; the numbers are to be the same text in both.
 
 use super::number::{push_f32, push_f64, push_seconds};
 use super::tracks_csv::status_word;

@@ -1,24 +1,34 @@
 //! Tables in and out: tracks, detections, MOTChallenge, JSON lines.
+//!
+//! One way in: [`lexer`] parts lines and fields, [`table`] tells the kind by the first line, [`columns`] names the columns,
+//! [`dialect`] knows what is special of each, [`row`] gives cells as numbers. What is made of the rows: detections
+//! ([`read_detections`]), states ([`read_tracks`]), or a table of tracks (`io::tracks`).
 
-mod columns;
+pub(crate) mod columns;
 mod detection_row;
 mod detections_csv;
+pub(crate) mod dialect;
 mod json_lines;
-mod mot;
-mod number;
+pub(crate) mod kind;
+pub(crate) mod lexer;
+pub(crate) mod lost;
+mod mot_writer;
+pub(crate) mod number;
 mod options;
 mod read_detections;
 mod read_tracks;
-mod rows;
+pub(crate) mod row;
 mod scan_times;
 mod seqinfo;
+pub(crate) mod table;
 mod tracks_csv;
 
 pub use columns::Columns;
 pub use detections_csv::DetectionsCsv;
+pub use dialect::mot::mot_box_of_extent;
+pub use dialect::named::Dialect;
 pub use json_lines::JsonLines;
-pub use mot::{MotWriter, mot_box_of_extent};
-pub(crate) use number::parse_seconds;
+pub use mot_writer::MotWriter;
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
 pub use read_tracks::{StateTable, read_tracks};

@@ -6,8 +6,8 @@
 use super::columns::Field;
 use super::detection_row::RowReader;
 use super::options::TableOptions;
-use super::rows::Table;
 use super::scan_times::{scans_of, set_times};
+use super::table::Table;
 use crate::{Error, ErrorKind, Result, Scan};
 use std::path::Path;
 
@@ -36,34 +36,31 @@ pub struct DetectionTable {
 pub fn read_detections(path: impl AsRef<Path>, options: &TableOptions) -> Result<DetectionTable> {
     options.validate("table")?;
     let path = path.as_ref();
-    let table = Table::open(path, &options.columns)?;
-    detections_of(&table, options, super::seqinfo::rate_beside(path))
+    let mut table = Table::open(path, &options.columns)?;
+    detections_of(&mut table, options, super::seqinfo::rate_beside(path))
 }
 
-fn detections_of(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<DetectionTable> {
+fn detections_of(table: &mut Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<DetectionTable> {
     Ok(identified_of(table, options, rate_beside, false)?.0)
 }
 
 /// Reads the rows as detections, with the identity of each in the order of the scans; `identified` leaves out rows that
 /// belong to no track (an empty or negative identity).
 pub(crate) fn identified_of(
-    table: &Table,
+    table: &mut Table,
     options: &TableOptions,
     rate_beside: Option<f64>,
     identified: bool,
 ) -> Result<(DetectionTable, Vec<u64>)> {
-    let layout = &table.layout;
-    if !layout.has(&[Field::Frame]) {
-        return Err(table.lacks("which frame a row belongs to", "name it: --columns frame=NAME"));
+    if table.is_empty {
+        return Err(Error::new(ErrorKind::Damaged, "the table is empty").at(&table.form.label));
     }
-    if !layout.has_position() {
-        return Err(table.lacks("where a detection is (x and y, or a box)", "name them: --columns x=NAME,y=NAME"));
-    }
-    let reader = RowReader::new(table, options);
+    table.check_place()?;
+    let reader = RowReader::new(&table.form, table.first_frame(), options);
     let mut out = DetectionTable {
         scans: Vec::new(),
         rate_hz: 0.0,
-        format: reader.format(),
+        format: RowReader::format(&table.form),
         class_names: Vec::new(),
         n_rows: 0,
         n_skipped: 0,
@@ -71,52 +68,51 @@ pub(crate) fn identified_of(
     };
     let mut seen = Vec::new();
     let mut n_loose = 0;
-    for row in table.rows() {
+    while let Some(row) = table.next_row()? {
         out.n_rows += 1;
-        if identified && row.maybe(Field::Id).is_ok_and(|id| id.is_none_or(|id| id < 0.0)) {
+        if identified && row.id().is_ok_and(|id| id.is_none_or(|id| id < 0)) {
             n_loose += 1;
             continue;
         }
         match reader.read(&row, identified, &mut out.class_names) {
-            Ok(one) => seen.push(one),
+            Ok(one) => seen.extend(one),
             Err(_) if options.skip_bad_rows => out.n_skipped += 1,
             // A run that was cut off leaves a last line without an end.
-            Err(e) if row.cut && !seen.is_empty() => {
+            Err(e) if row.line.cut && !seen.is_empty() => {
                 out.n_skipped += 1;
                 out.warnings.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
             }
             Err(e) => return Err(e.hint("mend the row, or leave such rows out with --skip-bad-rows")),
         }
     }
+    let (label, layout) = (&table.form.label, &table.form.layout);
     if out.n_skipped > 0 && options.skip_bad_rows {
-        out.warnings.push(format!("{}: {} of {} rows were bad and left out.", table.label, out.n_skipped, out.n_rows));
+        out.warnings.push(format!("{label}: {} of {} rows were bad and left out.", out.n_skipped, out.n_rows));
     }
     if seen.is_empty() && out.n_skipped > 0 {
-        return Err(
-            Error::new(ErrorKind::Damaged, format!("none of its {} rows can be read", out.n_rows)).at(&table.label)
-        );
+        return Err(Error::new(ErrorKind::Damaged, format!("none of its {} rows can be read", out.n_rows)).at(label));
     }
     if let Some(unit) = &table.unit {
         out.warnings.push(format!(
             "{}: positions are in {unit}, and were taken as pixels: export them in pixels, or read all results in {unit}.",
-            table.label
+            label
         ));
     }
     if n_loose > 0 {
-        out.warnings.push(format!("{}: {n_loose} rows belong to no track and were left out.", table.label));
+        out.warnings.push(format!("{}: {n_loose} rows belong to no track and were left out.", label));
     }
     seen.sort_by_key(|s| s.frame);
-    let ids = seen.iter().map(|s| s.id).collect();
-    let (mut scans, times) = scans_of(table, seen)?;
-    let rate = set_times(&mut scans, &times, table, options, rate_beside)?;
+    let ids = seen.iter().map(|s| s.id.unwrap_or_default().unsigned_abs()).collect();
+    let (mut scans, times) = scans_of(label, seen)?;
+    let rate = set_times(&mut scans, &times, label, options, rate_beside)?;
     (out.scans, out.rate_hz) = (scans, rate.rate_hz);
     if rate.is_assumed {
-        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", table.label, rate.rate_hz));
+        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", label, rate.rate_hz));
     }
     if !layout.has(&[Field::VarX]) && !layout.has(&[Field::StdX]) && !out.scans.is_empty() {
         out.warnings.push(format!(
             "{} has no position errors: a standard deviation of {} px was taken.",
-            table.label, options.std_px
+            label, options.std_px
         ));
     }
     Ok((out, ids))
@@ -131,7 +127,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn read(text: &str, options: &TableOptions) -> Result<DetectionTable> {
-        detections_of(&Table::of_text("t.csv".into(), text.as_bytes(), &options.columns)?, options, None)
+        detections_of(&mut Table::of_text("t.csv", text.as_bytes(), &options.columns)?, options, None)
     }
 
     fn plain(text: &str) -> DetectionTable {
@@ -199,7 +195,7 @@ mod tests {
             ("-1,1,2", "column frame"),
             ("1.5,1,2", "column frame"),
             ("1,1", "2 fields"),
-            ("1,one,2", "'one'"),
+            ("1,one,2", "\"one\""),
         ] {
             let text = format!("frame,x,y\n0,1,1\n{row}\n2,3,3\n");
             let error = read(&text, &TableOptions::default()).unwrap_err().to_string();
@@ -211,7 +207,9 @@ mod tests {
         let far = read("frame,x,y\n0,1,1\n999999999999,1,1\n", &TableOptions::default());
         assert!(far.unwrap_err().to_string().contains("hole"));
         let wild = read("frame,x,y,time_ns\n0,1,1,0\n1,1,1,1e30\n", &TableOptions::default());
-        assert!(wild.unwrap_err().to_string().contains("column time_ns: found '1e30'"));
+        assert!(
+            wild.unwrap_err().to_string().contains("column time_ns: expected a time within 292 years, found \"1e30\"")
+        );
     }
 
     #[test]

@@ -6,8 +6,8 @@
 use super::columns::Field;
 use super::options::TableOptions;
 use super::read_detections::identified_of;
-use super::rows::{Row, Table};
-use super::tracks_csv::{TRACKS_HEADER, status_word};
+use super::row::Row;
+use super::table::Table;
 use crate::{Extent, FrameIndex, Result, Timestamp, TrackFrame, TrackId, TrackState, TrackStatus};
 use boresight_filters::Gaussian;
 use nalgebra::{SMatrix, SVector};
@@ -20,6 +20,8 @@ pub struct StateTable {
     pub frames: Vec<TrackFrame>,
     /// Rate, frames/s: given, or found from the times.
     pub rate_hz: f64,
+    /// Whether the table states velocities and whole covariances, as `tracks.csv` does; else they are made up.
+    pub has_states: bool,
     /// Number of rows left out.
     pub n_skipped: u64,
     /// Whole sentences about what was assumed or left out.
@@ -32,18 +34,18 @@ pub struct StateTable {
 pub fn read_tracks(path: impl AsRef<Path>, options: &TableOptions) -> Result<StateTable> {
     options.validate("table")?;
     let path = path.as_ref();
-    let table = Table::open(path, &options.columns)?;
-    if table.header.join(",") == TRACKS_HEADER {
-        return own_tracks(&table, options);
+    let mut table = Table::open(path, &options.columns)?;
+    if table.form.layout.has_states() {
+        return own_tracks(&mut table, options);
     }
-    foreign_tracks(&table, options, super::seqinfo::rate_beside(path))
+    foreign_tracks(&mut table, options, super::seqinfo::rate_beside(path))
 }
 
-/// Our own table: nothing is guessed, every number comes back to the bit.
-fn own_tracks(table: &Table, options: &TableOptions) -> Result<StateTable> {
-    let mut out = StateTable { frames: Vec::new(), rate_hz: 0.0, n_skipped: 0, warnings: Vec::new() };
-    for row in table.rows() {
-        match own_row(table, &row) {
+/// A table of states, as our own: nothing is guessed, every number comes back to the bit.
+fn own_tracks(table: &mut Table, options: &TableOptions) -> Result<StateTable> {
+    let mut out = StateTable { frames: Vec::new(), rate_hz: 0.0, has_states: true, n_skipped: 0, warnings: Vec::new() };
+    while let Some(row) = table.next_row()? {
+        match own_row(&row) {
             Ok((index, time, state)) => match out.frames.last_mut() {
                 Some(last) if last.index == index => last.tracks.push(state),
                 Some(last) if last.index > index && !options.skip_bad_rows => {
@@ -55,7 +57,7 @@ fn own_tracks(table: &Table, options: &TableOptions) -> Result<StateTable> {
                 _ => out.frames.push(TrackFrame { index, time, tracks: vec![state] }),
             },
             Err(_) if options.skip_bad_rows => out.n_skipped += 1,
-            Err(e) if row.cut && !out.frames.is_empty() => {
+            Err(e) if row.line.cut && !out.frames.is_empty() => {
                 out.n_skipped += 1;
                 out.warnings.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
             }
@@ -73,52 +75,46 @@ fn own_tracks(table: &Table, options: &TableOptions) -> Result<StateTable> {
     Ok(out)
 }
 
-fn own_row(table: &Table, row: &Row<'_>) -> Result<(FrameIndex, Timestamp, TrackState)> {
+fn own_row(row: &Row<'_>) -> Result<(FrameIndex, Timestamp, TrackState)> {
     row.check_length()?;
-    let wrong = |at: usize, expected: &str| {
-        let name = table.header.get(at).map_or("", String::as_str);
-        row.bad(format!("column {name}: found '{}', expected {expected}", row.cell(at).unwrap_or("")))
-    };
-    let whole = |at: usize| row.cell(at).and_then(|c| c.parse::<u64>().ok()).ok_or_else(|| wrong(at, "a whole number"));
-    let number = |at: usize| {
-        let value = row.cell(at).and_then(|c| c.parse::<f64>().ok()).filter(|v| v.is_finite());
-        value.ok_or_else(|| wrong(at, "a finite number"))
-    };
-    let time = row.cell(1).and_then(super::number::parse_seconds).ok_or_else(|| wrong(1, "a time in seconds"))?;
-    let status = [TrackStatus::Tentative, TrackStatus::Confirmed, TrackStatus::Coasting]
-        .into_iter()
-        .find(|s| row.cell(3) == Some(status_word(*s)))
-        .ok_or_else(|| wrong(3, "tentative, confirmed or coasting"))?;
-    let mean = SVector::<f64, 4>::new(number(4)?, number(6)?, number(5)?, number(7)?);
+    let wrong = |field: Field, expected: &str| row.wrong(field, &row.word(field).unwrap_or_default(), expected);
+    let time = row.time()?.ok_or_else(|| wrong(Field::TimeS, "a time in seconds"))?;
+    let status = row.status().ok_or_else(|| wrong(Field::Status, "tentative, confirmed or coasting"))?;
+    let [vx, vy] = Field::VELOCITY.map(|f| row.need(f));
+    let mean = SVector::<f64, 4>::new(row.need(Field::X)?, vx?, row.need(Field::Y)?, vy?);
     let mut cov = SMatrix::<f64, 4, 4>::zeros();
-    let mut at = 8;
+    let mut upper = Field::COV.into_iter();
     for i in 0..4 {
         for j in i..4 {
-            cov[(i, j)] = number(at)?;
+            cov[(i, j)] = upper.next().map_or(Ok(0.0), |f| row.need(f))?;
             cov[(j, i)] = cov[(i, j)];
-            at += 1;
         }
     }
-    let (width_px, height_px) = (number(18)?, number(19)?);
+    let (width_px, height_px) = (row.need(Field::Width)?, row.need(Field::Height)?);
     let extent = Extent { left_px: mean[0] - width_px / 2.0, top_px: mean[2] - height_px / 2.0, width_px, height_px };
-    let detection = match row.cell(20) {
-        None | Some("") => None,
-        Some(text) => Some(text.parse().map_err(|_| wrong(20, "a row number or nothing"))?),
-    };
-    let id = TrackId(whole(2)?);
-    let state =
-        TrackState { id, status, kinematics: Gaussian { mean, cov }, extent, detection, innovation: None, score: 1.0 };
-    Ok((FrameIndex(whole(0)?), time, state))
+    let detection = row.detection();
+    if detection.is_none() && row.word(Field::Detection).is_some() {
+        return Err(wrong(Field::Detection, "a row number or nothing"));
+    }
+    let id = row.id()?.and_then(|id| u64::try_from(id).ok()).ok_or_else(|| wrong(Field::Id, "a track id from 0"))?;
+    let kinematics = Gaussian { mean, cov };
+    let state = TrackState { id: TrackId(id), status, kinematics, extent, detection, innovation: None, score: 1.0 };
+    Ok((FrameIndex(row.frame(0)?), time, state))
 }
 
 /// Any other table: its rows are read as detections and get their identities.
-fn foreign_tracks(table: &Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<StateTable> {
-    if !table.layout.has(&[Field::Id]) {
-        return Err(table.lacks("which track a row belongs to", "rename the one that does to track_id"));
+fn foreign_tracks(table: &mut Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<StateTable> {
+    if !table.is_empty {
+        table.check_track()?;
     }
     let (read, ids) = identified_of(table, options, rate_beside, true)?;
-    let mut out =
-        StateTable { frames: Vec::new(), rate_hz: read.rate_hz, n_skipped: read.n_skipped, warnings: read.warnings };
+    let mut out = StateTable {
+        frames: Vec::new(),
+        rate_hz: read.rate_hz,
+        has_states: false,
+        n_skipped: read.n_skipped,
+        warnings: read.warnings,
+    };
     let mut ids = ids.into_iter();
     for scan in read.scans {
         if scan.detections.is_empty() {
@@ -226,9 +222,9 @@ mod tests {
 
     #[test]
     fn rows_without_identity_are_no_tracks() {
-        let table =
-            Table::of_text("t".into(), b"FRAME,TRACK_ID,X,Y\n0,,1,1\n0,5,2,2\n1,4,3,3\n", &Columns::default()).unwrap();
-        let read = foreign_tracks(&table, &TableOptions::default(), None).unwrap();
+        let mut table =
+            Table::of_text("t", b"FRAME,TRACK_ID,X,Y\n0,,1,1\n0,5,2,2\n1,4,3,3\n", &Columns::default()).unwrap();
+        let read = foreign_tracks(&mut table, &TableOptions::default(), None).unwrap();
         assert_eq!(read.frames.iter().map(|f| f.tracks[0].id.0).collect::<Vec<_>>(), [5, 4]);
         assert!(read.warnings.iter().any(|w| w.contains("1 rows belong to no track")));
     }

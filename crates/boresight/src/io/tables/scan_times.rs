@@ -5,7 +5,6 @@
 
 use super::detection_row::Seen;
 use super::options::TableOptions;
-use super::rows::Table;
 use crate::{Error, ErrorKind, FrameIndex, Result, Scan, Timestamp};
 
 /// A sequence of frames with a hole larger than this is taken for a wrong number, not for a pause.
@@ -20,7 +19,7 @@ const USUAL_RATE_HZ: f64 = 25.0;
 /// Groups rows, sorted by frame, into one scan a frame; with the time of each frame as far as its first row has one.
 /// # Errors
 /// [`ErrorKind::Damaged`] for holes that no pause explains.
-pub(super) fn scans_of(table: &Table, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec<Option<Timestamp>>)> {
+pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec<Option<Timestamp>>)> {
     let mut scans: Vec<Scan> = Vec::new();
     let mut times = Vec::new();
     let mut n_empty = 0;
@@ -38,7 +37,7 @@ pub(super) fn scans_of(table: &Table, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec
                         next - 1
                     );
                     return Err(Error::new(ErrorKind::Damaged, what)
-                        .at(&table.label)
+                        .at(label)
                         .hint("is the frame column really the frame?"));
                 }
                 scans.extend((next..one.frame).map(|f| Scan { index: FrameIndex(f), ..Scan::default() }));
@@ -66,7 +65,7 @@ pub(super) struct Rate {
 pub(super) fn set_times(
     scans: &mut [Scan],
     times: &[Option<Timestamp>],
-    table: &Table,
+    label: &str,
     options: &TableOptions,
     rate_beside: Option<f64>,
 ) -> Result<Rate> {
@@ -96,7 +95,7 @@ pub(super) fn set_times(
                 to.as_secs_f64()
             );
             return Err(Error::new(ErrorKind::Damaged, what)
-                .at(&table.label)
+                .at(label)
                 .hint("--rate-hz makes times from the frames' numbers"));
         }
         let n = (b - a) as i128;

@@ -5,7 +5,8 @@
 //! A pixel's value is its cell's label, 0 the background. Frames and pixels count from 0.
 //! Limits: two dimensions; labels up to 65535.
 
-use super::lines::{Fields, each_line, separator};
+use crate::io::tables::lexer::{Lines, Separator, split};
+use crate::io::tables::number::parse_f64;
 use crate::io::{OpenOptions, open};
 use crate::{Error, ErrorKind, Image, PixelOrigin, Pixels, Result, TrackRow, TrackTable, TrackTableBuilder};
 use std::collections::BTreeMap;
@@ -132,26 +133,30 @@ impl CtcFolder {
 /// # Errors
 /// A missing file; a malformed line; a label twice; an end before its begin.
 pub fn read_lineages(path: &Path) -> Result<Vec<Lineage>> {
-    let mut out: Vec<Lineage> = Vec::new();
-    each_line(path, |number, line| {
-        let place = || format!("{} line {number}", path.display());
-        let mut f = Fields::new(line, separator(line));
+    let (mut out, mut cells) = (Vec::new(), Vec::new());
+    let mut lines = Lines::open(path)?;
+    while let Some(line) = lines.next_line()? {
+        let damaged =
+            |what: String| Error::new(ErrorKind::Damaged, what).at(format!("{} line {}", path.display(), line.number));
+        let separator = Separator::of(line.text);
+        split(line.text, separator, &mut cells);
         let mut v = [0_u32; 4];
-        for (v, what) in v.iter_mut().zip(["a label", "a first frame", "a last frame", "a parent's label"]) {
-            let n = f.integer(what).map_err(|e| e.at(place()))?;
-            *v = u32::try_from(n).map_err(|_| {
-                Error::new(ErrorKind::Damaged, format!("expected {what} from 0, found {n}")).at(place())
-            })?;
+        let expected = ["a label", "a first frame", "a last frame", "a parent's label"];
+        for (k, (v, what)) in v.iter_mut().zip(expected).enumerate() {
+            let text = cells.get(k).map_or(&b""[..], |c| &line.text[c.0 as usize..c.1 as usize]);
+            let number = parse_f64(text, false).filter(|n| n.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(n));
+            *v = number.ok_or_else(|| {
+                let found = String::from_utf8_lossy(text);
+                let found: String = found.chars().take(30).collect();
+                damaged(format!("column {}: expected {what} (a whole number from 0), found \"{found}\"", k + 1))
+            })? as u32;
         }
         let [label, begin, end, parent] = v;
         if end < begin {
-            return Err(
-                Error::new(ErrorKind::Damaged, format!("ends in frame {end} before it begins in {begin}")).at(place())
-            );
+            return Err(damaged(format!("ends in frame {end} before it begins in {begin}")));
         }
         out.push(Lineage { label, begin, end, parent });
-        Ok(())
-    })?;
+    }
     out.sort_unstable_by_key(|l| l.label);
     if let Some(w) = out.windows(2).find(|w| w[0].label == w[1].label) {
         return Err(Error::new(ErrorKind::Damaged, format!("label {} stands twice", w[0].label)).at(path.display()));

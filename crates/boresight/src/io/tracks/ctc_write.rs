@@ -6,6 +6,7 @@
 //! Limits: labels up to 65535; images up to 2²⁸ pixels.
 
 use super::ctc::Lineage;
+use crate::io::tables::lost::lost;
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackTable};
 use std::path::Path;
 use tiff::encoder::{TiffEncoder, colortype::Gray16};
@@ -175,7 +176,7 @@ fn dropped(table: &TrackTable, plan: &Plan, n_hidden: usize, n_outside: usize) -
     if n_outside > 0 {
         out.push(format!("{n_outside} rows outside of the images"));
     }
-    out.extend(super::lost(table, &[]));
+    out.extend(lost(table, &[]));
     out.extend(table.extra.iter().map(|e| e.0.clone()).filter(|n| n != "parent"));
     out
 }

@@ -1,4 +1,4 @@
-//! TIFF pages that the `tiff` crate does not read: palettes of 1 to 8 bits, and grey packed to 10, 12 or 14 bits.
+//! TIFF pages that the `tiff` crate (0.11.3, its newest) does not read: palettes of 1 to 8 bits, and grey packed to 10, 12 or 14 bits.
 //!
 //! Strips or tiles; uncompressed, LZW, deflate or PackBits; horizontal predictor for 8-bit palettes. Samples are packed
 //! from the high bit on, each row starts at a byte. Source: TIFF 6.0, sections 3 to 5, 9, 14, 15 and 8 (palette colour).

@@ -1,26 +1,11 @@
-//! MOTChallenge results: `frame,id,left,top,width,height,conf,-1,-1,-1`, frames and pixels counted from 1.
-//!
-//! A MOTChallenge box that starts at the top-left pixel has left = top = 1; here that pixel's left edge is -0.5. So left
-//! and top shift by 1.5 px, sizes do not change. Source: Leal-Taixé et al., *MOTChallenge 2015*, section on data format.
+//! MOTChallenge results as a sink: `frame,id,left,top,width,height,conf,-1,-1,-1`, counted from 1 (see `dialect::mot`).
 
+use super::dialect::mot::mot_box_of_extent;
 use super::number::{push_f32, push_f64};
 use crate::io::atomic::Output;
-use crate::{Extent, Result, Sink, TrackStatus, View};
+use crate::{Result, Sink, TrackStatus, View};
 use std::fmt::Write;
 use std::path::PathBuf;
-
-/// From a pixel's edge counted from the centre of pixel 0 to the box coordinate counted from pixel 1.
-const SHIFT_PX: f64 = 1.5;
-
-/// Returns left, top, width, height as MOTChallenge counts them, px.
-pub fn mot_box_of_extent(extent: &Extent) -> [f64; 4] {
-    [extent.left_px + SHIFT_PX, extent.top_px + SHIFT_PX, extent.width_px, extent.height_px]
-}
-
-/// Returns the box of MOTChallenge's left, top, width, height, px.
-pub fn extent_of_mot_box([left, top, width_px, height_px]: [f64; 4]) -> Extent {
-    Extent { left_px: left - SHIFT_PX, top_px: top - SHIFT_PX, width_px, height_px }
-}
 
 /// Writes MOTChallenge text.
 pub struct MotWriter {

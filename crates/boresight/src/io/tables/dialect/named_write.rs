@@ -5,7 +5,7 @@
 //! TrackMate's table wants a label, a spot's number and three more header lines; they are made up where the table has none.
 
 use super::named::Dialect;
-use super::{REGIONS, lost};
+use crate::io::tables::lost::{REGIONS, lost};
 use crate::{Error, ErrorKind, Result, TrackTable};
 use std::io::Write;
 
@@ -25,6 +25,7 @@ pub fn write(table: &TrackTable, dialect: Dialect, out: &mut impl Write) -> Resu
         Dialect::Plain => ["visibility", "truncation", "occlusion"].into_iter().filter(|c| says(c)).collect(),
         _ => Vec::new(),
     };
+    let class = |r: usize| table.class_name(r).map_or_else(|| table.class.get(r).to_string(), String::from);
     let trackmate = dialect == Dialect::TrackMate;
     let extra: Vec<&Extra> = table.extra.iter().filter(|e| !(trackmate && TRACKMATE.contains(&e.0.as_str()))).collect();
     let own = TRACKMATE.map(|n| table.extra.iter().find(|e| trackmate && e.0 == n).map(|e| &e.1));
@@ -54,9 +55,9 @@ pub fn write(table: &TrackTable, dialect: Dialect, out: &mut impl Write) -> Resu
             let (x, y) = (e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0);
             let (id, score) = (table.ids[table.tracks[r] as usize], table.score.get(r));
             match dialect {
-                Dialect::Plain if table.is_points => write!(out, "{frame},{id},{x},{y},{score},{}", table.class.get(r)),
+                Dialect::Plain if table.is_points => write!(out, "{frame},{id},{x},{y},{score},{}", class(r)),
                 Dialect::Plain => {
-                    write!(out, "{frame},{id},{x},{y},{},{},{score},{}", e.width_px, e.height_px, table.class.get(r))
+                    write!(out, "{frame},{id},{x},{y},{},{},{score},{}", e.width_px, e.height_px, class(r))
                 }
                 Dialect::Trackpy => write!(out, "{frame},{id},{x},{y}"),
                 Dialect::TrackMate => {
@@ -88,7 +89,7 @@ pub fn write(table: &TrackTable, dialect: Dialect, out: &mut impl Write) -> Resu
 
 fn dropped(table: &TrackTable, dialect: Dialect) -> Vec<String> {
     let mut out = match dialect {
-        Dialect::Plain => lost(table, &["score", "class", "visibility", "truncation", "occlusion"]),
+        Dialect::Plain => lost(table, &["score", "class", "class names", "visibility", "truncation", "occlusion"]),
         Dialect::TrackMate => lost(table, &["score"]),
         _ => lost(table, &[]),
     };
@@ -100,14 +101,13 @@ fn dropped(table: &TrackTable, dialect: Dialect) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::named::read;
-    use super::super::{BadRows, ReadOptions};
     use super::*;
+    use crate::io::tracks::{BadRows, ReadOptions, read};
 
     fn read_text(text: &str, options: ReadOptions) -> Result<(TrackTable, BadRows)> {
         let f = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(f.path(), text).unwrap();
-        read(f.path(), options, false)
+        read(f.path(), None, options, false).map(|f| (f.table, f.bad))
     }
 
     #[test]
