@@ -235,6 +235,55 @@ mod tests {
         assert!(plain("frame,x,y\n0,1,1\n").warnings.iter().any(|w| w.contains("standard deviation of 1 px")));
     }
 
+    #[test]
+    fn what_a_table_does_not_say_is_taken_as_the_options_say() {
+        let first = |text: &str, options: &TableOptions| read(text, options).unwrap().scans[0].detections[0].clone();
+        let usual = TableOptions::default();
+        let d = first("frame,x,y\n0,10,20\n", &usual);
+        assert_eq!(d.extent, Extent { left_px: 7.5, top_px: 17.5, width_px: 5.0, height_px: 5.0 });
+        assert_eq!((d.area_px, d.peak, d.sum, d.score, d.class), (25, 0.0, 0.0, 1.0, None));
+        assert_eq!(d.cov, Matrix2::identity());
+        let d = first("frame,x,y,area\n0,10,20,16\n", &usual);
+        assert_eq!((d.extent.left_px, d.extent.width_px, d.area_px), (8.0, 4.0, 16));
+        let d = first("frame,left,top,width,height\n0,10,20,0.1,0.1\n", &usual);
+        assert_eq!(d.area_px, 1, "no detection is smaller than a pixel");
+        let d = first("frame,x,y,w,h\n0,10,20,-1,-1\n", &usual);
+        assert_eq!(d.extent.width_px, 5.0, "a size below 0 stands for none");
+        let shares = TableOptions { std_per_side: 0.1, ..usual.clone() };
+        let d = first("frame,left,top,width,height\n0,10,20,30,4\n", &shares);
+        assert_eq!((d.cov[(0, 0)], d.cov[(1, 1)]), (9.0, 1.0), "the larger of the two");
+        let d = first("frame,x,y,ep\n0,10,20,-1\n", &usual);
+        assert_eq!(d.cov[(0, 0)], 1.0, "trackpy's unknown error");
+        let d = first("frame,x,y,std_x,std_y\n0,10,20,2,3\n", &usual);
+        assert_eq!((d.cov[(0, 0)], d.cov[(0, 1)], d.cov[(1, 1)]), (4.0, 0.0, 9.0));
+        let table = plain("frame,x,y\n2,1,1\n");
+        assert_eq!((table.rate_hz, table.scans[0].time.ns), (25.0, 80_000_000));
+        assert!(table.warnings.iter().any(|w| w.contains("25 frames/s were taken")));
+    }
+
+    #[test]
+    fn options_out_of_range_are_refused_by_name() {
+        let of = |change: fn(&mut TableOptions)| {
+            let mut options = TableOptions::default();
+            change(&mut options);
+            options.validate("table").map_err(|e| e.to_string())
+        };
+        assert!(of(|_| {}).is_ok());
+        for (change, name) in [
+            ((|o| o.rate_hz = Some(0.0)) as fn(&mut TableOptions), "table.rate-hz"),
+            (|o| o.rate_hz = Some(f64::INFINITY), "table.rate-hz"),
+            (|o| o.std_px = 0.0, "table.std-px"),
+            (|o| o.std_px = f64::NAN, "table.std-px"),
+            (|o| o.std_per_side = 1.01, "table.std-per-side"),
+            (|o| o.std_per_side = -0.01, "table.std-per-side"),
+            (|o| o.box_px = -1.0, "table.box-px"),
+            (|o| o.first_pixel = f64::NAN, "table.first-pixel"),
+        ] {
+            assert!(of(change).unwrap_err().contains(name), "{name}");
+        }
+        assert!(of(|o| (o.box_px, o.std_per_side, o.first_pixel) = (0.0, 1.0, 1.0)).is_ok());
+    }
+
     fn detection() -> impl Strategy<Value = Detection> {
         let n = || -1e6..1e6f64;
         (n(), n(), 1e-9..1e3f64, 1e-9..1e3f64, -0.99..0.99f64, 0.0..1e4f64, 1u32..100, any::<f32>(), n()).prop_map(
