@@ -6,10 +6,13 @@ pub mod ctc;
 #[cfg(feature = "images")]
 pub mod ctc_write;
 mod format;
+mod options;
 mod read;
+mod rows;
 mod write;
 
 pub use crate::io::tables::Dialect;
 pub use format::Format;
-pub use read::{BadRows, ReadOptions, TrackFile, read, sniff};
+pub use options::{BadRows, ReadOptions};
+pub use read::{TrackFile, read, sniff};
 pub use write::write;
