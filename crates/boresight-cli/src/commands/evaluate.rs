@@ -1,18 +1,23 @@
 //! `boresight evaluate`: how good is a result against the truth, by every measure of the field.
 
 mod arguments;
+mod demand;
 mod html;
 mod images;
 mod json;
+mod judged;
+mod output;
 mod plot;
 mod read;
 mod sequences;
 mod table;
 
 use anyhow::{Context, bail};
-use boresight::metrics::evaluation::{self, Better, Comparison, ResultEvaluation, Value};
+use boresight::metrics::evaluation::{self, Comparison, ResultEvaluation};
+use demand::met;
+use judged::Judged;
+use output::put;
 use rayon::prelude::*;
-use std::path::Path;
 use std::process::ExitCode;
 
 pub use arguments::{Args, format, size};
@@ -55,12 +60,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     met(&args, &results[0].evaluation.values())
 }
 
-/// A result and what there is to say of it.
-struct Judged {
-    evaluation: ResultEvaluation,
-    notes: Vec<String>,
-}
-
 /// The notes of all sequences, with the sequence's name where there are several.
 fn named_notes(evaluation: &ResultEvaluation, notes: Vec<Vec<String>>) -> Vec<String> {
     let several = notes.len() > 1;
@@ -69,12 +68,6 @@ fn named_notes(evaluation: &ResultEvaluation, notes: Vec<Vec<String>>) -> Vec<St
         notes.into_iter().map(move |n| if several { format!("{name}: {n}") } else { n })
     };
     evaluation.sequences.iter().zip(notes).flat_map(named).collect()
-}
-
-fn put(path: &Path, text: &str) -> boresight::Result<()> {
-    std::fs::write(path, text).map_err(|e| {
-        boresight::Error::new(boresight::ErrorKind::Output, "cannot be written").at(path.display()).because(e)
-    })
 }
 
 fn write_files(args: &Args, results: &[Judged], comparison: &[Comparison]) -> anyhow::Result<()> {
@@ -92,27 +85,4 @@ fn write_files(args: &Args, results: &[Judged], comparison: &[Comparison]) -> an
         put(path, &html::report(results, comparison))?;
     }
     Ok(())
-}
-
-/// Whether the demands are met, as an exit code.
-fn met(args: &Args, combined: &[Value]) -> anyhow::Result<ExitCode> {
-    let mut met = true;
-    for (name, limit) in &args.require {
-        let Some(found) = combined.iter().find(|v| v.name.eq_ignore_ascii_case(name)) else {
-            let known: Vec<&str> = combined.iter().map(|v| v.name).collect();
-            bail!(
-                boresight::Error::new(boresight::ErrorKind::Config, "no such measure")
-                    .at(format!("--require {name}"))
-                    .hint(format!("one of {}", known.join(", ")))
-            );
-        };
-        let (key, value, at_most) = (found.name, found.value, found.better == Better::Lower);
-        let ok = if at_most { value <= *limit } else { value >= *limit };
-        if !ok {
-            met = false;
-            let word = if at_most { "at most" } else { "at least" };
-            eprintln!("not met: {key} = {value:.6}, demanded {word} {limit}");
-        }
-    }
-    Ok(if met { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

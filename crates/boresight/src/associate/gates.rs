@@ -6,6 +6,8 @@
 //! P_D probability that a target is detected; P_G that its detection lies in the gate; ψ probability that the track exists.
 //! Limits: at most 2³² − 1 detections in a scan and pairs in a table.
 
+use super::assignment::table::{CostTable, Entry};
+
 /// Clutter of no density would make every weight infinite.
 const LEAST_DENSITY: f64 = 1e-200;
 
@@ -18,6 +20,17 @@ pub struct Pair {
     pub cost: f64,
     /// ln l of the pair, with the terms beside position (l in 1/px²).
     pub log_likelihood: f64,
+}
+
+impl Entry for Pair {
+    #[inline]
+    fn column(&self) -> u32 {
+        self.detection
+    }
+    #[inline]
+    fn cost(&self) -> f64 {
+        self.cost
+    }
 }
 
 /// What is known of a track before its detections are looked at.
@@ -149,6 +162,24 @@ impl Gates {
     }
 }
 
+impl CostTable for Gates {
+    type Pair = Pair;
+    fn n_rows(&self) -> usize {
+        self.n_tracks()
+    }
+    fn n_columns(&self) -> usize {
+        self.n_detections()
+    }
+    #[inline]
+    fn row(&self, row: usize) -> &[Pair] {
+        self.row(row)
+    }
+    #[inline]
+    fn miss_cost(&self, row: usize) -> f64 {
+        self.prior(row).miss_cost
+    }
+}
+
 /// One detection of a track's answer, with the probability that it is the target's own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
@@ -199,5 +230,59 @@ impl Assignment {
     #[inline]
     pub fn row(&self, track_idx: usize) -> &[Share] {
         &self.shares[self.starts[track_idx] as usize..self.starts[track_idx + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn prior(existence: f64, p_detection: f64, p_gate: f64) -> Prior {
+        Prior { p_detection, p_gate, existence, miss_cost: 9.0 }
+    }
+
+    #[test]
+    fn weights_are_the_logarithms_of_the_products_in_the_header() {
+        let mut gates = Gates::new();
+        gates.reset(3, 1e-3);
+        let pair = Pair { detection: 2, cost: 1.0, log_likelihood: 0.02_f64.ln() };
+        gates.push(pair);
+        gates.end_row(prior(0.5, 0.8, 0.9));
+        // ψ P_D l / λ = 0.5 · 0.8 · 0.02 / 0.001 = 8; 1 − ψ P_D P_G = 0.64.
+        assert!((gates.log_weight(0, &pair) - 8.0_f64.ln()).abs() < 1e-12);
+        assert!((gates.log_miss(0) - 0.64_f64.ln()).abs() < 1e-12);
+        gates.set_clutter([1.0, 2.0, 4e-3].into_iter());
+        assert!((gates.log_weight(0, &pair) - 2.0_f64.ln()).abs() < 1e-12);
+        assert_eq!((gates.clutter(0), gates.clutter(1)), (1.0, 2.0));
+    }
+
+    #[test]
+    fn clutter_of_no_density_stays_finite_and_a_sure_detection_cannot_be_missed() {
+        let mut gates = Gates::new();
+        gates.reset(2, 0.0);
+        assert_eq!(gates.clutter(1), 1e-200);
+        gates.set_clutter([0.0, 3.0].into_iter());
+        assert_eq!((gates.clutter(0), gates.clutter(1)), (1e-200, 3.0));
+        gates.end_row(prior(1.0, 1.0, 1.0));
+        assert_eq!(gates.log_miss(0), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn rows_keep_their_pairs_and_an_open_row_can_be_cut() {
+        let mut gates = Gates::new();
+        gates.reset(5, 1.0);
+        let pair = |detection| Pair { detection, cost: f64::from(detection), log_likelihood: 0.0 };
+        gates.push(pair(1));
+        gates.end_row(prior(1.0, 0.9, 0.9));
+        (2..5).for_each(|d| gates.push(pair(d)));
+        gates.open_row()[0].cost = 7.0;
+        gates.truncate_open_row(2);
+        gates.end_row(prior(0.4, 0.9, 0.9));
+        gates.end_row(prior(0.3, 0.9, 0.9));
+        assert_eq!((gates.n_tracks(), gates.n_pairs(), gates.n_detections()), (3, 3, 5));
+        assert_eq!(gates.row(1), [Pair { cost: 7.0, ..pair(2) }, pair(3)]);
+        assert!(gates.row(2).is_empty() && gates.prior(1).existence == 0.4);
+        gates.reset(1, 1.0);
+        assert_eq!((gates.n_tracks(), gates.n_pairs()), (0, 0));
     }
 }

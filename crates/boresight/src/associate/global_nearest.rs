@@ -7,9 +7,9 @@
 //! Limits: a group so dense that its exact solution would need more than about 10⁹ steps (10⁵ detections in a few pixels)
 //! is finished greedily; every ordinary scan is exact.
 
-use super::assignment::sparse::{SparseSolver, UNASSIGNED};
-use super::groups::Groups;
-use super::{Assignment, Associator, Gates, Pair};
+use super::assignment::group_wise::GroupWise;
+use super::assignment::table::{SparseTable, UNASSIGNED};
+use super::{Assignment, Associator, Gates};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,38 +32,22 @@ pub struct GlobalNearestConfig {
     pub cost: CostKind,
 }
 
+/// A certain detection makes a miss impossible: its cost stays finite.
+const LEAST_LOG_MISS: f64 = -700.0;
+
 /// The global-nearest-neighbour associator.
 #[derive(Clone, Debug, Default)]
 pub struct GlobalNearest {
     cost: CostKind,
-    groups: Groups,
-    solver: SparseSolver,
-    choice: Vec<u32>,
+    solver: GroupWise,
     /// The same table with likelihood costs, when asked for.
-    by_likelihood: Gates,
+    by_likelihood: SparseTable,
 }
 
 impl GlobalNearest {
     /// Builds the associator.
     pub fn new(config: &GlobalNearestConfig) -> Self {
         Self { cost: config.cost, ..Self::default() }
-    }
-
-    fn solve(&mut self, gates: &Gates) {
-        self.choice.clear();
-        self.choice.resize(gates.n_tracks(), UNASSIGNED);
-        self.groups.find(gates);
-        for group in self.groups.iter() {
-            match *group {
-                [a] => self.choice[a as usize] = best_two(gates, a)[0].0,
-                [a, b] => {
-                    let (ca, cb) = pair_of_tracks(gates, a, b);
-                    self.choice[a as usize] = ca;
-                    self.choice[b as usize] = cb;
-                }
-                _ => self.solver.solve(gates, group, &mut self.choice),
-            }
-        }
     }
 }
 
@@ -73,23 +57,21 @@ impl Associator for GlobalNearest {
     }
 
     fn associate(&mut self, gates: &Gates, out: &mut Assignment) {
-        if self.cost == CostKind::Likelihood {
-            let mut table = std::mem::take(&mut self.by_likelihood);
-            table.reset(gates.n_detections(), 1.0);
+        let choice = if self.cost == CostKind::Likelihood {
+            let table = &mut self.by_likelihood;
+            table.reset(gates.n_detections());
             for i in 0..gates.n_tracks() {
-                let miss = gates.log_miss(i).max(-700.0);
                 for p in gates.row(i) {
-                    table.push(Pair { cost: -gates.log_weight(i, p), ..*p });
+                    table.push(p.detection, -gates.log_weight(i, p));
                 }
-                table.end_row(super::Prior { miss_cost: -miss, ..*gates.prior(i) });
+                table.end_row(-gates.log_miss(i).max(LEAST_LOG_MISS));
             }
-            self.solve(&table);
-            self.by_likelihood = table;
+            self.solver.solve(table)
         } else {
-            self.solve(gates);
-        }
+            self.solver.solve(gates)
+        };
         out.reset();
-        for c in &self.choice {
+        for c in choice {
             if *c != UNASSIGNED {
                 out.push(*c, 1.0);
             }
@@ -98,32 +80,43 @@ impl Associator for GlobalNearest {
     }
 }
 
-/// The two cheapest ends of a track, a miss among them.
-#[inline]
-fn best_two(gates: &Gates, track: u32) -> [(u32, f64); 2] {
-    let mut best = [(UNASSIGNED, gates.prior(track as usize).miss_cost), (UNASSIGNED, f64::INFINITY)];
-    for p in gates.row(track as usize) {
-        // `<=` only against a miss: a pair at the very edge of the gate is taken, ties between pairs go to the first.
-        if p.cost < best[0].1 || (p.cost == best[0].1 && best[0].0 == UNASSIGNED) {
-            best[1] = best[0];
-            best[0] = (p.detection, p.cost);
-        } else if p.cost < best[1].1 {
-            best[1] = (p.detection, p.cost);
-        }
-    }
-    best
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::associate::{Pair, Prior};
 
-/// Two tracks in closed form: if both want the same detection, the cheaper of the two ways to give in.
-#[inline]
-fn pair_of_tracks(gates: &Gates, a: u32, b: u32) -> (u32, u32) {
-    let (best_a, best_b) = (best_two(gates, a), best_two(gates, b));
-    if best_a[0].0 == UNASSIGNED || best_a[0].0 != best_b[0].0 {
-        return (best_a[0].0, best_b[0].0);
+    fn chosen(cost: CostKind, density: f64, p_detection: f64, rows: &[&[(u32, f64, f64)]]) -> Vec<Option<u32>> {
+        let mut gates = Gates::new();
+        gates.reset(4, density);
+        for row in rows {
+            for &(detection, cost, log_likelihood) in *row {
+                gates.push(Pair { detection, cost, log_likelihood });
+            }
+            gates.end_row(Prior { p_detection, p_gate: 0.99, existence: 1.0, miss_cost: 9.0 });
+        }
+        let mut answer = Assignment::new();
+        let mut solver = GlobalNearest::new(&GlobalNearestConfig { cost });
+        assert_eq!(solver.needs_likelihood(), cost == CostKind::Likelihood);
+        solver.associate(&gates, &mut answer);
+        (0..rows.len()).map(|i| answer.row(i).first().map(|s| s.detection)).collect()
     }
-    if best_a[0].1 + best_b[1].1 <= best_a[1].1 + best_b[0].1 {
-        (best_a[0].0, best_b[1].0)
-    } else {
-        (best_a[1].0, best_b[0].0)
+
+    #[test]
+    fn at_equal_distance_the_likelihood_decides_for_the_sharp_track() {
+        // Both want detection 0; the second row is the sharper one.
+        let rows: [&[(u32, f64, f64)]; 2] = [&[(0, 1.0, -6.0)], &[(0, 1.0, -2.0)]];
+        assert_eq!(chosen(CostKind::Distance, 1e-6, 0.9, &rows), [Some(0), None]);
+        assert_eq!(chosen(CostKind::Likelihood, 1e-6, 0.9, &rows), [None, Some(0)]);
+    }
+
+    #[test]
+    fn a_pair_less_likely_than_clutter_is_left_unless_the_target_is_surely_detected() {
+        // ln(P_D l / λ) = ln 0.9 − 8 + ln 10; a miss ln(1 − 0.891) = −2.2 is likelier.
+        let rows: [&[(u32, f64, f64)]; 1] = [&[(0, 1.0, -8.0)]];
+        assert_eq!(chosen(CostKind::Likelihood, 0.1, 0.9, &rows), [None]);
+        // Surely detected, it could only lie outside of the gate: −ln 0.01 = 4.6 against 4.2.
+        let sure: [&[(u32, f64, f64)]; 1] = [&[(0, 1.0, -6.5)]];
+        assert_eq!(chosen(CostKind::Likelihood, 0.1, 0.9, &sure), [None]);
+        assert_eq!(chosen(CostKind::Likelihood, 0.1, 1.0, &sure), [Some(0)]);
     }
 }

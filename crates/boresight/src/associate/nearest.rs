@@ -67,3 +67,37 @@ impl Associator for Nearest {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::associate::{Pair, Prior};
+
+    fn chosen(shared: bool, rows: &[(f64, &[(u32, f64)])]) -> Vec<Option<u32>> {
+        let mut gates = Gates::new();
+        gates.reset(4, 1.0);
+        for (miss_cost, pairs) in rows {
+            for &(detection, cost) in *pairs {
+                gates.push(Pair { detection, cost, log_likelihood: 0.0 });
+            }
+            gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: *miss_cost });
+        }
+        let mut answer = Assignment::new();
+        Nearest::new(&NearestConfig { shared }).associate(&gates, &mut answer);
+        (0..rows.len()).map(|i| answer.row(i).first().map(|s| s.detection)).collect()
+    }
+
+    #[test]
+    fn the_cheapest_pair_goes_first_and_ties_to_the_lower_numbers() {
+        let rows: [(f64, &[(u32, f64)]); 3] =
+            [(9.0, &[(0, 2.0), (1, 3.0)]), (9.0, &[(0, 1.0), (1, 4.0)]), (9.0, &[(1, 3.0), (2, 3.0)])];
+        assert_eq!(chosen(false, &rows), [Some(1), Some(0), Some(2)]);
+        // Tracks that choose alone take their nearest, whoever else does.
+        assert_eq!(chosen(true, &rows), [Some(0), Some(0), Some(1)]);
+    }
+
+    #[test]
+    fn a_pair_dearer_than_a_miss_is_not_taken_one_as_dear_is() {
+        assert_eq!(chosen(false, &[(5.0, &[(0, 5.0)]), (5.0, &[(1, 5.1)])]), [Some(0), None]);
+    }
+}

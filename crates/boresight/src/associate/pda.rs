@@ -50,3 +50,35 @@ impl Associator for Pda {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::associate::{Pair, Prior};
+
+    fn weights(density: f64, p_detection: f64, log_likelihoods: &[f64]) -> Vec<f64> {
+        let mut gates = Gates::new();
+        gates.reset(log_likelihoods.len(), density);
+        for (k, l) in log_likelihoods.iter().enumerate() {
+            gates.push(Pair { detection: k as u32, cost: 1.0, log_likelihood: *l });
+        }
+        gates.end_row(Prior { p_detection, p_gate: 0.5, existence: 1.0, miss_cost: 9.0 });
+        let mut answer = Assignment::new();
+        Pda::new(&PdaConfig {}).associate(&gates, &mut answer);
+        answer.row(0).iter().map(|s| s.weight).collect()
+    }
+
+    #[test]
+    fn the_weights_are_those_of_the_formula_by_hand() {
+        // P_D l / λ = 0.8 · 0.3 / 0.1 = 2.4 and 0.8 · 0.1 / 0.1 = 0.8; a miss 1 − 0.8 · 0.5 = 0.6: of 3.8.
+        let w = weights(0.1, 0.8, &[0.3_f64.ln(), 0.1_f64.ln()]);
+        assert!((w[0] - 2.4 / 3.8).abs() < 1e-12 && (w[1] - 0.8 / 3.8).abs() < 1e-12, "{w:?}");
+    }
+
+    #[test]
+    fn weights_far_beyond_the_range_of_a_float_keep_their_ratio() {
+        let w = weights(1e-200, 0.8, &[600.0, 600.0 + 3.0_f64.ln()]);
+        assert!((w[0] - 0.25).abs() < 1e-12 && (w[1] - 0.75).abs() < 1e-12, "{w:?}");
+        assert!(weights(1.0, 0.0, &[f64::NEG_INFINITY]).iter().all(|w| *w == 0.0));
+    }
+}

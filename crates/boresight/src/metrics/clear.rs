@@ -8,8 +8,9 @@
 //! The older convention of py-motmetrics and the MATLAB kit is [`mod@super::clear_classic`].
 //! Symbols: TP, FN, FP pairs, misses, false alarms; IDSW switches; MOTA = (TP − FP − IDSW) / (TP + FN).
 
-use super::assignment::{Matcher, NONE, Pair};
 use super::overlap::Overlap;
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
+use crate::associate::assignment::table::UNASSIGNED;
 use serde::Serialize;
 
 /// Counts of the CLEAR measures; they add up over sequences.
@@ -151,7 +152,7 @@ pub struct ClearCounter {
     before_list: Vec<u32>,
     now_list: Vec<(u32, u32)>,
     matcher: Matcher,
-    pairs: Vec<Pair>,
+    pairs: Vec<WeightedPair>,
     similarity: Vec<f64>,
     taken: Vec<u32>,
 }
@@ -165,8 +166,8 @@ impl ClearCounter {
             seen: vec![0; n_truths],
             matched: vec![0; n_truths],
             frags: vec![0; n_truths],
-            last: vec![NONE; n_truths],
-            before: vec![NONE; n_truths],
+            last: vec![UNASSIGNED; n_truths],
+            before: vec![UNASSIGNED; n_truths],
             before_list: Vec::new(),
             now_list: Vec::new(),
             matcher: Matcher::default(),
@@ -192,7 +193,7 @@ impl ClearCounter {
             if o.similarity >= self.threshold {
                 let goes_on = self.before[truth[o.row as usize] as usize] == result[o.col as usize];
                 let weight = if goes_on { 1000.0 + o.similarity } else { o.similarity };
-                self.pairs.push(Pair { row: o.row, col: o.col, weight });
+                self.pairs.push(WeightedPair { row: o.row, column: o.col, weight });
                 self.similarity.push(o.similarity);
             }
         }
@@ -201,17 +202,17 @@ impl ClearCounter {
         let mut motp = 0.0;
         for &k in &self.taken {
             let p = self.pairs[k as usize];
-            let (t, r) = (truth[p.row as usize], result[p.col as usize]);
+            let (t, r) = (truth[p.row as usize], result[p.column as usize]);
             motp += self.similarity[k as usize];
             let last = &mut self.last[t as usize];
-            self.sum.idsw += u64::from(*last != NONE && *last != r);
+            self.sum.idsw += u64::from(*last != UNASSIGNED && *last != r);
             *last = r;
             self.matched[t as usize] += 1;
-            self.frags[t as usize] += u32::from(self.before[t as usize] == NONE);
+            self.frags[t as usize] += u32::from(self.before[t as usize] == UNASSIGNED);
             self.now_list.push((t, r));
         }
         for &t in &self.before_list {
-            self.before[t as usize] = NONE;
+            self.before[t as usize] = UNASSIGNED;
         }
         self.before_list.clear();
         for &(t, r) in &self.now_list {

@@ -6,9 +6,10 @@
 //! (TrackEval: above 80 %); a fragmentation is a loss between two matches; MOTP is the mean *distance* 1 − IoU.
 //! Symbols: d = 1 − similarity; pairs with d > 1 − threshold never match.
 
-use super::assignment::{Matcher, NONE, Pair};
 use super::overlap::{Overlap, OverlapFinder, frame_boxes, frame_tracks};
 use super::{MatchOptions, multi_object::refuse_doubles};
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
+use crate::associate::assignment::table::UNASSIGNED;
 use crate::{Result, TrackTable};
 use serde::Serialize;
 
@@ -93,14 +94,14 @@ pub fn clear_classic(truth: &TrackTable, result: &TrackTable, options: &MatchOpt
     refuse_doubles(result)?;
     let mut c = Counter {
         sum: ClearClassic::default(),
-        of_truth: vec![NONE; truth.n_tracks()],
-        of_result: vec![NONE; result.n_tracks()],
+        of_truth: vec![UNASSIGNED; truth.n_tracks()],
+        of_result: vec![UNASSIGNED; result.n_tracks()],
         result_known: vec![false; result.n_tracks()],
         truth_known: vec![false; truth.n_tracks()],
         seen: vec![0; truth.n_tracks()],
         tracked: vec![0; truth.n_tracks()],
         lost: vec![false; truth.n_tracks()],
-        col_of: vec![NONE; result.n_tracks()],
+        col_of: vec![UNASSIGNED; result.n_tracks()],
         matcher: Matcher::default(),
     };
     let (mut finder, mut overlaps) = (OverlapFinder::default(), Vec::new());
@@ -127,11 +128,11 @@ impl Counter {
         };
         for (row, &t) in truth.iter().enumerate() {
             let before = self.of_truth[t as usize];
-            if before == NONE {
+            if before == UNASSIGNED {
                 continue;
             }
             let col = self.col_of[before as usize];
-            if col == NONE || col_done[col as usize] {
+            if col == UNASSIGNED || col_done[col as usize] {
                 continue;
             }
             if let Some(d) = distance(row as u32, col) {
@@ -147,9 +148,9 @@ impl Counter {
             let (t, r) = (truth[row as usize] as usize, result[col as usize] as usize);
             row_done[row as usize] = true;
             col_done[col as usize] = true;
-            let switch = self.of_truth[t] != NONE && self.of_truth[t] != r as u32;
+            let switch = self.of_truth[t] != UNASSIGNED && self.of_truth[t] != r as u32;
             self.sum.ascends += u64::from(switch && !self.result_known[r]);
-            let transfer = self.of_result[r] != NONE && self.of_result[r] != t as u32;
+            let transfer = self.of_result[r] != UNASSIGNED && self.of_result[r] != t as u32;
             self.sum.transfers += u64::from(transfer);
             self.sum.migrates += u64::from(transfer && !self.truth_known[t]);
             self.result_known[r] = true;
@@ -174,7 +175,7 @@ impl Counter {
         }
         self.sum.false_positives += col_done.iter().filter(|d| !**d).count() as u64;
         for &r in result {
-            self.col_of[r as usize] = NONE;
+            self.col_of[r as usize] = UNASSIGNED;
         }
     }
 
@@ -195,8 +196,10 @@ impl Counter {
         }
         // A missing pair costs more than any difference that the others could make.
         let missing = 2.0 * n.min(m) as f64 * (worst + 1.0) + 1.0;
-        let pairs: Vec<Pair> =
-            left.iter().map(|o| Pair { row: o.row, col: o.col, weight: missing - (1.0 - o.similarity) }).collect();
+        let pairs: Vec<WeightedPair> = left
+            .iter()
+            .map(|o| WeightedPair { row: o.row, column: o.col, weight: missing - (1.0 - o.similarity) })
+            .collect();
         let mut taken = Vec::new();
         if self.matcher.solve_unique(n, m, &pairs, &mut taken) || n * m > 1 << 26 {
             return taken.iter().map(|&k| left[k as usize]).map(|o| (o.row, o.col, 1.0 - o.similarity)).collect();

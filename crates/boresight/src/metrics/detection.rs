@@ -6,8 +6,8 @@
 //! Symbols: bias mean of (result − truth) of the centres, px; scatter standard deviation about the bias, px.
 
 use super::MatchOptions;
-use super::assignment::{Matcher, Pair};
 use super::overlap::{OverlapFinder, frame_boxes};
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
 use crate::{Result, TrackTable};
 use serde::Serialize;
 
@@ -73,11 +73,11 @@ pub fn match_rows(truth: &TrackTable, result: &TrackTable, options: &MatchOption
         finder.frame(options.similarity, frame_boxes(truth, frame), frame_boxes(result, frame), &mut overlaps);
         pairs.clear();
         let good = overlaps.iter().filter(|o| o.similarity >= options.threshold - f64::EPSILON);
-        pairs.extend(good.map(|o| Pair { row: o.row, col: o.col, weight: o.similarity }));
+        pairs.extend(good.map(|o| WeightedPair { row: o.row, column: o.col, weight: o.similarity }));
         let (t, r) = (truth.rows(frame), result.rows(frame));
         matcher.solve_any(t.len(), r.len(), &pairs, &mut taken);
         for &k in &taken {
-            each(t.start + pairs[k as usize].row as usize, r.start + pairs[k as usize].col as usize);
+            each(t.start + pairs[k as usize].row as usize, r.start + pairs[k as usize].column as usize);
         }
     }
 }

@@ -8,8 +8,9 @@
 //! Departure: sums over the sparse pairs instead of dense matrices; row sums add in numpy's order, since their rounding
 //! decides ties.
 
-use super::assignment::{Matcher, NONE, Pair};
 use super::overlap::Overlap;
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
+use crate::associate::assignment::table::UNASSIGNED;
 use serde::Serialize;
 
 /// Number of thresholds.
@@ -203,14 +204,14 @@ fn blocked_sum(first: u32, n: u32, entries: &[(u32, f64)]) -> f64 {
 pub(crate) struct HotaCounter {
     levels: [f64; N_ALPHA],
     loc: Curve,
-    /// For each pair its place in `reached`, or NONE.
+    /// For each pair its place in `reached`, or UNASSIGNED.
     place: Vec<u32>,
     /// For each pair that ever matched: how many of its matches reach exactly threshold k.
     reached: Vec<[u32; N_ALPHA]>,
     place_pair: Vec<u32>,
     tp: [u64; N_ALPHA],
     matcher: Matcher,
-    pairs: Vec<Pair>,
+    pairs: Vec<WeightedPair>,
     taken: Vec<u32>,
     source: Vec<u32>,
 }
@@ -221,7 +222,7 @@ impl HotaCounter {
         Self {
             levels: alphas().map(|a| a - f64::EPSILON),
             loc: [0.0; N_ALPHA],
-            place: vec![NONE; n_pairs],
+            place: vec![UNASSIGNED; n_pairs],
             reached: Vec::new(),
             place_pair: Vec::new(),
             tp: [0; N_ALPHA],
@@ -239,7 +240,7 @@ impl HotaCounter {
         for (i, (o, &k)) in overlaps.iter().zip(number).enumerate() {
             let weight = scores[k as usize] * o.similarity;
             if weight > 0.0 {
-                self.pairs.push(Pair { row: o.row, col: o.col, weight });
+                self.pairs.push(WeightedPair { row: o.row, column: o.col, weight });
                 self.source.push(i as u32);
             }
         }
@@ -257,7 +258,7 @@ impl HotaCounter {
             }
             self.tp[n - 1] += 1;
             let pair = number[i] as usize;
-            if self.place[pair] == NONE {
+            if self.place[pair] == UNASSIGNED {
                 self.place[pair] = self.reached.len() as u32;
                 self.reached.push([0; N_ALPHA]);
                 self.place_pair.push(pair as u32);

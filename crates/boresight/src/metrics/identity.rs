@@ -6,8 +6,8 @@
 //! not needed and ties do not matter.
 //! Symbols: IDF1 = IDTP / (IDTP + ½ IDFP + ½ IDFN).
 
-use super::assignment::NONE;
-use super::assignment::sparse::{Edges, SparseMatcher};
+use crate::associate::assignment::sparse::{AtEqualCost, SparseSolver};
+use crate::associate::assignment::table::{CostTable, SparseTable, UNASSIGNED};
 use serde::Serialize;
 
 /// Counts of the identity measures; they add up over sequences.
@@ -54,20 +54,20 @@ pub fn identity(
 ) -> Identity {
     let mut rows: Vec<u32> = (0..pairs.len() as u32).filter(|&k| common[k as usize] > 0).collect();
     rows.sort_unstable_by_key(|&k| pairs[k as usize]);
-    let mut g = Edges::default();
-    let mut last = NONE;
-    for &k in &rows {
-        let (t, r) = pairs[k as usize];
-        if t != last {
-            g.next_row();
-            last = t;
+    let mut table = SparseTable::default();
+    table.reset(n_results);
+    let (mut choice, mut order) = (Vec::new(), Vec::new());
+    for chunk in rows.chunk_by(|&a, &b| pairs[a as usize].0 == pairs[b as usize].0) {
+        for &k in chunk {
+            table.push(pairs[k as usize].1, -f64::from(common[k as usize]));
         }
-        g.push(r, f64::from(common[k as usize]));
+        table.end_row(0.0);
+        order.push(choice.len() as u32);
+        choice.push(UNASSIGNED);
     }
-    g.close();
-    let mut m = SparseMatcher::default();
-    m.solve(&g, n_results);
-    let idtp = m.row_edge.iter().filter(|&&e| e != NONE).map(|&e| u64::from(common[rows[e as usize] as usize])).sum();
+    SparseSolver::new(AtEqualCost::Miss).solve_within(&table, &order, &mut choice, u64::MAX);
+    let gain = |i: usize| table.row(i).iter().find(|c| c.column == choice[i]).map_or(0, |c| -c.cost as u64);
+    let idtp = (0..choice.len()).map(gain).sum();
     Identity { idtp, idfn: n_truth_rows - idtp, idfp: n_result_rows - idtp }
 }
 

@@ -205,4 +205,32 @@ mod tests {
     fn the_spectral_norm_of_a_diagonal_matrix_is_its_largest_entry() {
         assert!((spectral_norm(vec![3.0, 0.0, 0.0, 0.0, -7.0, 0.0], 3) - 7.0).abs() < 1e-12);
     }
+
+    #[test]
+    fn frames_are_compared_by_their_type_with_its_largest_value() {
+        let gray = |v: Vec<u8>| Pixels::Gray8(Image::from_vec(2, 1, v).unwrap());
+        let m = compare_pixels(&gray(vec![10, 20]), &gray(vec![11, 22]), None).unwrap();
+        assert_eq!((m.mse, m.mae), (2.5, 1.5));
+        assert!((m.psnr - 10.0 * (255.0_f64.powi(2) / 2.5).log10()).abs() < 1e-12);
+        let deep = |v: Vec<u16>| Pixels::Gray16(Image::from_vec(2, 1, v).unwrap());
+        let m = compare_pixels(&deep(vec![10, 20]), &deep(vec![11, 22]), None).unwrap();
+        assert!((m.psnr - 10.0 * (65535.0_f64.powi(2) / 2.5).log10()).abs() < 1e-12);
+        let m = compare_pixels(&deep(vec![10, 20]), &deep(vec![11, 22]), Some(100.0)).unwrap();
+        assert!((m.psnr - 10.0 * (1e4_f64 / 2.5).log10()).abs() < 1e-12);
+        // A colour pixel counts as three values.
+        let rgb = |v: [u8; 3]| Pixels::Rgb8(Image::from_vec(1, 1, vec![v]).unwrap());
+        assert_eq!(compare_pixels(&rgb([1, 2, 3]), &rgb([1, 2, 6]), None).unwrap().mse, 3.0);
+        let float = || Pixels::GrayF32(Image::from_vec(1, 1, vec![0.5]).unwrap());
+        assert!(compare_pixels(&float(), &float(), None).unwrap_err().to_string().contains("no largest value"));
+        assert_eq!(compare_pixels(&float(), &float(), Some(1.0)).unwrap().mse, 0.0);
+        assert_eq!(compare_pixels(&float(), &rgb([0; 3]), None).unwrap_err().kind(), ErrorKind::Unsupported);
+    }
+
+    #[test]
+    fn means_are_over_the_frames_and_keep_names_and_units() {
+        let one = |mse: f64| ImageMetrics { mse, ..EMPTY };
+        let m = mean_values(&[one(2.0), one(5.0)]);
+        assert_eq!((m[0].name, m[0].value, m[0].unit, m[5].name), ("MSE", 3.5, "counts²", "PSNR"));
+        assert_eq!((m[4].better, m[1].better, mean_values(&[])[0].value), (Better::Higher, Better::Lower, 0.0));
+    }
 }

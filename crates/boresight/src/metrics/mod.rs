@@ -3,7 +3,6 @@
 //! [`evaluate`] judges a result by all of them ([`evaluation`]); [`mot_scores`] gives CLEAR, identity and HOTA alone, and each
 //! other module one family of measures.
 
-pub(crate) mod assignment;
 pub(crate) mod bootstrap;
 pub mod cells;
 pub(crate) mod clear;

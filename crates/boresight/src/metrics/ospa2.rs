@@ -6,10 +6,10 @@
 //! Symbols: c cutoff, px; p order over tracks; q order over time; window w frames.
 //! Limits: weights over time are equal.
 
-use super::assignment::{Matcher, Pair};
 use super::near::{each_near_pair, rows_of_tracks, shared_frames};
 use super::pairs::PairIndex;
 use super::set::SetOptions;
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
 use crate::{Result, TrackTable};
 
 /// OSPA(2) of two tables over frames `from..to`, px; 0 if neither has a track there. `time_order` is q.
@@ -44,15 +44,15 @@ pub fn ospa2(
     if most == 0 {
         return Ok(0.0);
     }
-    let mut pairs: Vec<(Pair, f64)> = Vec::new();
+    let mut pairs: Vec<(WeightedPair, f64)> = Vec::new();
     for (k, &(t, r)) in index.pairs().iter().enumerate() {
         let frames = f64::from(n_t[t as usize] + n_r[r as usize] - shared[k]);
         let d = (c.powf(q) - sum[k] / frames).max(0.0).powf(p / q);
-        pairs.push((Pair { row: t, col: r, weight: c.powf(p) - d }, d));
+        pairs.push((WeightedPair { row: t, column: r, weight: c.powf(p) - d }, d));
     }
     pairs.retain(|x| x.0.weight > 0.0);
-    pairs.sort_by_key(|x| (x.0.row, x.0.col));
-    let only: Vec<Pair> = pairs.iter().map(|x| x.0).collect();
+    pairs.sort_by_key(|x| (x.0.row, x.0.column));
+    let only: Vec<WeightedPair> = pairs.iter().map(|x| x.0).collect();
     let mut taken = Vec::new();
     Matcher::default().solve_any(truth.n_tracks(), result.n_tracks(), &only, &mut taken);
     let matched: f64 = taken.iter().map(|&k| pairs[k as usize].1).sum();

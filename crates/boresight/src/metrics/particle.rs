@@ -6,9 +6,9 @@
 //! rows of X; α = 1 − d(X, Y) / d(X, ∅); β = (d(X, ∅) − d(X, Y)) / (d(X, ∅) + d(Y̅, ∅)), Y̅ the tracks paired with none.
 //! Limits: two dimensions.
 
-use super::assignment::{Matcher, Pair};
 use super::near::{each_near_pair, rows_of_tracks, shared_frames};
 use super::pairs::PairIndex;
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
 use crate::{Error, ErrorKind, Result, TrackTable};
 use serde::Serialize;
 
@@ -41,15 +41,15 @@ pub fn particle_scores(truth: &TrackTable, result: &TrackTable, gate_px: f64) ->
     let (index, gain, hits) = gains(truth, result, gate_px);
     // A frame that both share is no loss for the result track; frames it has alone cost the gate.
     let both = shared_frames(truth, result, 0..truth.n_frames(), &index);
-    let mut pairs: Vec<(Pair, u32)> = Vec::new();
+    let mut pairs: Vec<(WeightedPair, u32)> = Vec::new();
     for (k, &(t, r)) in index.pairs().iter().enumerate() {
         let weight = gain[k] - gate_px * f64::from(n_r[r as usize] - both[k]);
         if weight > 0.0 {
-            pairs.push((Pair { row: t, col: r, weight }, k as u32));
+            pairs.push((WeightedPair { row: t, column: r, weight }, k as u32));
         }
     }
-    pairs.sort_by_key(|p| (p.0.row, p.0.col));
-    let only: Vec<Pair> = pairs.iter().map(|p| p.0).collect();
+    pairs.sort_by_key(|p| (p.0.row, p.0.column));
+    let only: Vec<WeightedPair> = pairs.iter().map(|p| p.0).collect();
     let mut taken = Vec::new();
     Matcher::default().solve_any(truth.n_tracks(), result.n_tracks(), &only, &mut taken);
     let empty = gate_px * truth.n_rows() as f64;
@@ -58,7 +58,7 @@ pub fn particle_scores(truth: &TrackTable, result: &TrackTable, gate_px: f64) ->
     for &k in &taken {
         let (p, pair) = pairs[k as usize];
         distance -= p.weight;
-        paired_rows += u64::from(n_r[p.col as usize]);
+        paired_rows += u64::from(n_r[p.column as usize]);
         tp += u64::from(hits[pair as usize].0);
         error2 += hits[pair as usize].1;
     }

@@ -7,8 +7,8 @@
 //! pedestrian) and truths too hidden (occlusion > 2) or cut off (truncation > 0) take their result with them; unmatched
 //! results vanish if at most 25 px high or more than half inside a DontCare region.
 
-use super::assignment::{Matcher, Pair};
 use super::overlap::{OverlapFinder, Similarity, frame_boxes};
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
 use crate::{Error, ErrorKind, Result, TrackTable};
 
 /// The rules by which rows are left out.
@@ -187,10 +187,10 @@ fn for_each_match(
         for o in &overlaps {
             let (row, col) = (row_of[o.row as usize], col_of[o.col as usize]);
             if row != u32::MAX && col != u32::MAX && o.similarity >= 0.5 - f64::EPSILON {
-                pairs.push((Pair { row, col, weight: o.similarity }, o.row, o.col));
+                pairs.push((WeightedPair { row, column: col, weight: o.similarity }, o.row, o.col));
             }
         }
-        let only: Vec<Pair> = pairs.iter().map(|p| p.0).collect();
+        let only: Vec<WeightedPair> = pairs.iter().map(|p| p.0).collect();
         matcher.solve(n, m, &only, &mut taken);
         for &k in &taken {
             let (_, row, col) = pairs[k as usize];
@@ -246,5 +246,68 @@ mod tests {
         ]);
         let (_, r) = preprocess(&truth, &result, Rules::Kitti(KittiClass::Car)).unwrap();
         assert_eq!(r.ids, [7]);
+    }
+
+    #[test]
+    fn a_mot_challenge_truth_is_told_by_its_classes_and_its_name() {
+        let plain = table(&[(0, 1, [0.0, 0.0, 9.0, 9.0], 1.0, 1)]);
+        let mut classes = table(&[(0, 1, [0.0, 0.0, 9.0, 9.0], 1.0, 1), (0, 2, [0.0, 0.0, 9.0, 9.0], 1.0, 8)]);
+        assert_eq!(Rules::of_mot_challenge(&plain), Rules::Mot15);
+        assert_eq!(Rules::of_mot_challenge(&classes), Rules::Mot17);
+        classes.label = "data/mot20-01/gt.txt".into();
+        assert_eq!(Rules::of_mot_challenge(&classes), Rules::Mot20);
+    }
+
+    #[test]
+    fn a_non_mot_vehicle_is_a_distractor_in_mot20_only() {
+        let truth = table(&[(0, 1, [0.0, 0.0, 10.0, 10.0], 1.0, 1), (0, 2, [50.0, 0.0, 10.0, 10.0], 1.0, 6)]);
+        let result = table(&[(0, 7, [50.0, 0.0, 10.0, 10.0], 1.0, 1)]);
+        let kept = |rules| preprocess(&truth, &result, rules).unwrap().1.n_rows();
+        assert_eq!((kept(Rules::Mot17), kept(Rules::Mot20), kept(Rules::Mot15), kept(Rules::None)), (1, 0, 1, 1));
+    }
+
+    #[test]
+    fn classes_that_the_rules_do_not_know_are_refused_with_their_place() {
+        let strange = table(&[(4, 1, [0.0, 0.0, 9.0, 9.0], 1.0, 14)]);
+        let good = table(&[(4, 1, [0.0, 0.0, 9.0, 9.0], 1.0, 1)]);
+        let e = preprocess(&strange, &good, Rules::Mot17).unwrap_err().to_string();
+        assert!(e.contains("class 14") && e.contains("frame 5"), "{e}");
+        let car = table(&[(2, 1, [0.0, 0.0, 9.0, 9.0], 1.0, 3)]);
+        let e = preprocess(&good, &car, Rules::Mot17).unwrap_err().to_string();
+        assert!(e.contains("class 3") && e.contains("frame 3"), "{e}");
+    }
+
+    #[test]
+    fn kitti_takes_the_results_of_vans_and_of_hidden_or_cut_cars_away() {
+        let row = |id, x, class, occlusion, truncation| TrackRow {
+            id,
+            bbox: [x, 0.0, 40.0, 40.0],
+            class,
+            occlusion,
+            truncation,
+            ..TrackRow::default()
+        };
+        let table = |rows: Vec<TrackRow>| TrackTable::from_rows("k", PixelOrigin::Pixel0, rows).unwrap();
+        // A car that counts, one hidden beyond 2, one hidden at 2, one cut off, a van, a pedestrian.
+        let truth = table(vec![
+            row(1, 0.0, 1, 0, 0.0),
+            row(2, 100.0, 1, 3, 0.0),
+            row(3, 200.0, 1, 2, 0.0),
+            row(4, 300.0, 1, 0, 1.0),
+            row(5, 400.0, 2, 0, 0.0),
+            row(6, 500.0, 4, 0, 0.0),
+        ]);
+        let result = table((0..6).map(|k| row(10 + k, 100.0 * k as f64, 1, 0, 0.0)).collect());
+        let (t, r) = preprocess(&truth, &result, Rules::Kitti(KittiClass::Car)).unwrap();
+        assert_eq!((t.ids.as_slice(), r.ids.as_slice()), ([1, 3].as_slice(), [10, 12, 15].as_slice()));
+        let (t, _) = preprocess(&truth, &result, Rules::Kitti(KittiClass::Pedestrian)).unwrap();
+        assert_eq!(t.ids, [6]);
+    }
+
+    #[test]
+    fn a_box_counts_as_inside_a_region_from_more_than_half_of_its_area_on() {
+        assert_eq!(share_inside(&[0.0, 0.0, 10.0, 10.0], &[5.0, 5.0, 100.0, 100.0]), 0.25);
+        assert_eq!(share_inside(&[0.0, 0.0, 10.0, 10.0], &[20.0, 0.0, 5.0, 5.0]), 0.0);
+        assert_eq!(share_inside(&[0.0, 0.0, 0.0, 10.0], &[0.0, 0.0, 5.0, 5.0]), 0.0);
     }
 }

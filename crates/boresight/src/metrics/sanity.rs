@@ -268,4 +268,62 @@ mod tests {
         assert!(d.iter().any(|d| d.contains("50 rows is a track of its own")), "{d:?}");
         assert!(d.iter().any(|d| d.contains("reaches x 255, y 10 in images of 100 x 100 px")), "{d:?}");
     }
+
+    fn fixed(n: u32, step: u32, left: f64, width: f64) -> TrackTable {
+        let row = |k| TrackRow { frame: k * step, id: 1, bbox: [left, 0.0, width, 10.0], ..TrackRow::default() };
+        TrackTable::from_rows("t", PixelOrigin::Centre0, (0..n).map(row)).unwrap()
+    }
+
+    fn warn(t: &TrackTable, r: &TrackTable) -> Vec<SanityWarning> {
+        sanity_checks(t, r, Similarity::Iou, None).unwrap()
+    }
+
+    #[test]
+    fn empty_tables_are_named() {
+        let (some, none) = (fixed(3, 1, 0.0, 10.0), fixed(0, 1, 0.0, 10.0));
+        assert_eq!(warn(&none, &none), [SanityWarning::BothEmpty]);
+        assert_eq!(warn(&none, &some), [SanityWarning::EmptyTruth("t".into())]);
+        assert_eq!(warn(&some, &none), [SanityWarning::EmptyResult("t".into())]);
+    }
+
+    #[test]
+    fn an_earlier_shift_is_told_apart_from_a_later_one_and_a_small_gain_is_not_told() {
+        let w = warn(&moving(1, 1.0), &moving(0, 1.0));
+        assert!(matches!(w[0], SanityWarning::ShiftedFrames { later: false, .. }), "{w:?}");
+        // A target that stands fits as well in each frame.
+        assert!(warn(&fixed(30, 1, 0.0, 10.0), &fixed(30, 1, 1.0, 10.0)).is_empty());
+    }
+
+    #[test]
+    fn the_extents_tell_why_nothing_overlaps() {
+        assert_eq!(mismatch((100.0, 50.0), (100.0, 50.0)), Mismatch::Sequence);
+        assert_eq!(mismatch((100.0, 50.0), (149.0, 34.0)), Mismatch::Sequence);
+        assert_eq!(mismatch((100.0, 50.0), (160.0, 50.0)), Mismatch::ImageSize);
+        assert_eq!(mismatch((100.0, 50.0), (66.0, 50.0)), Mismatch::ImageSize);
+        assert_eq!(mismatch((100.0, 50.0), (52.0, 98.0)), Mismatch::SwappedAxes);
+    }
+
+    #[test]
+    fn rows_long_after_the_truth_are_told_but_not_those_just_after() {
+        let last = |n| {
+            let w = sanity_checks(&fixed(20, 1, 0.0, 10.0), &fixed(n, 1, 0.0, 10.0), Similarity::Iou, None).unwrap();
+            w.iter().any(|w| matches!(w, SanityWarning::LongerThanTruth { .. }))
+        };
+        // 20 frames, the last is 19: told from frame 30 on.
+        assert!(!last(30) && last(31));
+    }
+
+    #[test]
+    fn few_rows_without_ids_are_no_table_of_detections() {
+        let own = |n: u32| {
+            let row =
+                |k: u32| TrackRow { frame: k, id: i64::from(k), bbox: [0.0, 0.0, 9.0, 9.0], ..TrackRow::default() };
+            TrackTable::from_rows("d", PixelOrigin::Centre0, (0..n).map(row)).unwrap()
+        };
+        let told = |n| {
+            let w = sanity_checks(&fixed(n, 1, 0.0, 9.0), &own(n), Similarity::Iou, None).unwrap();
+            w.contains(&SanityWarning::DetectionsWithoutIds(n as usize))
+        };
+        assert!(!told(20) && told(21));
+    }
 }

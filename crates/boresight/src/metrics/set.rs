@@ -9,7 +9,7 @@
 //! [`OspaAssignment::FirstPower`], and [`OspaAssignment::OrderP`], the definition, is the default. Both agree for p = 1.
 //! Limits: finite p.
 
-use super::assignment::{Matcher, Pair};
+use crate::associate::assignment::matching::{Matcher, WeightedPair};
 use crate::{Error, ErrorKind, Result};
 use serde::Serialize;
 
@@ -79,7 +79,7 @@ pub struct Gospa {
 #[derive(Debug, Default)]
 pub struct SetDistance {
     order: Vec<(f64, f64, u32)>,
-    pairs: Vec<Pair>,
+    pairs: Vec<WeightedPair>,
     distance2: Vec<f64>,
     matcher: Matcher,
     taken: Vec<u32>,
@@ -96,8 +96,8 @@ fn power(d2: f64, p: f64) -> f64 {
 }
 
 impl SetDistance {
-    /// Matches points nearer than the cutoff so that Σ (c^q − d^q) is greatest; afterwards `taken` lists the pairs.
-    /// False if other matchings are as good.
+    /// Matches points nearer than the cutoff so that Σ (c^q − d^q) is greatest; afterwards `taken` lists the pairs, whose
+    /// columns are places in the order of x. False if other matchings are as good.
     fn assign(&mut self, truth: &[[f64; 2]], result: &[[f64; 2]], c: f64, q: f64) -> bool {
         self.order.clear();
         self.order.extend(result.iter().enumerate().map(|(j, p)| (p[0], p[1], j as u32)));
@@ -107,7 +107,7 @@ impl SetDistance {
         let (c2, top) = (c * c, power(c * c, q));
         for (i, t) in truth.iter().enumerate() {
             let begin = self.order.partition_point(|o| o.0 <= t[0] - c);
-            for &(x, y, j) in &self.order[begin..] {
+            for (at, &(x, y, _)) in self.order.iter().enumerate().skip(begin) {
                 if x >= t[0] + c {
                     break;
                 }
@@ -116,7 +116,7 @@ impl SetDistance {
                 if d2 < c2 {
                     let weight = top - power(d2, q);
                     if weight > 0.0 {
-                        self.pairs.push(Pair { row: i as u32, col: j, weight });
+                        self.pairs.push(WeightedPair { row: i as u32, column: at as u32, weight });
                         self.distance2.push(d2);
                     }
                 }
@@ -127,7 +127,8 @@ impl SetDistance {
 
     /// The pairs (truth, result) matched last.
     pub fn matched(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
-        self.taken.iter().map(|&k| (self.pairs[k as usize].row, self.pairs[k as usize].col))
+        let pair = |&k: &u32| self.pairs[k as usize];
+        self.taken.iter().map(pair).map(|p| (p.row, self.order[p.column as usize].2))
     }
 
     fn sum_of_powers(&self, p: f64) -> f64 {

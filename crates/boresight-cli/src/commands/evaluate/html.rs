@@ -1,6 +1,6 @@
 //! The report: one HTML file with tables and plots, readable without a network.
 
-use super::Judged;
+use super::judged::Judged;
 use super::plot::{Line, label, plot};
 use super::table::{comparison as comparison_table, state};
 use boresight::metrics::OperatingPoint;

@@ -1,6 +1,8 @@
 //! `boresight evaluate` of two images, folders of images or videos: MSE, RMSE, MAE, PFE, SNR, PSNR of each frame.
 
-use super::Args;
+use super::arguments::Args;
+use super::demand::met;
+use super::output::put;
 use super::table::aligned;
 use anyhow::bail;
 use boresight::io::{OpenOptions, is_table, open};
@@ -75,14 +77,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let _ = writeln!(csv, "{k},{}", f.values().map(|v| v.value.to_string()).join(","));
     }
     if let Some(path) = &args.csv {
-        super::put(path, &csv)?;
+        put(path, &csv)?;
     }
     if let Some(path) = &args.json {
         let named: serde_json::Map<String, serde_json::Value> =
             mean.iter().map(|v| (v.name.to_string(), v.value.into())).collect();
         let numbers: Vec<[f64; 6]> = frames.iter().map(|f| f.values().map(|v| v.value)).collect();
         let all = serde_json::json!({"mean": named, "names": mean.map(|v| v.name), "frames": numbers});
-        super::put(path, &serde_json::to_string_pretty(&all)?)?;
+        put(path, &serde_json::to_string_pretty(&all)?)?;
     }
-    super::met(args, &mean)
+    met(args, &mean)
 }

@@ -1,6 +1,6 @@
 //! The scores as JSON.
 
-use super::Judged;
+use super::judged::Judged;
 use boresight::metrics::evaluation::Value;
 use boresight::metrics::{MotScores, hota};
 use serde_json::json;

@@ -1,7 +1,6 @@
 //! Reads the tables of a sequence and judges them.
 
-use super::Args;
-use super::arguments::RulesArg;
+use super::arguments::{Args, RulesArg};
 use super::sequences;
 use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc, read, sniff};
 use boresight::io::{TableOptions, read_detections};

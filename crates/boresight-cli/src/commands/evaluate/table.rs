@@ -1,6 +1,6 @@
 //! The scores as tables: for the terminal and as CSV.
 
-use super::Judged;
+use super::judged::Judged;
 use boresight::metrics::consistency::Consistency;
 use boresight::metrics::evaluation::{
     Comparison, Evaluation, NeesOverRuns, ResultEvaluation, StateMeasures, Value, nees_over_runs,

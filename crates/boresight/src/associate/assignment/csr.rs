@@ -1,36 +1,21 @@
 //! Sparse assignment of every row, given as a compressed matrix (CSR): the shape other tools speak.
 //!
-//! Method: a column that only one row can use is that row's private end (a miss); the rest is the sparse problem of
-//! [`super::super::global_nearest`], solved group by group.
+//! Method: a column that only one row can use is that row's private end (a miss); the rest is solved group
+//! by group ([`super::group_wise`]).
 //! Cost: near O(entries) on gating problems.
 
-use super::super::global_nearest::{GlobalNearest, GlobalNearestConfig};
-use super::super::{Assignment, Associator, Gates, Pair, Prior};
-use super::sparse::{FORBIDDEN, UNASSIGNED};
+use super::group_wise::GroupWise;
+use super::table::{FORBIDDEN, SparseTable, UNASSIGNED};
 use crate::{Error, ErrorKind, Result};
 
 /// Solves compressed problems one after the other; keeps its memory.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Csr {
-    gates: Gates,
-    answer: Assignment,
-    solver: GlobalNearest,
+    table: SparseTable,
+    solver: GroupWise,
     degree: Vec<u32>,
     private: Vec<u32>,
     columns: Vec<u32>,
-}
-
-impl Default for Csr {
-    fn default() -> Self {
-        Self {
-            gates: Gates::new(),
-            answer: Assignment::new(),
-            solver: GlobalNearest::new(&GlobalNearestConfig::default()),
-            degree: Vec::new(),
-            private: Vec::new(),
-            columns: Vec::new(),
-        }
-    }
 }
 
 impl Csr {
@@ -52,25 +37,24 @@ impl Csr {
         for j in indices {
             self.degree[*j as usize] += 1;
         }
-        self.gates.reset(n_columns, 1.0);
+        self.table.reset(n_columns);
         self.private.clear();
         for i in 0..n {
             let mut miss = (FORBIDDEN, UNASSIGNED);
             for k in starts[i] as usize..starts[i + 1] as usize {
-                let (detection, cost) = (indices[k], costs[k]);
-                if self.degree[detection as usize] > 1 {
-                    self.gates.push(Pair { detection, cost, log_likelihood: 0.0 });
+                let (column, cost) = (indices[k], costs[k]);
+                if self.degree[column as usize] > 1 {
+                    self.table.push(column, cost);
                 } else if cost < miss.0 {
-                    miss = (cost, detection);
+                    miss = (cost, column);
                 }
             }
             self.private.push(miss.1);
-            self.gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: miss.0 });
+            self.table.end_row(miss.0);
         }
-        self.solver.associate(&self.gates, &mut self.answer);
         self.columns.clear();
-        for i in 0..n {
-            let column = self.answer.row(i).first().map_or(self.private[i], |s| s.detection);
+        for (i, &chosen) in self.solver.solve(&self.table).iter().enumerate() {
+            let column = if chosen == UNASSIGNED { self.private[i] } else { chosen };
             if column == UNASSIGNED {
                 return Err(Error::new(
                     ErrorKind::Numeric,
@@ -80,5 +64,39 @@ impl Csr {
             self.columns.push(column);
         }
         Ok(&self.columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_gets_a_column_at_the_least_total() {
+        // Costs 4 1 .; 2 . 3; . 5 6 on columns 0 to 2, column 3 only row 2 may use, for 9: 1 + 2 + 6 = 9 beats 1 + 2 + 9.
+        let (starts, columns) = ([0, 2, 4, 7], [0, 1, 0, 2, 1, 2, 3]);
+        let costs = [4.0, 1.0, 2.0, 3.0, 5.0, 6.0, 9.0];
+        assert_eq!(Csr::default().solve(4, &starts, &columns, &costs).unwrap(), [1, 0, 2]);
+        // At 5 the private column is the better end.
+        let costs = [4.0, 1.0, 2.0, 3.0, 5.0, 6.0, 5.0];
+        assert_eq!(Csr::default().solve(4, &starts, &columns, &costs).unwrap(), [1, 0, 3]);
+    }
+
+    #[test]
+    fn rows_that_cannot_all_be_served_and_broken_tables_are_refused() {
+        let refused = |n, starts: &[u32], columns: &[u32], costs: &[f64]| {
+            Csr::default().solve(n, starts, columns, costs).unwrap_err().to_string()
+        };
+        assert!(refused(1, &[0, 1, 2], &[0, 0], &[1.0, 2.0]).contains("row 1 cannot be assigned"));
+        assert!(refused(1, &[0, 0], &[], &[]).contains("row 0 cannot be assigned"));
+        for (n, starts, columns, costs) in [
+            (2, &[0, 2][..], &[0][..], &[1.0][..]),
+            (1, &[0, 1][..], &[1][..], &[1.0][..]),
+            (2, &[0, 1][..], &[0][..], &[1.0, 2.0][..]),
+            (2, &[0, 2, 1][..], &[0, 1][..], &[1.0, 2.0][..]),
+        ] {
+            assert!(refused(n, starts, columns, costs).contains("do not make a sparse matrix"));
+        }
+        assert!(Csr::default().solve(3, &[], &[], &[]).unwrap().is_empty());
     }
 }

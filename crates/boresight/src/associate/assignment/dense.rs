@@ -7,10 +7,8 @@
 //! Symbols: v column price; u row price is implied. Cost: O(n³) at worst. Memory: 6 n numbers beside the matrix.
 //! Limits: costs must be finite.
 
+use super::table::UNASSIGNED;
 use crate::{Error, ErrorKind, Result};
-
-/// No partner yet.
-const NONE: u32 = u32::MAX;
 
 /// Values handled side by side.
 const LANES: usize = 8;
@@ -35,7 +33,7 @@ impl Dense {
     /// # Errors
     /// A length that is not n²; a cost that is not finite.
     pub fn solve(&mut self, n: usize, cost: &[f64]) -> Result<&[u32]> {
-        if cost.len() != n * n || n >= NONE as usize {
+        if cost.len() != n * n || n >= UNASSIGNED as usize {
             return Err(Error::new(ErrorKind::Config, format!("{} costs: expected n x n = {n} x {n}", cost.len())));
         }
         self.v.clear();
@@ -43,9 +41,9 @@ impl Dense {
         self.from.clear();
         self.from.resize(n, 0);
         self.row_of.clear();
-        self.row_of.resize(n, NONE);
+        self.row_of.resize(n, UNASSIGNED);
         self.column_of.clear();
-        self.column_of.resize(n, NONE);
+        self.column_of.resize(n, UNASSIGNED);
         self.free.clear();
         if n == 0 {
             return Ok(&self.column_of);
@@ -112,14 +110,14 @@ impl Dense {
             let displaced = self.row_of[j];
             if least < second {
                 self.v[j] -= second - least;
-            } else if displaced != NONE && n > 1 {
+            } else if displaced != UNASSIGNED && n > 1 {
                 j = second_j as usize;
             }
             let displaced = if least < second { displaced } else { self.row_of[j] };
             self.column_of[i] = j as u32;
             self.row_of[j] = i as u32;
-            if displaced != NONE {
-                self.column_of[displaced as usize] = NONE;
+            if displaced != UNASSIGNED {
+                self.column_of[displaced as usize] = UNASSIGNED;
                 if least < second && left > 0 {
                     left -= 1;
                     k -= 1;
@@ -147,7 +145,7 @@ impl Dense {
             let costs = &cost[i * n..(i + 1) * n];
             let least = relax(costs, &self.v, shift, u64::from(row), &self.closed, &mut self.open, &mut self.from);
             let j = first_equal(&self.open, least);
-            if self.row_of[j] == NONE {
+            if self.row_of[j] == UNASSIGNED {
                 break (j, least);
             }
             self.scanned.push(j as u32);

@@ -4,8 +4,8 @@
 //! 1968: the best solution splits what is left into parts that exclude it, each solved for its own best.
 //! Cost: at most k · rows solutions of the sparse problem. Limits: memory grows with k · rows parts.
 
-use super::super::{Gates, Pair, Prior};
-use super::sparse::{FORBIDDEN, SparseSolver, UNASSIGNED};
+use super::sparse::SparseSolver;
+use super::table::{CostTable, Entry, FORBIDDEN, SparseTable, UNASSIGNED};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -14,7 +14,7 @@ use std::collections::BinaryHeap;
 pub struct Ranked {
     /// Total cost, misses included.
     pub cost: f64,
-    /// Detection of each row, or [`UNASSIGNED`].
+    /// Column of each row, or [`UNASSIGNED`].
     pub choice: Vec<u32>,
 }
 
@@ -42,15 +42,15 @@ impl PartialOrd for Part {
     }
 }
 
-/// Returns the `k` cheapest assignments of all rows of `gates`, cheapest first (fewer if there are no more).
-pub fn k_best(gates: &Gates, k: usize) -> Vec<Ranked> {
-    let n = gates.n_tracks();
+/// Returns the `k` cheapest assignments of all rows of `table`, cheapest first (fewer if there are no more).
+pub fn k_best(table: &impl CostTable, k: usize) -> Vec<Ranked> {
+    let n = table.n_rows();
     let mut solver = SparseSolver::default();
-    let mut work = Gates::new();
+    let mut work = SparseTable::default();
     let mut heap = BinaryHeap::new();
     let mut number = 0;
     let mut out = Vec::new();
-    let solved = solve(gates, &vec![UNASSIGNED; n], 0, &[], &mut work, &mut solver);
+    let solved = solve(table, &vec![UNASSIGNED; n], 0, &[], &mut work, &mut solver);
     if let Some(solution) = solved {
         heap.push(Part { solution, fixed: 0, excluded: Vec::new(), number });
     }
@@ -60,7 +60,7 @@ pub fn k_best(gates: &Gates, k: usize) -> Vec<Ranked> {
         for row in part.fixed..n {
             let mut excluded = if row == part.fixed { part.excluded.clone() } else { Vec::new() };
             excluded.push(best[row]);
-            if let Some(solution) = solve(gates, best, row, &excluded, &mut work, &mut solver) {
+            if let Some(solution) = solve(table, best, row, &excluded, &mut work, &mut solver) {
                 number += 1;
                 heap.push(Part { solution, fixed: row, excluded, number });
             }
@@ -72,27 +72,27 @@ pub fn k_best(gates: &Gates, k: usize) -> Vec<Ranked> {
 
 /// The best solution with rows before `fixed` as in `choice` and row `fixed` not as in `excluded`.
 fn solve(
-    gates: &Gates,
+    table: &impl CostTable,
     choice: &[u32],
     fixed: usize,
     excluded: &[u32],
-    work: &mut Gates,
+    work: &mut SparseTable,
     solver: &mut SparseSolver,
 ) -> Option<Ranked> {
-    let n = gates.n_tracks();
-    work.reset(gates.n_detections(), 1.0);
+    let n = table.n_rows();
+    work.reset(table.n_columns());
     for i in 0..n {
-        let mut miss_cost = gates.prior(i).miss_cost;
-        for p in gates.row(i) {
-            let wanted = i >= fixed || choice[i] == p.detection;
-            if wanted && !(i == fixed && excluded.contains(&p.detection)) {
-                work.push(Pair { ..*p });
+        let mut miss_cost = table.miss_cost(i);
+        for p in table.row(i) {
+            let wanted = i >= fixed || choice[i] == p.column();
+            if wanted && !(i == fixed && excluded.contains(&p.column())) {
+                work.push(p.column(), p.cost());
             }
         }
         if (i < fixed && choice[i] != UNASSIGNED) || (i == fixed && excluded.contains(&UNASSIGNED)) {
             miss_cost = FORBIDDEN;
         }
-        work.end_row(Prior { miss_cost, ..*gates.prior(i) });
+        work.end_row(miss_cost);
     }
     let rows: Vec<u32> = (0..n as u32).collect();
     let mut found = vec![UNASSIGNED; n];
@@ -100,9 +100,9 @@ fn solve(
     let mut cost = 0.0;
     for (i, j) in found.iter().enumerate() {
         cost += if *j == UNASSIGNED {
-            work.prior(i).miss_cost
+            work.miss_cost(i)
         } else {
-            work.row(i).iter().find(|p| p.detection == *j).map_or(FORBIDDEN, |p| p.cost)
+            work.row(i).iter().find(|p| p.column == *j).map_or(FORBIDDEN, |p| p.cost)
         };
     }
     (cost < 0.5 * FORBIDDEN).then_some(Ranked { cost, choice: found })
@@ -113,15 +113,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn all(gates: &Gates, row: usize, used: u64, cost: f64, out: &mut Vec<f64>) {
-        if row == gates.n_tracks() {
+    fn all(table: &SparseTable, row: usize, used: u64, cost: f64, out: &mut Vec<f64>) {
+        if row == table.n_rows() {
             out.push(cost);
             return;
         }
-        all(gates, row + 1, used, cost + gates.prior(row).miss_cost, out);
-        for p in gates.row(row) {
-            if used & (1 << p.detection) == 0 {
-                all(gates, row + 1, used | 1 << p.detection, cost + p.cost, out);
+        all(table, row + 1, used, cost + table.miss_cost(row), out);
+        for p in table.row(row) {
+            if used & (1 << p.column) == 0 {
+                all(table, row + 1, used | 1 << p.column, cost + p.cost, out);
             }
         }
     }
@@ -132,18 +132,18 @@ mod tests {
             rows in prop::collection::vec((0.0..10.0f64, prop::collection::btree_map(0u32..4, 0.0..10.0f64, 0..4)), 0..5),
             k in 1usize..30,
         ) {
-            let mut gates = Gates::new();
-            gates.reset(4, 1.0);
+            let mut table = SparseTable::default();
+            table.reset(4);
             for (miss_cost, pairs) in &rows {
-                for (detection, cost) in pairs {
-                    gates.push(Pair { detection: *detection, cost: *cost, log_likelihood: 0.0 });
+                for (column, cost) in pairs {
+                    table.push(*column, *cost);
                 }
-                gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: *miss_cost });
+                table.end_row(*miss_cost);
             }
             let mut brute = Vec::new();
-            all(&gates, 0, 0, 0.0, &mut brute);
+            all(&table, 0, 0, 0.0, &mut brute);
             brute.sort_by(f64::total_cmp);
-            let ranked = k_best(&gates, k);
+            let ranked = k_best(&table, k);
             prop_assert_eq!(ranked.len(), k.min(brute.len()));
             for (r, b) in ranked.iter().zip(&brute) {
                 prop_assert!((r.cost - b).abs() < 1e-9);

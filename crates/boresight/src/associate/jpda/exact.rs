@@ -7,7 +7,7 @@
 //! where each miss that a joint event forces weighs 10⁻²⁰⁰) they are logarithms: dearer, but nothing is lost.
 //! Limits: at most 128 contested detections and `max_states` states a row; else `false` is returned.
 
-use super::Problem;
+use super::problem::Problem;
 
 /// ln of the least share of the joint weight that plain sums keep: 10⁻²⁶⁰, far from the least f64.
 const LEAST_LN: f64 = -600.0;

@@ -8,7 +8,7 @@
 //! Cost: O(pairs) an iteration, at most [`MOST_ITERATIONS`]. Limits: far from exact where tracks on a cycle of the gating
 //! graph are more than the detections they compete for and none may be missed.
 
-use super::Problem;
+use super::problem::Problem;
 
 /// Iterations before the answer is taken as it is.
 pub const MOST_ITERATIONS: usize = 200;

@@ -5,7 +5,7 @@
 //! Method: all joint events are listed, sorted by the two sets, and the best of each kept.
 //! Limits: at most 64 rows, 128 columns and `max_events` events; else `false` is returned.
 
-use super::Problem;
+use super::problem::Problem;
 
 #[derive(Clone, Copy, Debug)]
 struct Event {

@@ -55,3 +55,57 @@ pub fn compare(results: &[ResultEvaluation], n_draws: usize, seed: u64) -> Resul
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::evaluation::Evaluation;
+
+    fn scores(tp: u64) -> MotScores {
+        let mut s = MotScores::default();
+        s.clear.tp = tp;
+        s.clear.fn_ = 10 - tp;
+        s
+    }
+
+    fn of_sequences(tps: &[u64]) -> ResultEvaluation {
+        let one = |&tp: &u64| {
+            let pieces = vec![scores(tp), scores(tp / 2)];
+            Evaluation { scores: scores(tp), pieces, ..Evaluation::default() }
+        };
+        ResultEvaluation::new("r", tps.iter().map(one).collect())
+    }
+
+    fn mota(c: &[Comparison]) -> &Compared {
+        &c.iter().find(|c| c.measure == "MOTA").unwrap().results[1]
+    }
+
+    #[test]
+    fn eight_sequences_are_the_units_and_fewer_are_cut_into_pieces() {
+        let (a, b) = (of_sequences(&[4; 8]), of_sequences(&[6; 8]));
+        let c = compare(&[a, b], 50, 3).unwrap();
+        assert_eq!(c.iter().map(|c| c.measure).collect::<Vec<_>>(), MEASURES);
+        // Sequences all alike: no draw differs.
+        let all = mota(&c);
+        assert_eq!(
+            (all.difference.lower, all.difference.upper, all.share_above),
+            (all.difference.value, all.difference.value, 1.0)
+        );
+        assert!((all.difference.value - 0.2).abs() < 1e-12);
+        // Pieces differ within a sequence: so do the draws.
+        let c = compare(&[of_sequences(&[4; 7]), of_sequences(&[6; 7])], 50, 3).unwrap();
+        assert!(mota(&c).score.lower < mota(&c).score.upper);
+    }
+
+    #[test]
+    fn a_shorter_result_has_empty_pieces_at_its_end() {
+        let (a, mut b) = (of_sequences(&[4]), of_sequences(&[4]));
+        b.sequences[0].pieces.pop();
+        assert!(compare(&[a.clone(), b], 10, 1).is_ok());
+        let (mut a, mut b) = (a.clone(), a);
+        for r in [&mut a, &mut b] {
+            r.sequences[0].pieces.truncate(1);
+        }
+        assert!(compare(&[a, b], 10, 1).unwrap_err().to_string().contains("at least two"));
+    }
+}

@@ -18,8 +18,6 @@ use serde::Serialize;
 
 /// Levels of the score at which the operating curve is computed.
 const CURVE_POINTS: usize = 25;
-/// Frame rate where none is known, frames/s.
-pub(super) const DEFAULT_RATE_HZ: f64 = 25.0;
 
 /// Measures beside CLEAR, identity and HOTA.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -69,7 +67,7 @@ impl FurtherMeasures {
             Err(e) => return Err(e),
         };
         let associations = nearest_associations(t, r, set.cutoff_px, |b| [b[0] + b[2] / 2.0, b[1] + b[3] / 2.0]);
-        let siap = siap(t, r, &associations, 1.0 / s.rate_hz.unwrap_or(DEFAULT_RATE_HZ), |i, k| {
+        let siap = siap(t, r, &associations, s.dt_s(), |i, k| {
             let (p, q) = (centre(t, i), centre(r, k));
             ((p[0] - q[0]).hypot(p[1] - q[1]), 0.0)
         });

@@ -4,6 +4,7 @@
 //! beside each other with bootstrap intervals. [`Value`] names a number, its unit and which way it is better.
 
 mod comparison;
+mod evaluate;
 mod further;
 mod note;
 mod options;
@@ -14,10 +15,11 @@ mod values;
 
 pub use crate::metrics::value::{Better, Value};
 pub use comparison::{Comparison, compare};
+pub use evaluate::{Evaluation, evaluate};
 pub use further::FurtherMeasures;
 pub use note::Note;
 pub use options::{BoundModel, ClearConvention, EvaluateOptions, Matching, MeasureSet};
 pub use result::ResultEvaluation;
-pub use sequence::{Evaluation, Sequence, evaluate};
+pub use sequence::Sequence;
 pub use states::{NeesOverRuns, StateMeasures, nees_over_runs};
 pub use values::mot_values;

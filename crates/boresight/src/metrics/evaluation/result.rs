@@ -1,6 +1,6 @@
 //! The sequences of one result together.
 
-use super::sequence::Evaluation;
+use super::evaluate::Evaluation;
 use super::values::mot_values;
 use crate::metrics::clear_classic::ClearClassic;
 use crate::metrics::multi_object::MotScores;
@@ -56,5 +56,66 @@ impl ResultEvaluation {
             }
         }
         sums.into_iter().map(|(v, sum, weight)| Value { value: sum / weight.max(1.0), ..v }).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::evaluation::{Better, ClearConvention, EvaluateOptions, evaluate};
+    use crate::{PixelOrigin, TrackRow, TrackTable};
+    use std::collections::BTreeSet;
+
+    fn table(n_frames: u32, shift: f64) -> TrackTable {
+        let row = |frame| TrackRow { frame, id: 1, bbox: [shift, 0.0, 10.0, 10.0], ..TrackRow::default() };
+        TrackTable::from_rows("t", PixelOrigin::Centre0, (0..n_frames).map(row)).unwrap()
+    }
+
+    fn two(options: &EvaluateOptions) -> ResultEvaluation {
+        let judged = |n, shift| evaluate(&table(n, 0.0), &table(n, shift), options).unwrap();
+        ResultEvaluation::new("two", vec![judged(3, 1.0), judged(1, 3.0)])
+    }
+
+    fn value(r: &ResultEvaluation, name: &str) -> f64 {
+        r.values().into_iter().find(|v| v.name == name).unwrap().value
+    }
+
+    #[test]
+    fn counts_add_up_and_other_measures_weigh_by_frames() {
+        let r = two(&EvaluateOptions::default());
+        assert_eq!((r.combined.clear.tp, r.combined.n_frames), (4, 4));
+        // Biases 1 px over 3 frames and 3 px over 1: (3 + 3) / 4.
+        assert!((value(&r, "bias_x") - 1.5).abs() < 1e-12 && (value(&r, "OSPA") - 1.5).abs() < 1e-12);
+        assert_eq!(value(&r, "MT"), 2.0);
+        let mut classic = EvaluateOptions::default();
+        classic.convention = ClearConvention::MotMetrics;
+        // Overlaps 9/11 and 7/13; the classic MOTP is the mean distance over all pairs.
+        let distance = (3.0 * (1.0 - 9.0 / 11.0) + (1.0 - 7.0 / 13.0)) / 4.0;
+        assert!((value(&two(&classic), "MOTP") - distance).abs() < 1e-12);
+        assert!(ResultEvaluation::default().further_values().is_empty());
+    }
+
+    #[test]
+    fn every_measure_stands_once_with_a_direction_that_fits_its_kind() {
+        let values = two(&EvaluateOptions::default()).values();
+        let names: BTreeSet<&str> = values.iter().map(|v| v.name).collect();
+        assert_eq!(names.len(), values.len());
+        let better = |name: &str| values.iter().find(|v| v.name == name).unwrap().better;
+        for name in ["HOTA", "MOTA", "IDF1", "Recall", "MT", "SIAP_C", "SIAP_LS", "alpha", "JSC", "AP"] {
+            assert_eq!(better(name), Better::Higher, "{name}");
+        }
+        for name in
+            ["FP", "FN", "IDSW", "ML", "GOSPA", "missed", "OSPA2", "TGOSPA", "SIAP_S", "RMSE", "RMSPE", "RMSPE/2"]
+        {
+            assert_eq!(better(name), Better::Lower, "{name}");
+        }
+        for name in ["PT", "SIAP_A", "bias_x"] {
+            assert_eq!(better(name), Better::Neither, "{name}");
+        }
+        let unit = |name: &str| values.iter().find(|v| v.name == name).unwrap().unit;
+        assert_eq!(
+            (unit("GOSPA"), unit("missed"), unit("SIAP_R"), unit("PFE_x"), unit("HOTA")),
+            ("px", "px^p", "1/s", "%", "")
+        );
     }
 }

@@ -3,7 +3,6 @@
 //! Rows are matched frame by frame as for the detection measures. Positions are the rows' centres; velocities and
 //! covariances are those of the tables, where both tables, or the result, have them.
 
-use super::further::DEFAULT_RATE_HZ;
 use super::note::Note;
 use super::options::{BoundModel, EvaluateOptions};
 use super::sequence::Sequence;
@@ -99,7 +98,7 @@ impl StateMeasures {
             out.nis = nis(r, scans, options.extra_noise_px, notes)?;
         }
         if let Some(model) = options.bound {
-            out.bound_px = Some(least_rmspe(&model, t, &m.rows, 1.0 / s.rate_hz.unwrap_or(DEFAULT_RATE_HZ))?);
+            out.bound_px = Some(least_rmspe(&model, t, &m.rows, s.dt_s())?);
         }
         Ok(Some(out))
     }
@@ -239,4 +238,146 @@ pub fn nees_over_runs<'a>(runs: impl Iterator<Item = &'a StateMeasures>) -> Nees
     }
     let full = by_frame.into_iter().filter(|(_, v)| n_runs > 1 && v.len() >= n_runs);
     NeesOverRuns { frames: full.filter_map(|(f, v)| Some((f, average(&v, 2, LEVEL).ok()?))).collect(), n_runs }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::evaluation::{Evaluation, Matching};
+    use crate::metrics::pcrlb::rmspe_without_prior;
+    use crate::{Detection, FrameIndex, PixelOrigin, RowState, TrackRow, TrackTableBuilder};
+
+    /// Points of one track: frame, x, y, and what they say of the state.
+    fn table(rows: &[(u32, f64, f64, RowState)]) -> TrackTable {
+        let mut b = TrackTableBuilder::new("t", PixelOrigin::Centre0);
+        for &(frame, x, y, ref state) in rows {
+            let row = TrackRow { frame, id: 1, bbox: [x - 2.0, y - 2.0, 4.0, 4.0], ..TrackRow::default() };
+            b.push_with_state(&row, state).unwrap();
+        }
+        b.finish(0).unwrap()
+    }
+
+    fn moving(vx: f64, vy: f64) -> RowState {
+        RowState { velocity: Some([vx, vy]), ..RowState::default() }
+    }
+
+    /// Covariance diag(4, 1, 16, 9) of `[x, vx, y, vy]`.
+    const COV: [f64; 10] = [4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 16.0, 0.0, 9.0];
+
+    fn by_centres(t: &TrackTable, r: &TrackTable, scans: Option<&[Scan]>, o: &mut EvaluateOptions) -> Evaluation {
+        o.matching = Matching::Centre;
+        o.max_distance_px = 20.0;
+        let mut s = Sequence::new(t, r);
+        s.detections = scans;
+        s.rate_hz = Some(1.0);
+        s.evaluate(o).unwrap()
+    }
+
+    fn state(e: &Evaluation) -> &StateMeasures {
+        e.further.as_ref().unwrap().state.as_ref().unwrap()
+    }
+
+    #[test]
+    fn errors_and_nees_are_those_of_a_hand_computed_pair_of_rows() {
+        let truth = table(&[(0, 10.0, 20.0, moving(1.0, 2.0)), (1, 30.0, 40.0, moving(1.0, 2.0))]);
+        let cov = RowState { velocity: Some([2.0, 5.0]), cov: Some(COV), ..RowState::default() };
+        let result = table(&[(0, 12.0, 24.0, cov), (1, 26.0, 40.0, cov)]);
+        let e = by_centres(&truth, &result, None, &mut EvaluateOptions::default());
+        let s = state(&e);
+        // Errors (−2, −1, −4, −3) and (4, −1, 0, −3).
+        assert!((s.errors.rmspe - 18.0_f64.sqrt()).abs() < 1e-12 && (s.errors.rmsve - 10.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(s.rsspe, [(0, 20.0_f64.sqrt()), (1, 4.0)]);
+        // Position NEES: 4/4 + 16/16 = 2 and 16/4 = 4; with the velocities 1/1 + 9/9 = 2 more.
+        assert_eq!(s.nees_by_frame, [(0, 2.0), (1, 4.0)]);
+        assert!((s.nees.unwrap().average - 3.0).abs() < 1e-12 && (s.nees4.unwrap().average - 5.0).abs() < 1e-12);
+        assert_eq!((s.nees.unwrap().expected, s.nees4.unwrap().expected), (2.0, 4.0));
+        // ±2σ: 4, 2, 8, 6.
+        assert_eq!(s.bounded[1].bound, [4.0, 2.0, 8.0, 6.0]);
+        assert_eq!(s.bounded[1].error, [4.0, -1.0, 0.0, -3.0]);
+        // The mean square error is [[10, 4], [4, 8]]: NEES with it (by its inverse [[8, −4], [−4, 10]] / 64) are 2 each.
+        let (index, inclination) = s.noncredibility.unwrap();
+        let want = (0.0 + 10.0 * 2.0_f64.log10()) / 2.0;
+        assert!((index - want).abs() < 1e-9 && (inclination - want).abs() < 1e-9, "{index} {inclination}");
+    }
+
+    #[test]
+    fn a_table_without_velocities_or_covariances_has_position_errors_only() {
+        let truth = table(&[(0, 10.0, 20.0, moving(1.0, 2.0))]);
+        let result = table(&[(0, 13.0, 24.0, RowState::default())]);
+        let e = by_centres(&truth, &result, None, &mut EvaluateOptions::default());
+        let s = state(&e);
+        assert!(!s.has_velocity && s.nees.is_none() && s.nees4.is_none() && s.bounded.is_empty() && s.nis.is_none());
+        assert!((s.errors.rmspe - 5.0).abs() < 1e-12);
+        assert!(s.values().iter().all(|v| v.name != "RMSVE"));
+        let far = table(&[(0, 500.0, 24.0, RowState::default())]);
+        assert!(by_centres(&truth, &far, None, &mut EvaluateOptions::default()).further.unwrap().state.is_none());
+    }
+
+    #[test]
+    fn the_nis_is_that_of_the_innovation_and_rows_without_a_detection_are_counted() {
+        // One axis: P = 3, R = 1: gain 3/4, posterior 3/4. Innovation (2, 0) leaves the residual (0.5, 0); NIS 4 / (3 + 1).
+        let updated = RowState { position_cov: Some([0.75, 0.0, 0.75]), detection: Some(0), ..RowState::default() };
+        let lost = RowState { detection: Some(7), ..updated };
+        let truth = table(&[(0, 10.0, 20.0, RowState::default()), (1, 10.0, 20.0, RowState::default())]);
+        let result = table(&[(0, 10.0, 20.0, updated), (1, 10.0, 20.0, lost)]);
+        let at = Vector2::new(10.5, 20.0);
+        let scan = |k: u64, cov: Matrix2<f64>| Scan {
+            index: FrameIndex(k),
+            detections: vec![Detection { position: at, cov, ..detection() }],
+            ..Scan::default()
+        };
+        let scans = [scan(0, Matrix2::identity()), scan(1, Matrix2::identity())];
+        let mut o = EvaluateOptions::default();
+        let e = by_centres(&truth, &result, Some(&scans), &mut o);
+        assert!((state(&e).nis.unwrap().average - 1.0).abs() < 1e-12);
+        assert!(e.notes.contains(&Note::NisRowsLeftOut(1)), "{:?}", e.notes);
+        // The same noise told as 0.84 of the detection and 0.4 px of the tracker.
+        o.extra_noise_px = 0.4;
+        let scans = [scan(0, Matrix2::identity() * 0.84)];
+        let e = by_centres(&truth, &result, Some(&scans), &mut o);
+        assert!((state(&e).nis.unwrap().average - 1.0).abs() < 1e-12);
+        let bare = table(&[(0, 10.0, 20.0, RowState::default()), (1, 10.0, 20.0, RowState::default())]);
+        assert!(by_centres(&truth, &bare, Some(&scans), &mut o).notes.contains(&Note::NoDetectionColumn));
+    }
+
+    fn detection() -> Detection {
+        Detection {
+            position: Vector2::zeros(),
+            cov: Matrix2::identity(),
+            extent: crate::Extent::default(),
+            area_px: 1,
+            peak: 1.0,
+            sum: 1.0,
+            score: 1.0,
+            class: None,
+        }
+    }
+
+    #[test]
+    fn the_bound_without_process_noise_is_that_of_a_straight_line_fit() {
+        let rows: Vec<_> = (3..11).map(|k| (k, f64::from(k), 5.0, RowState::default())).collect();
+        let (truth, result) = (table(&rows), table(&rows));
+        let mut o = EvaluateOptions::default();
+        o.bound = Some(BoundModel { measurement_var_px2: 0.5, acceleration_density_px2_per_s3: 0.0, p_detection: 1.0 });
+        let e = by_centres(&truth, &result, None, &mut o);
+        let bound = state(&e).bound_px.unwrap();
+        // The line fit of 8 scans from the truth's first row on; prior knowledge of 1e9 variances counts for nothing.
+        assert!((bound - rmspe_without_prior(0.5, 8)).abs() < 1e-6, "{bound}");
+        o.bound = Some(BoundModel { p_detection: 0.5, ..o.bound.unwrap() });
+        assert!(state(&by_centres(&truth, &result, None, &mut o)).bound_px.unwrap() > bound);
+    }
+
+    #[test]
+    fn averages_over_runs_need_two_runs_and_a_value_of_each() {
+        let run = |values: &[(u32, f64)]| StateMeasures {
+            nees: average(&[2.0], 2, LEVEL).ok(),
+            nees_by_frame: values.to_vec(),
+            ..StateMeasures::default()
+        };
+        let (a, b) = (run(&[(0, 1.0), (1, 3.0)]), run(&[(1, 5.0), (2, 2.0)]));
+        let over = nees_over_runs([&a, &b, &StateMeasures::default()].into_iter());
+        assert_eq!(over.n_runs, 2);
+        assert_eq!(over.frames.iter().map(|(f, c)| (*f, c.average, c.n)).collect::<Vec<_>>(), [(1, 4.0, 2)]);
+        assert!(nees_over_runs([&a].into_iter()).frames.is_empty());
+    }
 }

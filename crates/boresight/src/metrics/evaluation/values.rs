@@ -1,6 +1,6 @@
 //! The measures by name, with unit and direction.
 
-use super::sequence::Evaluation;
+use super::evaluate::Evaluation;
 use super::states::StateMeasures;
 use crate::metrics::clear_classic::ClearClassic;
 use crate::metrics::consistency::Consistency;
