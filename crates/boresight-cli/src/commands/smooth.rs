@@ -1,10 +1,9 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
 use boresight::io::{TableOptions, TracksCsv, read_tracks};
-use boresight::track::smooth::{SmoothConfig, SmoothMethod, filter_track, predict, smooth_track};
-use boresight::{Config, Extent, FrameIndex, Scan, Sink, Timestamp, TrackFrame, TrackState, TrackStatus, View};
-use boresight_filters::Gaussian;
-use std::collections::BTreeMap;
+use boresight::track::smooth::{SmoothConfig, SmoothMethod};
+use boresight::track::smooth_table;
+use boresight::{Config, Scan, Sink, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -62,9 +61,6 @@ pub struct Args {
     skip_bad_rows: bool,
 }
 
-/// One track: its rows with their frames.
-type Rows = Vec<(FrameIndex, Timestamp, TrackState)>;
-
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = TableOptions {
@@ -80,41 +76,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !own {
         eprintln!("rows are positions of deviation {} px where the table has none: filtered first", args.std_px);
     }
-    let mut tracks: BTreeMap<u64, Rows> = BTreeMap::new();
-    for frame in &table.frames {
-        for track in &frame.tracks {
-            tracks.entry(track.id.0).or_default().push((frame.index, frame.time, track.clone()));
-        }
-    }
-    let (mut n_rows, mut n_filled, mut stds) = (0, 0, [Vec::new(), Vec::new()]);
-    let mut frames: BTreeMap<FrameIndex, TrackFrame> = BTreeMap::new();
-    for (id, rows) in &mut tracks {
-        let place = |e: boresight::Error| e.at(format!("track {id} of {}", args.tracks.display()));
-        if !own {
-            each_belief(rows, |times, beliefs| filter_track(times, beliefs, args.speed_std, &config)).map_err(place)?;
-        }
-        if args.fill {
-            n_filled += fill(rows, &table.frames, &config).map_err(place)?;
-        }
-        n_rows += rows.len();
-        stds[0].extend(rows.iter().map(|r| deviation(&r.2)));
-        each_belief(rows, |times, beliefs| smooth_track(times, beliefs, &config)).map_err(place)?;
-        stds[1].extend(rows.iter().map(|r| deviation(&r.2)));
-        for (index, time, state) in rows.drain(..) {
-            let frame = frames.entry(index).or_insert(TrackFrame { index, time, tracks: Vec::new() });
-            frame.tracks.push(state);
-        }
-    }
+    let done = smooth_table(&table.frames, &config, (!own).then_some(args.speed_std), args.fill)
+        .map_err(|e| e.at(args.tracks.display()))?;
     let mut out = TracksCsv::create(&args.output)?;
-    for frame in frames.values() {
+    for frame in &done.frames {
         let scan = Scan::at(frame.index, frame.time);
         out.put(&View { frame: None, scan: &scan, tracks: &frame.tracks })?;
     }
     Box::new(out).finish()?;
-    let [before, after] = stds.map(median);
     eprintln!(
-        "{} tracks, {n_rows} rows ({n_filled} filled in): median deviation of a position {before:.3} -> {after:.3} px: {}",
-        tracks.len(),
+        "{} tracks, {} rows ({} filled in): median deviation of a position {:.3} -> {:.3} px: {}",
+        done.n_tracks,
+        done.n_rows,
+        done.n_filled,
+        done.median_std_before_px,
+        done.median_std_after_px,
         args.output.display()
     );
     Ok(ExitCode::SUCCESS)
@@ -146,59 +122,4 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     };
     config.validate("smooth")?;
     Ok(config)
-}
-
-/// Puts predicted rows into the frames between a track's rows in which it has none; returns how many.
-fn fill(rows: &mut Rows, frames: &[TrackFrame], config: &SmoothConfig) -> boresight::Result<usize> {
-    let mut filled: Rows = Vec::with_capacity(rows.len());
-    let mut n = 0;
-    for (index, time, state) in rows.drain(..) {
-        let (from, after) = match filled.last() {
-            Some((from, after, _)) => (*from, *after),
-            None => (index, time),
-        };
-        for missing in from.0 + 1..index.0 {
-            let known = frames.binary_search_by_key(&missing, |f| f.index.0).ok().map(|at| frames[at].time);
-            // A frame without any track: its time lies between its neighbours'.
-            let share = (missing - from.0) as f64 / (index.0 - from.0) as f64;
-            let between = || Timestamp::from_secs_f64(after.as_secs_f64() + share * time.seconds_since(after));
-            let at = known.unwrap_or_else(between);
-            let Some((_, last, before)) = filled.last() else { break };
-            let kinematics = predict(&before.kinematics, at.seconds_since(*last), config)?;
-            let row = TrackState { kinematics, status: TrackStatus::Coasting, detection: None, ..before.clone() };
-            filled.push((FrameIndex(missing), at, row));
-            n += 1;
-        }
-        filled.push((index, time, state));
-    }
-    *rows = filled;
-    Ok(n)
-}
-
-/// Lets `change` work on the beliefs of a track, and moves the boxes with them.
-fn each_belief(
-    rows: &mut Rows,
-    change: impl FnOnce(&[Timestamp], &mut [Gaussian<4>]) -> boresight::Result<()>,
-) -> boresight::Result<()> {
-    let times: Vec<Timestamp> = rows.iter().map(|r| r.1).collect();
-    let mut beliefs: Vec<_> = rows.iter().map(|r| r.2.kinematics).collect();
-    change(&times, &mut beliefs)?;
-    for ((_, _, state), belief) in rows.iter_mut().zip(beliefs) {
-        let (width_px, height_px) = (state.extent.width_px, state.extent.height_px);
-        let (left_px, top_px) = (belief.mean[0] - width_px / 2.0, belief.mean[2] - height_px / 2.0);
-        state.extent = Extent { left_px, top_px, width_px, height_px };
-        state.kinematics = belief;
-    }
-    Ok(())
-}
-
-/// Standard deviation of a position, mean of both axes, px.
-fn deviation(state: &TrackState) -> f64 {
-    let p = &state.kinematics.cov;
-    (0.5 * (p[(0, 0)] + p[(2, 2)])).sqrt()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -1,8 +1,8 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
 use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks};
-use boresight::track::{StitchConfig, join};
-use boresight::{FrameIndex, Scan, Sink, Timestamp, TrackFrame, View};
+use boresight::track::{StitchConfig, join, with_empty_frames};
+use boresight::{Scan, Sink, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -57,24 +57,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     config.validate("stitch")?;
     let table = read_tracks(&args.tracks, &TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() })?;
     table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", args.tracks.display()));
-    let rate_hz = table.rate_hz;
-    let mut scans: Vec<TrackFrame> = Vec::new();
-    for frame in table.frames {
-        // Frames without any track have no rows in a table; a gap needs them.
-        if let Some(last) = scans.last()
-            && args.smooth
-        {
-            let (from, time) = (last.index.0, last.time);
-            let n = frame.index.0.saturating_sub(from);
-            // Beyond the longest gap nothing is filled: no need to make room for it.
-            let step_s = frame.time.seconds_since(time) / n.max(1) as f64;
-            for k in (1..n).filter(|_| n as f64 <= args.max_gap * rate_hz + 1.0) {
-                let time = Timestamp::from_ns(time.ns + (step_s * k as f64 * 1e9).round() as i64);
-                scans.push(TrackFrame { index: FrameIndex(from + k), time, tracks: Vec::new() });
-            }
-        }
-        scans.push(frame);
-    }
+    // Frames without any track have no rows in a table; a gap needs them.
+    let mut scans =
+        if args.smooth { with_empty_frames(table.frames, args.max_gap, table.rate_hz) } else { table.frames };
     let done = join(&mut scans, &config, args.smooth)?;
     let mut out: Box<dyn Sink> = if args.output.extension().is_some_and(|e| e == "txt") {
         Box::new(MotWriter::create(&args.output)?.with_coasting(args.smooth))
