@@ -58,7 +58,11 @@ fn the_normalised_error_of_every_centroid_has_mean_square_two() {
     // Noise 4 counts, threshold at 5 times the noise: peaks of 15 to 35 times the noise.
     let ms = mean_squares(4.0, 5.0, (1.5, 2.5), &methods);
     println!("{ms:?}");
-    for (m, method) in ms.iter().zip(&methods).take(4) {
-        assert!((m / 2.0 - 1.0).abs() < 0.05, "{method:?}: {m}");
+    // The mean of 10 000 squares has the deviation 0.02.
+    for (m, method) in ms.iter().zip(&methods) {
+        // Weighed above the background, a whole rectangle is on the safe side: its covariance is up to 25 % too large.
+        let safe = *method == (Bbox, true);
+        let low = if safe { 0.75 } else { 0.95 };
+        assert!((low..1.05).contains(&(m / 2.0)), "{method:?}: {m}");
     }
 }

@@ -314,40 +314,4 @@ fn noise_gain(disc: &[(i32, i32)], radius: usize, smooth: usize, surround: usize
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn spot_image(x0: f64, y0: f64, amplitude: f64) -> Image<f32> {
-        let mut image = Image::filled(64, 48, 50.0f32);
-        for y in 0..48 {
-            for x in 0..64 {
-                let d2 = (x as f64 - x0).powi(2) + (y as f64 - y0).powi(2);
-                image.row_mut(y)[x] += (amplitude * (-d2 / (2.0 * 1.5 * 1.5)).exp()) as f32;
-            }
-        }
-        image
-    }
-
-    #[test]
-    fn a_spot_is_found_at_its_sub_pixel_position_bright_or_dark() {
-        for (amplitude, polarity) in [(80.0, super::super::Polarity::Bright), (-40.0, super::super::Polarity::Both)] {
-            let config = SpotConfig { size_px: 7.0, polarity, ..Default::default() };
-            let mut found = Vec::new();
-            SpotDetector::new(&config).detect(&spot_image(30.3, 20.6, amplitude), (1.0, 0.0), &mut found);
-            assert_eq!(found.len(), 1, "{amplitude}");
-            let d = found[0].position - Vector2::new(30.3, 20.6);
-            assert!(d.norm() < 0.05, "{d}");
-            assert!((f64::from(found[0].peak) - 50.0).signum() == amplitude.signum());
-        }
-    }
-
-    #[test]
-    fn a_flat_frame_or_one_without_values_has_no_spots() {
-        let mut found = Vec::new();
-        for image in [Image::filled(40, 40, 7.0f32), Image::filled(40, 40, f32::NAN), Image::filled(1, 1, 3.0)] {
-            SpotDetector::new(&SpotConfig::default()).detect(&image, (1.0, 0.0), &mut found);
-        }
-        SpotDetector::new(&SpotConfig::default()).detect(&Image::<u8>::filled(0, 0, 0), (1.0, 0.0), &mut found);
-        assert!(found.is_empty());
-    }
-}
+mod tests;

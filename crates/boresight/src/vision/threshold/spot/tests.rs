@@ -1,0 +1,257 @@
+//! The spot detector against its kernel written out, hand-made responses, and trials with noise.
+
+use super::*;
+use crate::vision::threshold::Polarity;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const GROUND: f64 = 50.0;
+
+/// A frame of 64 x 48 with Gaussian spots (x, y, height) of sigma 1.5 px.
+fn frame(spots: &[(f64, f64, f64)]) -> Image<f32> {
+    let mut image = Image::filled(64, 48, GROUND as f32);
+    for y in 0..48 {
+        for x in 0..64 {
+            let light = |s: &(f64, f64, f64)| {
+                let d2 = (x as f64 - s.0).powi(2) + (y as f64 - s.1).powi(2);
+                s.2 * (-d2 / (2.0 * 1.5 * 1.5)).exp()
+            };
+            image.row_mut(y)[x] += spots.iter().map(light).sum::<f64>() as f32;
+        }
+    }
+    image
+}
+
+fn detect(image: &Image<f32>, config: &SpotConfig, noise: (f64, f64)) -> Vec<Detection> {
+    let mut found = Vec::new();
+    SpotDetector::new(config).detect(image, noise, &mut found);
+    found
+}
+
+/// A box applied twice less a wider box, at (dx, dy), written out.
+fn kernel(smooth: usize, surround: usize, dx: i64, dy: i64) -> f64 {
+    let twice = |k: i64| (smooth as f64 - k.abs() as f64).max(0.0) / (smooth * smooth) as f64;
+    let wide = |k: i64| if 2 * k.abs() < surround as i64 { 1.0 / surround as f64 } else { 0.0 };
+    twice(dx) * twice(dy) - wide(dx) * wide(dy)
+}
+
+#[test]
+fn the_response_to_one_pixel_is_the_kernel_and_a_missing_value_takes_its_left_neighbours() {
+    let mut detector = SpotDetector::new(&SpotConfig::default());
+    let mut image = Image::filled(41, 41, 0.0f32);
+    image.row_mut(20)[20] = 1000.0;
+    detector.fill_response(&image);
+    for (dx, dy) in [(0, 0), (1, 0), (0, -2), (2, 2), (-3, 1), (5, -5), (6, 0), (9, 9)] {
+        let ours = f64::from(detector.response.row((20 + dy) as usize)[(20 + dx) as usize]);
+        assert!((ours - 1000.0 * kernel(3, 11, dx, dy)).abs() < 1e-3, "{dx} {dy}: {ours}");
+    }
+    let holes = Image::from_vec(4, 1, vec![f32::NAN, 3.0, f32::NAN, f32::INFINITY]).unwrap();
+    detector.fill_response(&holes);
+    assert_eq!(detector.frame.as_slice(), [0.0, 3.0, 3.0, 3.0]);
+}
+
+#[test]
+fn sizes_follow_from_the_targets_size() {
+    let sizes = |config: SpotConfig| {
+        let d = SpotDetector::new(&config);
+        (d.smooth, d.surround, d.radius, d.disc.len())
+    };
+    // Discs: whole-pixel offsets nearer than radius + 2.
+    let inside = |r: i32| (-r..=r).flat_map(|y| (-r..=r).map(move |x| x * x + y * y)).filter(|d2| *d2 < r * r).count();
+    assert_eq!(sizes(SpotConfig::default()), (3, 11, 3, inside(5)));
+    assert_eq!(sizes(SpotConfig { size_px: 20.0, ..Default::default() }), (5, 31, 10, inside(12)));
+    let narrow = SpotConfig { size_px: 4.0, surround: 1.0, smooth_px: Some(9.0), ..Default::default() };
+    assert_eq!(sizes(narrow), (9, 11, 2, inside(4)), "the surroundings are wider than the smoothing");
+    assert_eq!(sizes(SpotConfig { size_px: 1.9, ..Default::default() }), (1, 3, 1, inside(3)));
+    assert_eq!([0.2, 1.0, 2.0, 2.6, 4.0, 4.6].map(odd), [1, 1, 3, 3, 5, 5]);
+}
+
+#[test]
+fn the_gain_from_noise_to_position_is_that_of_the_kernel_written_out() {
+    for config in
+        [SpotConfig::default(), SpotConfig { size_px: 11.0, surround: 1.0, smooth_px: Some(5.0), ..Default::default() }]
+    {
+        let d = SpotDetector::new(&config);
+        let mut sum = 0.0;
+        for y in -30..=30 {
+            for x in -30..=30 {
+                let seen: f64 = d
+                    .disc
+                    .iter()
+                    .map(|&(px, py)| {
+                        let window = (d.radius as f64 + 0.5 - f64::from(px).hypot(f64::from(py))).clamp(0.0, 1.0);
+                        f64::from(px) * window * kernel(d.smooth, d.surround, i64::from(px) - x, i64::from(py) - y)
+                    })
+                    .sum();
+                sum += seen * seen;
+            }
+        }
+        assert!((d.noise_gain / sum - 1.0).abs() < 1e-4, "{} {sum}", d.noise_gain);
+    }
+}
+
+#[test]
+fn a_spot_is_found_at_its_sub_pixel_position_bright_or_dark() {
+    for (amplitude, polarity) in [(80.0, Polarity::Bright), (-40.0, Polarity::Dark), (-40.0, Polarity::Both)] {
+        let config = SpotConfig { size_px: 7.0, polarity, ..Default::default() };
+        let found = detect(&frame(&[(30.3, 20.6, amplitude)]), &config, (1.0, 0.0));
+        assert_eq!(found.len(), 1, "{amplitude}");
+        let d = found[0].position - Vector2::new(30.3, 20.6);
+        assert!(d.norm() < 0.05, "{d}");
+        let peak = f64::from(frame(&[(30.3, 20.6, amplitude)]).row(21)[30]);
+        assert!((f64::from(found[0].peak) - peak).abs() < 1e-4, "{} {peak}", found[0].peak);
+    }
+    let dark = SpotConfig { polarity: Polarity::Dark, ..Default::default() };
+    let opposite = detect(&frame(&[(30.3, 20.6, 80.0)]), &dark, (1.0, 0.0));
+    assert!(opposite.iter().all(|d| (d.position - Vector2::new(30.3, 20.6)).norm() > 3.0), "only its rim is dark");
+}
+
+#[test]
+fn spots_of_both_signs_come_in_raster_order_without_each_others_rims() {
+    let both = SpotConfig { polarity: Polarity::Both, ..Default::default() };
+    let found = detect(&frame(&[(14.0, 30.0, -60.0), (45.0, 12.0, 80.0), (50.0, 35.0, -80.0)]), &both, (1.0, 0.0));
+    let places: Vec<_> = found.iter().map(|d| (d.position.x.round(), d.position.y.round())).collect();
+    assert_eq!(places, [(45.0, 12.0), (14.0, 30.0), (50.0, 35.0)]);
+    // A neighbour half as strong, and of the other sign, is a target of its own; a third as strong it may be a rim.
+    let pair = |height: f64| detect(&frame(&[(25.0, 24.0, 80.0), (33.0, 24.0, height)]), &both, (1.0, 0.0)).len();
+    assert_eq!((pair(-70.0), pair(-1.0)), (2, 1));
+}
+
+#[test]
+fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
+    let mut detector = SpotDetector::new(&SpotConfig { size_px: 8.0, ..Default::default() });
+    let mut kept = |spots: &[(f64, f64, f64)]| -> Vec<f64> {
+        detector.spots = spots
+            .iter()
+            .map(|&(x, y, mass)| Spot {
+                position: Vector2::new(x, y),
+                mass,
+                pull: 0.0,
+                score: 1.0,
+                peak: (x as usize, y as usize),
+            })
+            .collect();
+        detector.drop_doubles();
+        detector.spots.iter().map(|s| s.mass).collect()
+    };
+    assert_eq!(kept(&[(10.0, 10.0, 1.0), (13.9, 10.0, 2.0)]), [2.0]);
+    assert_eq!(kept(&[(10.0, 10.0, 2.0), (10.0, 13.9, 1.0)]), [2.0]);
+    assert_eq!(kept(&[(10.0, 10.0, 2.0), (12.0, 12.0, 2.0)]).len(), 1);
+    assert_eq!(kept(&[(10.0, 10.0, 1.0), (14.0, 10.0, 2.0)]), [1.0, 2.0], "exactly half the size apart");
+    assert_eq!(kept(&[(10.0, 10.0, 3.0), (40.0, 10.0, 1.0), (13.0, 11.0, 2.0), (40.0, 60.0, 4.0)]), [3.0, 1.0, 4.0]);
+}
+
+#[test]
+fn two_equal_pixels_are_one_spot_between_them() {
+    let mut image = Image::filled(40, 40, 10.0f32);
+    image.row_mut(20)[20..22].fill(100.0);
+    let found = detect(&image, &SpotConfig::default(), (1.0, 0.0));
+    assert_eq!(found.len(), 1);
+    assert!((found[0].position - Vector2::new(20.5, 20.0)).norm() < 0.02, "{}", found[0].position);
+}
+
+#[test]
+fn a_response_below_the_least_contrast_is_none() {
+    let response = |height: f64| {
+        let mut d = SpotDetector::new(&SpotConfig::default());
+        d.fill_response(&frame(&[(30.0, 20.0, height)]));
+        f64::from(d.response.row(20)[30])
+    };
+    let least = response(10.0);
+    for (height, n) in [(10.1, 1), (9.9, 0)] {
+        let config = SpotConfig { min_contrast: least, ..Default::default() };
+        assert_eq!(detect(&frame(&[(30.0, 20.0, height)]), &config, (1.0, 0.0)).len(), n, "{height}");
+    }
+    // A frame without spread scores by the least deviation there is, 1e-6.
+    let found = detect(&frame(&[(30.0, 20.0, 10.0)]), &SpotConfig::default(), (1.0, 0.0));
+    assert!((f64::from(found[0].score) * 1e-6 / least - 1.0).abs() < 1e-3, "{} {least}", found[0].score);
+    let found = detect(&frame(&[(30.0, 20.0, 1e6)]), &SpotConfig::default(), (1.0, 0.0));
+    assert_eq!(found[0].score, 1e9);
+}
+
+#[test]
+fn size_peak_and_variance_are_read_from_the_response() {
+    let mut d = SpotDetector::new(&SpotConfig::default());
+    d.response = Image::filled(20, 20, 0.0);
+    d.frame = Image::filled(20, 20, 7.0);
+    for (x, y, r, v) in
+        [(9, 9, 10.0, 20.0), (10, 9, 6.0, 26.0), (11, 9, 5.0, 12.0), (9, 10, 5.0, 3.0), (8, 9, 4.9, 90.0)]
+    {
+        d.response.row_mut(y)[x] = r;
+        d.frame.row_mut(y)[x] = v;
+    }
+    d.noise_gain = 2.0;
+    let spot = |pull| Spot { position: Vector2::new(9.4, 9.2), mass: 10.0, pull, score: 4.0, peak: (9, 9) };
+    let bright = d.detection(&spot(0.5), (3.0, 0.1), 1.0);
+    // Half the peak or more: (9, 9), (10, 9), (11, 9), (9, 10).
+    assert_eq!(bright.extent, Extent { left_px: 8.5, top_px: 8.5, width_px: 3.0, height_px: 2.0 });
+    assert_eq!((bright.area_px, bright.peak, bright.sum, bright.score), (4, 26.0, 10.0, 4.0));
+    assert_eq!(bright.position, Vector2::new(9.4, 9.2));
+    assert_eq!(d.detection(&spot(0.5), (3.0, 0.1), -1.0).peak, 3.0);
+    // (3 + 0.1 x 20) x 2 / (10 x 0.5)² + 1e-4.
+    let variance = |spot: &Spot, noise| d.detection(spot, noise, 1.0).cov[(0, 0)];
+    assert!((variance(&spot(0.5), (3.0, 0.1)) - 0.4001).abs() < 1e-12);
+    assert!((variance(&spot(0.0), (3.0, 0.0)) - 0.0601).abs() < 1e-12);
+    assert!((variance(&spot(0.95), (9.0, 0.0)) - 2.0001).abs() < 1e-12, "a disc is pulled by 0.7 at most");
+    assert_eq!(bright.cov, Matrix2::identity() * bright.cov[(0, 0)]);
+    d.frame.row_mut(9)[9] = -20.0;
+    assert!((d.detection(&spot(0.0), (3.0, 0.1), 1.0).cov[(0, 0)] - 0.0601).abs() < 1e-12, "no shot noise below 0");
+}
+
+#[test]
+fn the_pull_of_the_disc_is_how_far_its_centroid_follows_it() {
+    // An even response pulls a disc all the way: the centroid of what is inside is its middle wherever it stands. By parts: a unit step of the
+    // disc moves the centroid by Σ_edge D r / (2 Σ D), the edge's half towards the step; here Σ over the soft ring, counted by hand.
+    let mut d = SpotDetector::new(&SpotConfig::default());
+    d.response = Image::filled(40, 40, 2.0);
+    d.grid.refresh(&d.response);
+    let spot = d.centre(20, 20, 2.0);
+    let (mut mass, mut edge) = (0.0, 0.0);
+    for y in -5..=5 {
+        for x in -5..=5 {
+            let r = f64::from(x).hypot(f64::from(y));
+            let window = (3.5 - r).clamp(0.0, 1.0);
+            mass += 2.0 * window;
+            edge += if window > 0.0 && window < 1.0 { r } else { 0.0 };
+        }
+    }
+    assert_eq!(spot.position, Vector2::new(20.0, 20.0));
+    assert!((spot.mass - mass).abs() < 1e-9 && (spot.pull - edge / mass).abs() < 1e-9, "{} {}", spot.mass, spot.pull);
+}
+
+#[test]
+fn a_flat_frame_or_one_without_values_has_no_spots() {
+    for image in [Image::filled(40, 40, 7.0f32), Image::filled(40, 40, f32::NAN), Image::filled(1, 1, 3.0)] {
+        assert!(detect(&image, &SpotConfig::default(), (1.0, 0.0)).is_empty());
+    }
+    let mut found = Vec::new();
+    SpotDetector::new(&SpotConfig::default()).detect(&Image::<u8>::filled(0, 0, 0), (1.0, 0.0), &mut found);
+    assert!(found.is_empty());
+}
+
+#[test]
+fn errors_in_noise_are_as_large_as_their_covariance_says() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let (mut z, mut sum2) = (Vec::new(), 0.0);
+    for _ in 0..400 {
+        let truth = Vector2::new(30.0 + rng.random::<f64>(), 20.0 + rng.random::<f64>());
+        let mut image = frame(&[(truth.x, truth.y, 120.0)]);
+        image.as_mut_slice().iter_mut().for_each(|p| *p += 4.0 * rng.sample::<f32, _>(StandardNormal));
+        let found = detect(&image, &SpotConfig::default(), (16.0, 0.0));
+        let Some(d) = found.iter().find(|d| (d.position - truth).norm() < 2.0) else { continue };
+        let e = (d.position - truth) / d.cov[(0, 0)].sqrt();
+        sum2 += e.norm_squared();
+        z.extend([e.x, e.y]);
+    }
+    let (n, mean) = (z.len() as f64, z.iter().sum::<f64>() / z.len() as f64);
+    let within = z.iter().filter(|z| z.abs() < 1.96).count() as f64 / n;
+    println!("{n} {mean} {} {within}", sum2 / n);
+    assert!(n >= 780.0, "{n}");
+    // Deviations of the mean, of the mean square and of the share inside: 0.035, 0.05, 0.008.
+    assert!(
+        mean.abs() < 0.12 && (sum2 / n - 1.0).abs() < 0.2 && (within - 0.95).abs() < 0.03,
+        "{mean} {} {within}",
+        sum2 / n
+    );
+}
