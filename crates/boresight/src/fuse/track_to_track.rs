@@ -15,7 +15,7 @@ use nalgebra::SMatrix;
 /// Fuses two beliefs with independent errors.
 ///
 /// ```
-/// use boresight::fuse::track_to_track::fuse_independent;
+/// use boresight::fuse::fuse_independent;
 /// use boresight_filters::Gaussian;
 /// use nalgebra::{Matrix2, Matrix4, Vector4};
 /// // The worked example of docs/theory/fusion.md.

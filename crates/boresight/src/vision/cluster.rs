@@ -205,8 +205,8 @@ impl Clusterer {
 ///
 /// The worked example of `docs/theory/segmentation.md` (its coordinates count from 1):
 /// ```
-/// use boresight::{Image, vision::cluster::segment};
-/// use boresight::vision::{config::{CentroidMethod, ClusterConfig}, centroid::{Surroundings, centroid}};
+/// use boresight::{Image, vision::segment};
+/// use boresight::vision::{CentroidMethod, ClusterConfig, Surroundings, centroid};
 /// let image = Image::from_vec(6, 6, vec![
 ///     95u8, 100, 20, 30, 105, 40,   98, 60, 20, 97, 10, 40,     30, 20, 99, 20, 10, 108,
 ///     10, 101, 10, 20, 200, 90,     10, 20, 30, 110, 20, 30,    94, 20, 111, 89, 20, 103,

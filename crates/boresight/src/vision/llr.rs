@@ -32,7 +32,7 @@ impl LlrTable {
     /// Builds the table for `n_levels` levels (256 for 8-bit pixels); both deviations must be above 0.
     ///
     /// ```
-    /// use boresight::vision::{llr::LlrTable, probability::Level};
+    /// use boresight::vision::{LlrTable, probability::Level};
     /// let table = LlrTable::new(Level { mean: 100.0, sd: 10.0 }, Level { mean: 50.0, sd: 50.0 }, 256);
     /// for (g, llr) in [(0, -50.901808326902), (50, -10.880570418522), (90, 1.4294438083709), (100, 2.109021315373),
     ///                  (110, 1.8294304753078), (150, -8.8806370834111)] {

@@ -115,7 +115,7 @@ impl CfarDetector {
             self.measure(c, T::STEP, largest);
         }
         self.candidates = candidates;
-        self.found.sort_by(|a, b| {
+        self.found.sort_unstable_by(|a, b| {
             let (a, b) = (a.detection.position, b.detection.position);
             a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x))
         });
