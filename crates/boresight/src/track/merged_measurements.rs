@@ -172,3 +172,68 @@ impl MergedMeasurements {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detection, Extent};
+    use nalgebra::{Matrix2, Vector2};
+
+    /// Box from (10, 0) to (30, 4) px, its centre at (20, 2), variance 1 px².
+    fn blob() -> Detection {
+        let extent = Extent { left_px: 10.0, top_px: 0.0, width_px: 20.0, height_px: 4.0 };
+        Detection::at(Vector2::new(20.0, 2.0), Matrix2::identity()).with_extent(extent)
+    }
+
+    /// Parts of the blob among tracks at these x (px) of these widths (px); `taker` took it, `missed` took nothing.
+    fn parts(x: &[f64], width: &[f64], taker: Option<u32>, missed: &[u32]) -> Vec<Part> {
+        let scan = Scan { detections: vec![blob()], ..Scan::default() };
+        let mut table = ScanTable::default();
+        table.read(&scan, 0.0, 0.0).unwrap();
+        table.sort(&scan);
+        let cov = Noise { xx: 1.0, xy: 0.0, yy: 1.0 };
+        let predicted: Vec<Predicted> = x.iter().map(|x| Predicted { x: *x, y: 2.0, cov, reach: 99.0 }).collect();
+        let appearance = |i: u32| Appearance { size: [width[i as usize], 4.0], sum: 1.0, class: None };
+        let mut merged = MergedMeasurements::default();
+        let config = MergedMeasurementsConfig::default();
+        merged.find(&config, &scan, &table, &predicted, appearance, &[taker.unwrap_or(u32::MAX)], missed);
+        merged.parts
+    }
+
+    #[test]
+    fn outer_members_stand_at_the_edges_and_inner_ones_keep_their_place_to_the_centre() {
+        // Left edge 10 + 6/2, right edge 30 − 8/2; between: 20 + 19 − (13 + 19 + 27)/3.
+        let parts = parts(&[13.0, 19.0, 27.0], &[6.0, 4.0, 8.0], Some(2), &[0, 1]);
+        let x: Vec<f64> = parts.iter().map(|p| p.position[0]).collect();
+        assert_eq!((x[0], x[2]), (13.0, 26.0));
+        assert!((x[1] - (39.0 - 59.0 / 3.0)).abs() < 1e-12, "{}", x[1]);
+        assert!(parts.iter().all(|p| p.position[1] == 2.0 && p.detection == 0));
+        assert_eq!(parts.iter().map(|p| p.track).collect::<Vec<_>>(), [0, 1, 2]);
+        // The detection's own variance and that of an edge, 0.7 px.
+        assert!(parts.iter().all(|p| (p.noise.xx - 1.49).abs() < 1e-12 && (p.noise.yy - 1.49).abs() < 1e-12));
+    }
+
+    #[test]
+    fn who_took_the_detection_is_primary_and_without_one_the_nearest() {
+        let primary = |taker, missed: &[u32]| {
+            let parts = parts(&[13.0, 19.0, 27.0], &[6.0; 3], taker, missed);
+            parts.iter().filter(|p| p.primary).map(|p| p.track).collect::<Vec<_>>()
+        };
+        assert_eq!(primary(Some(2), &[0, 1]), [2]);
+        assert_eq!(primary(None, &[0, 1, 2]), [1]);
+    }
+
+    #[test]
+    fn a_member_wider_than_the_box_stands_in_its_middle() {
+        let parts = parts(&[15.0, 25.0], &[90.0, 2.0], None, &[0, 1]);
+        assert_eq!(parts.iter().map(|p| p.position[0]).collect::<Vec<_>>(), [20.0, 29.0]);
+    }
+
+    #[test]
+    fn one_track_alone_or_outside_the_box_shares_nothing() {
+        assert!(parts(&[13.0], &[6.0], None, &[0]).is_empty());
+        assert!(parts(&[9.9, 20.0], &[6.0; 2], Some(1), &[0]).is_empty());
+        assert_eq!(parts(&[10.0, 20.0], &[6.0; 2], Some(1), &[0]).len(), 2);
+        assert!(parts(&[30.1, 20.0], &[6.0; 2], Some(1), &[0]).is_empty());
+    }
+}

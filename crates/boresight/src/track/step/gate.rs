@@ -80,6 +80,7 @@ mod tests {
     use crate::{Detection, Scan};
     use boresight_filters::{Filter, Gaussian};
     use nalgebra::{Matrix4, Vector4};
+    use std::cell::Cell;
 
     fn belief(i: &serde_json::Value) -> Gaussian<4> {
         let p: Vec<f64> = rows(&i["P"]).concat();
@@ -128,5 +129,57 @@ mod tests {
             let nearest = answer.row(0).first().map_or(-1.0, |s| f64::from(s.detection));
             assert_eq!(nearest, number(&case["outputs"]["nearest"]), "case {n}");
         }
+    }
+
+    /// The row of a track at the origin with variance 1 px² against detections at these places with variance 1 px².
+    fn row(places: &[(f64, f64)], gate: f64, max_gated: usize, reach: f64) -> (Vec<Pair>, usize) {
+        let detections =
+            places.iter().map(|p| Detection::at(Vector2::new(p.0, p.1), Matrix2::identity())).collect::<Vec<_>>();
+        let scan = Scan { detections, ..Scan::default() };
+        let mut table = ScanTable::default();
+        table.read(&scan, 0.0, 0.0).unwrap();
+        table.sort(&scan);
+        let track = Predicted { x: 0.0, y: 0.0, cov: Noise { xx: 1.0, xy: 0.0, yy: 1.0 }, reach };
+        let mut gates = Gates::new();
+        gates.reset(places.len(), 1.0);
+        let asked = Cell::new(0);
+        let free = |_| {
+            asked.set(asked.get() + 1);
+            true
+        };
+        gate_row(&table, &track, gate, max_gated, true, free, |_| 0.0, &mut gates);
+        gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: gate });
+        (gates.row(0).to_vec(), asked.get())
+    }
+
+    #[test]
+    fn the_ellipse_decides_and_the_largest_speed_cuts_it() {
+        // S = 2 I: d² = r² / 2, so a gate of 8 reaches to 4 px.
+        let places = [(3.99, 0.0), (4.01, 0.0), (0.0, -2.0), (2.9, 2.9)];
+        let gated = |reach| row(&places, 8.0, 9, reach).0.iter().map(|p| (p.detection, p.cost)).collect::<Vec<_>>();
+        assert_eq!(gated(f64::INFINITY).iter().map(|g| g.0).collect::<Vec<_>>(), [0, 2]);
+        assert!((gated(f64::INFINITY)[1].1 - 2.0).abs() < 1e-12);
+        assert_eq!(gated(3.0).iter().map(|g| g.0).collect::<Vec<_>>(), [2]);
+    }
+
+    #[test]
+    fn the_log_likelihood_is_that_of_a_gaussian() {
+        // −d²/2 − ln det S / 2 − ln 2π = −1 − ln 2 − 1.837877 for d² = 2, det S = 4.
+        let (pairs, _) = row(&[(0.0, 2.0)], 8.0, 9, f64::INFINITY);
+        assert!((pairs[0].log_likelihood + 1.0 + 2f64.ln() + 1.837_877_066).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_nearest_are_kept_in_the_order_of_the_scan() {
+        let places = [(1.0, 0.0), (0.1, 0.0), (0.5, 0.0), (0.2, 0.0)];
+        let kept: Vec<u32> = row(&places, 9.0, 2, f64::INFINITY).0.iter().map(|p| p.detection).collect();
+        assert_eq!(kept, [1, 3]);
+    }
+
+    #[test]
+    fn a_hundred_thousand_detections_in_one_pixel_cost_a_bounded_search() {
+        let places: Vec<_> = (0..100_000u32).map(|i| (f64::from(i % 7) * 0.1, 0.0)).collect();
+        let (pairs, asked) = row(&places, 9.0, 64, f64::INFINITY);
+        assert_eq!((pairs.len(), asked), (64, MOST_LOOKED_AT));
     }
 }

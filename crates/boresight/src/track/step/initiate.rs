@@ -219,3 +219,116 @@ fn second_point(context: &Context<'_>, used: &[bool], first: &Unassociated, dt_s
     debug_assert!(best.is_none_or(|(_, i)| (i as usize) < context.scan.detections.len()));
     best.map(|(_, i)| i as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::track::{
+        ConfirmationConfig, ExistenceConfig, InitiationConfig, OnePointConfig, TrackerConfig, TwoPointConfig,
+        VelocityBoundsConfig, build,
+    };
+    use crate::{Detection, Scan, Timestamp, TrackState};
+    use nalgebra::{Matrix2, Vector2};
+
+    /// Tracks after two scans `dt_s` apart of detections with variance `r` px² and score 5.
+    fn after(config: &TrackerConfig, r: f64, dt_s: f64, scans: [&[(f64, f64)]; 2]) -> Vec<TrackState> {
+        let mut tracker = build(config).unwrap();
+        let mut states = Vec::new();
+        for (k, places) in scans.iter().enumerate() {
+            let detection =
+                |p: &(f64, f64)| Detection::at(Vector2::new(p.0, p.1), Matrix2::identity() * r).with_score(5.0);
+            let scan = Scan {
+                time: Timestamp::from_secs_f64(k as f64 * dt_s),
+                detections: places.iter().map(detection).collect(),
+                ..Scan::default()
+            };
+            states = tracker.step(&scan).unwrap().to_vec();
+        }
+        states
+    }
+
+    fn existence() -> TrackerConfig {
+        let config = ExistenceConfig { new_target_density_per_px2: 1e-4, ..ExistenceConfig::default() };
+        TrackerConfig {
+            confirmation: ConfirmationConfig::Existence(config),
+            clutter_density_per_px2: 1e-3,
+            detection_probability: 0.9,
+            max_speed_px_per_s: 10.0,
+            acceleration_std_px_per_s2: 1e-9,
+            extra_noise_px: 0.0,
+            ..TrackerConfig::default()
+        }
+    }
+
+    #[test]
+    fn two_points_give_position_and_velocity_with_their_covariance() {
+        // x = [z₂, Δz/T], P = R [[1, 1/T], [1/T, 2/T²]] for R = 1/4, T = 1/2; the uniform Λ is 0.9 / (π 5² 0.001).
+        let states = after(&existence(), 0.25, 0.5, [&[(0.0, 0.0)], &[(2.0, 1.0)]]);
+        let k = &states[0].kinematics;
+        assert_eq!(k.mean.as_slice(), [2.0, 4.0, 1.0, 2.0]);
+        let block =
+            [k.cov[(0, 0)], k.cov[(0, 1)], k.cov[(1, 1)], k.cov[(2, 2)], k.cov[(2, 3)], k.cov[(3, 3)], k.cov[(0, 2)]];
+        assert_eq!(block, [0.25, 0.5, 2.0, 0.25, 0.5, 2.0, 0.0]);
+        // Odds 0.1 · 11.459 = 1.1459: probability 0.53400.
+        assert!((states[0].score - 0.534_00).abs() < 1e-5, "{}", states[0].score);
+    }
+
+    #[test]
+    fn with_a_known_spread_of_velocities_the_second_point_corrects_the_first() {
+        // R = 1, velocity 2 px/s, T = 1: P = [[5, 4], [4, 4]], S = 6; a step of 3 px gives x = 3 · 5/6, v = 3 · 4/6.
+        // Λ = 0.9 exp(−9/12) / (2π 6) / 0.001 = 11.2769, odds 1.12769: probability 0.53001.
+        let two = TwoPointConfig { velocity_std_px_per_s: Some(2.0) };
+        let config = TrackerConfig { initiation: InitiationConfig::TwoPoint(two), ..existence() };
+        let states = after(&config, 1.0, 1.0, [&[(0.0, 0.0)], &[(3.0, 0.0)]]);
+        let k = &states[0].kinematics;
+        assert!((k.mean[0] - 2.5).abs() < 1e-9 && (k.mean[1] - 2.0).abs() < 1e-9 && k.mean[3].abs() < 1e-9);
+        assert!((k.cov[(0, 0)] - 5.0 / 6.0).abs() < 1e-9 && (k.cov[(1, 1)] - 4.0 / 3.0).abs() < 1e-9);
+        assert!((states[0].score - 0.530_01).abs() < 1e-5, "{}", states[0].score);
+    }
+
+    #[test]
+    fn one_point_starts_at_rest_with_the_given_spread() {
+        let one = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: 3.0 });
+        let states = after(&TrackerConfig { initiation: one, ..existence() }, 0.25, 1.0, [&[], &[(4.0, 7.0)]]);
+        let k = &states[0].kinematics;
+        assert_eq!(k.mean.as_slice(), [4.0, 0.0, 7.0, 0.0]);
+        assert_eq!([k.cov[(0, 0)], k.cov[(1, 1)], k.cov[(0, 1)]], [0.25, 9.0, 0.0]);
+        // Odds 1e-4 / 1e-3.
+        assert!((states[0].score - 1.0 / 11.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_nearest_second_point_that_a_target_can_have_reached_is_taken() {
+        let x = |scan: &[(f64, f64)]| {
+            after(&existence(), 0.1, 1.0, [&[(0.0, 0.0)], scan])
+                .iter()
+                .map(|s| s.kinematics.mean[0])
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(x(&[(-7.0, 0.0), (4.0, 0.0), (5.0, 0.0)]), [4.0]);
+        assert_eq!(x(&[(9.99, 0.0)]), [9.99]);
+        assert!(x(&[(10.01, 0.0)]).is_empty(), "faster than the largest speed");
+    }
+
+    #[test]
+    fn velocity_bounds_refuse_what_moves_otherwise() {
+        let bounds = VelocityBoundsConfig { min_px_per_s: [2.0, -1.0], max_px_per_s: [6.0, 1.0] };
+        let config = TrackerConfig { initiation: InitiationConfig::VelocityBounds(bounds), ..existence() };
+        let n = |x: f64, y: f64| after(&config, 0.1, 0.5, [&[(0.0, 0.0)], &[(x, y)]]).len();
+        assert_eq!([n(1.0, 0.0), n(3.0, 0.5), n(0.9, 0.0), n(3.1, 0.0), n(2.0, 0.6), n(-2.0, 0.0)], [1, 1, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn weak_detections_and_a_full_tracker_initiate_nothing() {
+        let scans: [&[(f64, f64)]; 2] =
+            [&[(0.0, 0.0), (50.0, 0.0), (0.0, 50.0)], &[(1.0, 0.0), (51.0, 0.0), (1.0, 50.0)]];
+        let one = InitiationConfig::OnePoint(OnePointConfig::default());
+        for initiation in [InitiationConfig::default(), one] {
+            let n =
+                |c: TrackerConfig| after(&TrackerConfig { initiation: initiation.clone(), ..c }, 0.1, 1.0, scans).len();
+            assert_eq!(n(existence()), 3);
+            assert_eq!(n(TrackerConfig { max_tracks: 2, ..existence() }), 2);
+            assert_eq!(n(TrackerConfig { min_initiation_score: 5.0, ..existence() }), 3);
+            assert_eq!(n(TrackerConfig { min_initiation_score: 5.1, ..existence() }), 0);
+        }
+    }
+}
