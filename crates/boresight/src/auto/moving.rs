@@ -17,8 +17,8 @@ const SHARE_OF_FRAMES: f64 = 0.2;
 const LEAST_SIDE: f64 = 0.02;
 /// Least area of what moves, as a share of the frame's.
 const LEAST_AREA: f64 = 0.0004;
-/// Least share of fresh ground, see [`Scene`]: less is leaves, water, flicker.
-const LEAST_FRESH: f64 = 0.12;
+/// Least share of new ground, see [`Scene`]: less is leaves, water, flicker.
+const LEAST_NOVELTY: f64 = 0.12;
 /// More regions than this are noise, water, leaves or particles.
 const MOST_REGIONS: f64 = 40.0;
 /// Isolated blobs that explain this share of what moves are found better as such.
@@ -33,7 +33,7 @@ pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
         && scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
         && side >= LEAST_SIDE * info.width.max(info.height) as f64
         && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64
-        && scene.fresh >= LEAST_FRESH
+        && scene.novelty >= LEAST_NOVELTY
         && scene.regions <= MOST_REGIONS
         && scene.share <= 0.35
         && scene.n_frames >= LEAST_FRAMES

@@ -64,7 +64,7 @@ pub struct Scene {
     pub share: f64,
     /// Ground that moves in any frame, as a share of what moves in all frames together: 1 for things that go on, little for leaves
     /// and water, which stay in their places.
-    pub fresh: f64,
+    pub novelty: f64,
     /// Share of the regions that an isolated blob explains.
     pub explained: f64,
 }
@@ -124,7 +124,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     let stay = edges_moved as f64 / (edges.len() * grids.len()).max(1) as f64;
     let enough_edges = edges.len() * 1000 > grids[0].as_slice().len();
     scene.camera = camera(frames, enough_edges.then_some(stay));
-    scene.fresh = ever.count() as f64 / all.max(1) as f64;
+    scene.novelty = ever.count() as f64 / all.max(1) as f64;
     measure(&mut scene, &moved, info);
     if scene.camera == Camera::Fixed {
         scene.explained = explained(frames, &moved, info)?;

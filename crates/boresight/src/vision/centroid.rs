@@ -9,7 +9,8 @@
 //! slope as that of a Gaussian spot with the region's area and mean height over T (a paraboloid where the ground is unknown).
 //! Sides (`bbox`, `box-centre`): each side of the rectangle has the variance 1/12 + 0.75 δ²; 0.75 is fitted to simulated spots.
 //! Limits: tested on spots of 1.2 to 4 px sigma and 5 to 60 times the noise: the normalised error has its mean square 2 within
-//! 5 % for mask, binary, box-centre and bbox weighed by intensity; bbox weighed above the background is safe by up to 25 %. Not modelled:
+//! 5 % for mask, binary and bbox weighed by intensity (box-centre: of 1.5 to 2.5 px sigma and 15 to 35 times the noise); bbox weighed above
+//! the background is safe by up to 25 %. Not modelled:
 //! neighbours that touch, a background that slopes under the target, noise correlated between pixels, δ above 1 px.
 //! Symbols: I pixel value (counts); b background (counts, 0 for `intensity`); s = +1 bright, -1 dark; σ² variance of one pixel
 //! (counts²); p pixel centre (px); r radius of the circle of the region's area (px).

@@ -9,7 +9,7 @@ use super::config::{CentroidMethod, DetectorConfig, NoiseConfig, Weight};
 use super::isolated::IsolatedDetector;
 use super::noise_level::noise_level;
 use super::pixel::Pixel;
-use super::stage::Stage;
+use super::preprocess::Preprocessing;
 use super::strongest::Strongest;
 use super::threshold::band::words;
 use super::threshold::grid::BackgroundGrid;
@@ -78,9 +78,9 @@ struct ThresholdDetector {
     cfar: Option<CfarDetector>,
     colour: Option<ColourMask>,
     /// One per pixel type, so that a frame keeps its type.
-    stage8: Stage<u8>,
-    stage16: Stage<u16>,
-    stage32: Stage<f32>,
+    pre8: Preprocessing<u8>,
+    pre16: Preprocessing<u16>,
+    pre32: Preprocessing<f32>,
     last: Option<Timestamp>,
     follower: Option<Follower>,
 }
@@ -108,9 +108,9 @@ impl ThresholdDetector {
             size,
             kind,
             spots,
-            stage8: Stage::new(config.filter, &config.threshold)?,
-            stage16: Stage::new(config.filter, &config.threshold)?,
-            stage32: Stage::new(config.filter, &config.threshold)?,
+            pre8: Preprocessing::new(config.filter, &config.threshold)?,
+            pre16: Preprocessing::new(config.filter, &config.threshold)?,
+            pre32: Preprocessing::new(config.filter, &config.threshold)?,
             last: None,
             follower: config.follow.clone().map(Follower::new),
             grey: Image::default(),
@@ -171,23 +171,23 @@ impl ThresholdDetector {
     }
 
     fn run8(&mut self, image: &Image<u8>, scan: &mut Scan) -> Result<()> {
-        let mut stage = std::mem::take(&mut self.stage8);
-        let done = self.run_stage(image, &mut stage, scan);
-        self.stage8 = stage;
+        let mut pre = std::mem::take(&mut self.pre8);
+        let done = self.run_on(image, &mut pre, scan);
+        self.pre8 = pre;
         done
     }
 
-    fn run_stage<T: Pixel>(&mut self, image: &Image<T>, stage: &mut Stage<T>, scan: &mut Scan) -> Result<()> {
+    fn run_on<T: Pixel>(&mut self, image: &Image<T>, pre: &mut Preprocessing<T>, scan: &mut Scan) -> Result<()> {
         // The noise is that of the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same
         // sum over the pixels before smoothing, whose noise is white.
         let noise = self.pixel_noise(image);
-        let image = stage.smoother.as_mut().map_or(image, |f| f.apply(image));
-        if let Some(motion) = &mut stage.motion {
+        let image = pre.smoother.as_mut().map_or(image, |f| f.apply(image));
+        if let Some(motion) = &mut pre.motion {
             motion.update(image, scan.time, self.last)?;
         }
         self.last = Some(scan.time);
         let colour = self.colour.take();
-        let mask = stage.motion.as_ref().map(|m| m.bits()).or(colour.as_ref().map(ColourMask::bits));
+        let mask = pre.motion.as_ref().map(|m| m.bits()).or(colour.as_ref().map(ColourMask::bits));
         self.run(image, noise, mask, scan);
         self.colour = colour;
         Ok(())
@@ -348,15 +348,15 @@ impl Detector for ThresholdDetector {
         match &frame.pixels {
             Pixels::Gray8(image) => self.run8(image, scan)?,
             Pixels::Gray16(image) => {
-                let mut stage = std::mem::take(&mut self.stage16);
-                let done = self.run_stage(image, &mut stage, scan);
-                self.stage16 = stage;
+                let mut pre = std::mem::take(&mut self.pre16);
+                let done = self.run_on(image, &mut pre, scan);
+                self.pre16 = pre;
                 done?;
             }
             Pixels::GrayF32(image) => {
-                let mut stage = std::mem::take(&mut self.stage32);
-                let done = self.run_stage(image, &mut stage, scan);
-                self.stage32 = stage;
+                let mut pre = std::mem::take(&mut self.pre32);
+                let done = self.run_on(image, &mut pre, scan);
+                self.pre32 = pre;
                 done?;
             }
             Pixels::Rgb8(image) => {

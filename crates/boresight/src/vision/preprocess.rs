@@ -44,18 +44,18 @@ impl<T: Pixel> Motion<T> {
 }
 
 /// The parts of a detector that depend on the pixel type; nothing in them for the types that its frames do not have.
-pub(super) struct Stage<T: Pixel> {
+pub(super) struct Preprocessing<T: Pixel> {
     pub(super) smoother: Option<Smoother<T>>,
     pub(super) motion: Option<Motion<T>>,
 }
 
-impl<T: Pixel> Default for Stage<T> {
+impl<T: Pixel> Default for Preprocessing<T> {
     fn default() -> Self {
         Self { smoother: None, motion: None }
     }
 }
 
-impl<T: Pixel> Stage<T> {
+impl<T: Pixel> Preprocessing<T> {
     pub(super) fn new(filter: SpatialConfig, threshold: &ThresholdConfig) -> Result<Self> {
         let smoother = match filter {
             SpatialConfig::None => None,
