@@ -207,6 +207,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "trajectory-gospa"), ignore = "needs the feature trajectory-gospa")]
     fn a_track_cut_in_two_costs_one_switch_where_switches_are_cheap() {
         let truth = table(&[(0, 1, 0.0), (1, 1, 0.0), (2, 1, 0.0), (3, 1, 0.0)]);
         let cut = table(&[(0, 1, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 2, 1.0)]);
@@ -219,6 +220,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "trajectory-gospa"), ignore = "needs the feature trajectory-gospa")]
     fn two_truths_that_swap_their_results_cost_two_switches() {
         let truth = table(&[(0, 1, 0.0), (0, 2, 20.0), (1, 1, 0.0), (1, 2, 20.0)]);
         let swapped = table(&[(0, 7, 0.0), (0, 8, 20.0), (1, 8, 0.0), (1, 7, 20.0)]);
@@ -227,6 +229,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "trajectory-gospa"), ignore = "needs the feature trajectory-gospa")]
     fn with_single_frames_it_is_gospa() {
         let truth = table(&[(0, 1, 0.0), (0, 2, 7.0), (0, 3, 50.0)]);
         let result = table(&[(0, 1, 3.0), (0, 2, 6.5)]);
@@ -237,6 +240,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "trajectory-gospa"), ignore = "needs the feature trajectory-gospa")]
     fn windows_add_up_and_forgive_switches_at_their_borders() {
         let truth = table(&[(0, 1, 0.0), (1, 1, 0.0), (2, 1, 0.0), (3, 1, 0.0)]);
         let cut = table(&[(0, 1, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 2, 1.0)]);
