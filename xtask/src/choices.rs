@@ -63,7 +63,7 @@ fn name(detector: &DetectorConfig) -> String {
 
 /// Prints the choices.
 pub fn run(args: &Args) -> Result<()> {
-    let data = args.data.clone().unwrap_or_else(crate::test_data);
+    let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     let inputs = if args.inputs.is_empty() { all(&data)? } else { args.inputs.clone() };
     for input in &inputs {
         let base = Config::default();

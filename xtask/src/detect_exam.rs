@@ -254,7 +254,7 @@ fn table_of_time() {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let data = args.data.clone().unwrap_or_else(crate::test_data);
+    let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     let wanted = |name: &str| name.contains(&args.only);
     if wanted("time") {
         table_of_time();

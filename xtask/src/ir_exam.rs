@@ -141,7 +141,7 @@ fn median(v: &mut [f64]) -> f64 {
 
 /// Runs the exam and prints the table.
 pub fn exam(args: &Args) -> Result<()> {
-    let data = args.data.clone().unwrap_or_else(|| crate::test_data().join("ir_drone_svanstrom"));
+    let data = args.data.clone().unwrap_or_else(|| crate::data::test_data().join("ir_drone_svanstrom"));
     let mut index = csv::Reader::from_path(data.join("index.csv")).with_context(|| data.display().to_string())?;
     let headers = index.headers()?.clone();
     let column = |name: &str| headers.iter().position(|h| h == name).with_context(|| format!("no column {name}"));

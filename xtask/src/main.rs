@@ -5,6 +5,7 @@ mod bench_track;
 mod choices;
 mod clutter_table;
 mod crossing_table;
+mod data;
 mod detect_exam;
 mod detect_scenes;
 mod docs;
@@ -16,7 +17,6 @@ mod video_check;
 mod vision_exam;
 
 use clap::{Parser, Subcommand};
-use std::path::PathBuf;
 
 /// Repository chores: exams on public data, benchmarks, generated references.
 #[derive(Parser)]
@@ -53,12 +53,6 @@ enum Chore {
     VideoCheck(video_check::Args),
     /// Track the public clips that are not infrared with no options and score the tracks.
     VisionExam(vision_exam::Args),
-}
-
-/// The folder of the real data: `BORESIGHT_TEST_DATA`, by default `../shared/data` beside the repository.
-fn test_data() -> PathBuf {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
-    std::env::var_os("BORESIGHT_TEST_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from)
 }
 
 fn main() -> anyhow::Result<()> {

@@ -160,7 +160,7 @@ fn scores(clip: &Clip, truth: Vec<TrackRow>, result: Vec<TrackRow>) -> Result<Mo
 
 /// Runs the exam and prints the table.
 pub fn run(args: &Args) -> Result<()> {
-    let data = args.data.clone().unwrap_or_else(crate::test_data);
+    let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     println!(
         "{:<32} {:>6} {:>7} {:>9} {:>7} {:>7} {:>6} {:>9} {:>9}",
         "clip", "px", "recall", "precision", "MOTA", "IDF1", "IDSW", "error px", "frames/s"
