@@ -54,7 +54,8 @@ pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.
 ///
 /// `base` says how the input is read; its other parts are where the choice starts from.
-/// ```
+#[cfg_attr(feature = "video", doc = "```")]
+#[cfg_attr(not(feature = "video"), doc = "```no_run")]
 /// use boresight::{Config, Scan, TrackStatus, auto};
 ///
 /// # fn main() -> boresight::Result<()> {
