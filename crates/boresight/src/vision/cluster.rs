@@ -11,7 +11,7 @@ use super::config::ClusterConfig;
 use super::pixel::Pixel;
 use super::region::Region;
 use super::runs::{RowRuns, RunWord, find_runs};
-use super::threshold::band::{band_bits, words};
+use super::threshold::{band_bits, words};
 use crate::Image;
 use crate::union_find::root;
 use fearless_simd::Level;

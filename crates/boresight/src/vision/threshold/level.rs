@@ -1,7 +1,7 @@
 //! A band or a fixed level over a whole frame: every row's bits go to the clusterer as they come
 //! (`docs/theory/segmentation.md`).
 
-use super::band::band_bits;
+use super::bits::band_bits;
 use super::{LevelConfig, Side};
 use crate::Image;
 use crate::vision::cluster::Clusterer;

@@ -3,7 +3,7 @@
 //! The background is [`super::grid::BackgroundGrid`]; the level of a row is interpolated between the grid's nodes.
 
 use super::LocalConfig;
-use super::band::level_bits;
+use super::bits::level_bits;
 use super::grid::BackgroundGrid;
 use crate::vision::pixel::Pixel;
 

@@ -1,13 +1,15 @@
 //! Thresholds: which pixels belong to targets. Each turns one row of native pixels into one row of bits.
 
 pub(crate) mod band;
+mod bits;
 mod box_mean;
 pub(crate) mod grid;
 pub(crate) mod level;
 pub(crate) mod local;
 pub(crate) mod otsu;
 pub(crate) mod spot;
-pub use band::{band_bits, words};
+pub use band::words;
+pub use bits::band_bits;
 pub use grid::BackgroundGrid;
 pub use otsu::otsu_level;
 

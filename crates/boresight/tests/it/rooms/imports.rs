@@ -2,7 +2,8 @@
 //!
 //! A file imports another if its code, outside tests, names an item that the other defines: by `use`, or by a path in the code. A path is followed
 //! through modules and `use` lines to the file that defines the item, so a `mod.rs` that only declares and re-exports is never an end.
-//! Limits: items reached by a method call or made by a macro are not seen; names inside a function count as names of its module.
+//! A name that a module of the crate does not show is taken for one that a macro makes there. Limits: items reached by a method call are not
+//! seen; names inside a function count as names of its module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -131,6 +132,8 @@ struct Module {
     passed_on: BTreeSet<String>,
     /// Paths in the code.
     paths: Vec<Vec<String>>,
+    /// Whether a macro of the crate may make items here.
+    macros: bool,
     /// Single words in the code, outside `use`.
     words: BTreeSet<String>,
 }
@@ -221,6 +224,8 @@ impl Crate {
                         segments.push(t[j + 1].clone());
                         j += 2;
                     }
+                    m.macros |=
+                        t.get(j).is_some_and(|x| x == "!") && t.get(j + 1).is_some_and(|x| x == "(" || x == "{");
                     m.words.insert(w.to_string());
                     if segments.len() > 1 && !(i > 0 && (t[i - 1] == "::" || t[i - 1] == ".")) {
                         m.paths.push(segments);
@@ -265,12 +270,14 @@ impl Crate {
                 let full = [target.as_slice(), &path[k + 1..]].concat();
                 return self.defined_in(&at, &full, depth + 1);
             }
-            return m.globs.iter().find_map(|glob| {
+            let by_glob = m.globs.iter().find_map(|glob| {
                 let full = [glob.as_slice(), &path[k..]].concat();
                 (glob.first().is_some_and(|g| matches!(g.as_str(), "crate" | "self" | "super")))
                     .then(|| self.defined_in(&at, &full, depth + 1))
                     .flatten()
             });
+            // Reached by a path through the crate and not shown: a macro makes it.
+            return by_glob.or_else(|| (at != module && m.macros).then_some(m.file.as_path()));
         }
         None
     }
@@ -429,6 +436,17 @@ mod tests {
             assert_eq!(cycles_of(&tree(parent, child)), [["room/mod.rs", "room/x.rs"]], "{parent}");
         }
         assert!(cycles_of(&tree("mod x; mod y; pub use x::X; pub struct P;", child)).is_empty());
+    }
+
+    #[test]
+    fn what_a_macro_makes_is_where_the_macro_is_called() {
+        let made = ("src/a.rs", "use crate::b::B; make!(one, u8);");
+        for user in
+            ["use crate::a; pub struct B; fn f() { a::one() }", "pub struct B; use super::a::one; fn f() { one() }"]
+        {
+            let files = [("src/lib.rs", "mod a; mod b;"), made, ("src/b.rs", user)];
+            assert_eq!(cycles_of(&files), [["a.rs", "b.rs"]], "{user}");
+        }
     }
 
     #[test]
