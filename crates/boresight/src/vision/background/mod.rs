@@ -19,6 +19,7 @@ mod light;
 pub(crate) mod model;
 pub(crate) mod morphology;
 mod rows;
+mod segmenter;
 pub(crate) mod shadow;
 
 pub use config::BackgroundConfig;
@@ -26,6 +27,7 @@ pub use difference::{DifferenceConfig, FrameDifference};
 pub use model::BackgroundPixel;
 pub use morphology::{BitImage, CleanUp};
 pub(crate) use rows::pack;
+pub(crate) use segmenter::mask_rows;
 pub use shadow::ShadowConfig;
 
 use crate::{Error, ErrorKind, Image, Result};

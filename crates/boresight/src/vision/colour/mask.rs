@@ -1,8 +1,12 @@
 //! The pixels of a frame that have the target's colour, cleaned, 64 a word: what the detector joins to clusters.
 
 use super::{ColourMatch, ColourMatchConfig};
-use crate::vision::background::{BitImage, morphology};
-use crate::{Image, Result};
+use crate::vision::background::{BitImage, mask_rows, morphology};
+use crate::vision::pixel::Pixel;
+use crate::vision::segmenter::{PixelWeight, Regions, Segmenter};
+use crate::vision::target_finder::TypedFrame;
+use crate::vision::threshold::BackgroundGrid;
+use crate::{Error, ErrorKind, Image, Result};
 
 /// Finds the pixels of a colour in whole frames; keeps its memory.
 #[derive(Clone, Debug)]
@@ -21,16 +25,28 @@ impl ColourMask {
     }
 
     /// Takes the next frame.
-    pub(crate) fn update(&mut self, image: &Image<[u8; 3]>) {
+    fn update(&mut self, image: &Image<[u8; 3]>) {
         self.bits.reset(image.width(), image.height());
         for y in 0..image.height() {
             self.matcher.row(image.row(y), self.bits.row_mut(y));
         }
         morphology::clean(&mut self.bits, self.matcher.config().clean_up, &mut self.work);
     }
+}
 
-    /// The matching pixels of the last frame.
-    pub(crate) fn bits(&self) -> &BitImage {
-        &self.bits
+impl<T: Pixel> Segmenter<T> for ColourMask {
+    fn weight(&self) -> PixelWeight {
+        PixelWeight::Alike
+    }
+
+    fn segment(&mut self, frame: &TypedFrame<T>, _: &BackgroundGrid, regions: &mut Regions) -> Result<Option<f64>> {
+        let Some(colours) = frame.colours else {
+            return Err(Error::new(ErrorKind::Config, "expected colour frames, found grey ones")
+                .at("detector.threshold.colour")
+                .hint("--set input.colour=rgb reads a video in colour; grey pictures have none"));
+        };
+        self.update(colours);
+        mask_rows(&self.bits, frame.image, &mut regions.bright);
+        Ok(None)
     }
 }

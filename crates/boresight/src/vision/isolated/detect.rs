@@ -24,13 +24,15 @@ use crate::vision::noise_level::noise_level;
 use crate::vision::pixel::Pixel;
 use crate::vision::region::Region;
 use crate::vision::strongest::Strongest;
+use crate::vision::target_finder::{TargetFinder, TypedFrame};
 use crate::vision::threshold::band::words;
 use crate::vision::threshold::{Polarity, Side};
-use crate::{Detection, Extent, Image, Scan};
+use crate::{Detection, Extent, Image, Result};
 
 /// Finds isolated blobs; keeps its memory between frames.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct IsolatedDetector {
+    isolated: IsolatedConfig,
     sweep: Sweep,
     ring: Ring,
     levels: Vec<f64>,
@@ -42,14 +44,23 @@ pub struct IsolatedDetector {
 }
 
 impl IsolatedDetector {
-    /// Appends the isolated blobs of `image` to `scan`, the clearest first.
-    pub fn run<T: Pixel>(
-        &mut self,
-        image: &Image<T>,
-        config: &DetectorConfig,
-        isolated: &IsolatedConfig,
-        scan: &mut Scan,
-    ) {
+    /// Builds the detector for a checked configuration.
+    pub fn new(config: &IsolatedConfig) -> Self {
+        Self {
+            isolated: config.clone(),
+            sweep: Sweep::default(),
+            ring: Ring::default(),
+            levels: Vec::new(),
+            samples: Vec::new(),
+            bits: Vec::new(),
+            candidates: Vec::new(),
+            taken: Vec::new(),
+            strongest: Strongest::default(),
+        }
+    }
+
+    /// Appends the isolated blobs of `image` to `out`, the clearest first.
+    fn run<T: Pixel>(&mut self, image: &Image<T>, config: &DetectorConfig, out: &mut Vec<Detection>) {
         let estimated = noise_level(image, &mut self.samples);
         let noise = match &config.noise {
             NoiseConfig::Given(g) => g.read_counts,
@@ -57,13 +68,13 @@ impl IsolatedDetector {
         };
         self.bits.resize(words(image.width()), 0);
         for side in [Side::Bright, Side::Dark] {
-            if isolated.polarity.has(side) {
-                self.side(image, config, isolated, side, noise, scan);
+            if self.isolated.polarity.has(side) {
+                self.side(image, config, side, noise, out);
             }
         }
         // One side's are in that order already.
-        if isolated.polarity == Polarity::Both {
-            self.strongest.sort(&mut scan.detections);
+        if self.isolated.polarity == Polarity::Both {
+            self.strongest.sort(out);
         }
     }
 
@@ -71,11 +82,11 @@ impl IsolatedDetector {
         &mut self,
         image: &Image<T>,
         config: &DetectorConfig,
-        isolated: &IsolatedConfig,
         side: Side,
         noise: f64,
-        scan: &mut Scan,
+        out: &mut Vec<Detection>,
     ) {
+        let isolated = &self.isolated;
         levels::choose(image, side, isolated.levels as usize, noise, &mut self.samples, &mut self.levels);
         self.candidates.clear();
         let (min_area, max_area) = config.cluster.area_limits();
@@ -129,11 +140,18 @@ impl IsolatedDetector {
                 }
             }
             if let Some(d) = detection(image, config, side, best, shape, noise) {
-                scan.detections.push(d);
+                out.push(d);
             }
         }
         self.candidates = candidates;
         self.taken = taken;
+    }
+}
+
+impl<T: Pixel> TargetFinder<T> for IsolatedDetector {
+    fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
+        self.run(frame.image, config, out);
+        Ok(())
     }
 }
 
@@ -156,10 +174,9 @@ fn detection<T: Pixel>(
         ground: Some(best.background),
     };
     let c = centroid(&region, image, config.centroid.method, &around);
-    let extra = config.centroid.extra_sd_px * config.centroid.extra_sd_px;
     Some(Detection {
         position: c.position,
-        cov: c.cov + nalgebra::Matrix2::identity() * extra,
+        cov: c.cov,
         extent: Extent {
             left_px: f64::from(region.left) - 0.5,
             top_px: f64::from(region.top) - 0.5,
@@ -230,9 +247,9 @@ mod tests {
         let mut config =
             DetectorConfig { threshold: ThresholdConfig::Isolated(isolated.clone()), ..Default::default() };
         config.cluster.min_area_px = Some(3);
-        let mut scan = Scan::default();
-        IsolatedDetector::default().run(image, &config, &isolated, &mut scan);
-        scan.detections
+        let mut found = Vec::new();
+        IsolatedDetector::new(&isolated).run(image, &config, &mut found);
+        found
     }
 
     fn cast<T: Copy>(image: &Image<f32>, f: impl Fn(f32) -> T) -> Image<T> {

@@ -3,8 +3,13 @@
 //! Source: N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. SMC 9(1), 1979.
 //! 8-bit pixels use their 256 levels; other types use 1024 equal bins between the smallest and the largest finite value.
 
-use crate::Image;
+use super::grid::BackgroundGrid;
+use super::level::{one_side, weight_of};
+use super::{LevelConfig, OtsuConfig, Side};
 use crate::vision::pixel::Pixel;
+use crate::vision::segmenter::{PixelWeight, Regions, Segmenter};
+use crate::vision::target_finder::TypedFrame;
+use crate::{Image, Result};
 
 /// Bins of the histogram, for 8 bits a level each.
 const BINS: usize = 1024;
@@ -31,6 +36,31 @@ pub fn otsu_level<T: Pixel>(image: &Image<T>) -> Option<f64> {
     let split = best_split(&histogram)?;
     let edge = min + (split + 1) as f64 * width;
     Some(if whole { edge - 0.5 } else { edge })
+}
+
+/// A level found anew in every frame.
+#[derive(Clone, Debug)]
+pub(crate) struct OtsuThreshold {
+    side: Side,
+}
+
+impl OtsuThreshold {
+    pub(crate) fn new(config: &OtsuConfig) -> Self {
+        Self { side: config.side }
+    }
+}
+
+impl<T: Pixel> Segmenter<T> for OtsuThreshold {
+    fn weight(&self) -> PixelWeight {
+        weight_of(self.side)
+    }
+
+    fn segment(&mut self, frame: &TypedFrame<T>, _: &BackgroundGrid, regions: &mut Regions) -> Result<Option<f64>> {
+        Ok(otsu_level(frame.image).and_then(|level| {
+            let config = LevelConfig { level, side: self.side, exclusive: false };
+            one_side(frame.image, &config, regions)
+        }))
+    }
 }
 
 /// The last bin of the lower class; the middle one of several that are equally good.

@@ -14,8 +14,10 @@
 use super::box_mean::BoxMean;
 use super::grid::BackgroundGrid;
 use super::{Side, SpotConfig};
+use crate::vision::config::DetectorConfig;
 use crate::vision::pixel::Pixel;
-use crate::{Detection, Extent, Image};
+use crate::vision::target_finder::{PixelNoise, TargetFinder, TypedFrame};
+use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
 /// A spot.
@@ -56,6 +58,7 @@ pub struct SpotDetector {
     response: Image<f32>,
     boxes: BoxMean,
     grid: BackgroundGrid,
+    noise: PixelNoise,
     level: Vec<f32>,
     spots: Vec<Spot>,
     keep: Vec<bool>,
@@ -65,6 +68,14 @@ pub struct SpotDetector {
 fn odd(v: f64) -> usize {
     // A cast saturates; sizes were checked by the configuration.
     (v.round().max(1.0) as usize) | 1
+}
+
+impl<T: Pixel> TargetFinder<T> for SpotDetector {
+    fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
+        let noise = self.noise.of(frame.raw, &config.noise);
+        self.detect(frame.image, noise, out);
+        Ok(())
+    }
 }
 
 impl SpotDetector {
@@ -92,6 +103,7 @@ impl SpotDetector {
             response: Image::default(),
             boxes: BoxMean::default(),
             grid: BackgroundGrid::new(cell),
+            noise: PixelNoise::default(),
             level: Vec::new(),
             spots: Vec::new(),
             keep: Vec::new(),

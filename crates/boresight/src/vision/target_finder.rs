@@ -1,0 +1,49 @@
+//! What every way of finding targets has in common: a frame of one pixel type goes in, detections come out.
+//!
+//! One struct for each way implements [`TargetFinder`]: those that join pixels to regions through [`super::region_finder`], the
+//! others (`isolated`, `threshold::spot`, `cfar`) by themselves. `super::detector` builds the one that the configuration names.
+
+use super::config::{DetectorConfig, NoiseConfig};
+use super::noise_level::noise_level;
+use super::pixel::Pixel;
+use crate::{Detection, Image, Result};
+
+/// A frame as a finder sees it.
+pub(super) struct TypedFrame<'a, T> {
+    /// The pixels as they came.
+    pub(super) raw: &'a Image<T>,
+    /// The pixels after the spatial filter; `raw` without one.
+    pub(super) image: &'a Image<T>,
+    /// The colours, where the frame has them.
+    pub(super) colours: Option<&'a Image<[u8; 3]>>,
+    /// Time since the frame before, s; 0 at the first.
+    pub(super) dt_s: f64,
+}
+
+/// Finds targets in frames of one pixel type; keeps its memory between frames.
+pub(super) trait TargetFinder<T: Pixel>: Send {
+    /// Appends the detections of a frame to `out`, with the covariance that its pixels' noise explains.
+    /// # Errors
+    /// A frame that does not go with the frames before.
+    fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()>;
+}
+
+/// Says how noisy a pixel is, as the configuration wants it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PixelNoise {
+    samples: Vec<f32>,
+}
+
+impl PixelNoise {
+    /// Variance of one pixel at intensity 0, counts², and its growth with intensity, counts.
+    ///
+    /// Taken from the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same sum over the pixels
+    /// before smoothing, whose noise is white.
+    pub(super) fn of<T: Pixel>(&mut self, raw: &Image<T>, config: &NoiseConfig) -> (f64, f64) {
+        match config {
+            // The rounding to whole counts is noise as well.
+            NoiseConfig::Given(g) => (g.read_counts * g.read_counts + f64::from(T::STEP) / 12.0, g.gain),
+            NoiseConfig::Estimated => (noise_level(raw, &mut self.samples).powi(2), 0.0),
+        }
+    }
+}
