@@ -29,7 +29,7 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// The one configuration for all sequences, in `configs/people.json` form.
+/// The one configuration for all sequences, as JSON.
 pub const PEOPLE: &str = include_str!("mot_people.json");
 
 pub fn run(args: &Args) -> Result<()> {

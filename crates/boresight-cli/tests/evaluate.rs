@@ -63,10 +63,10 @@ fn a_perfect_result_scores_one_in_every_table_and_meets_its_demands() {
     ]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let csv = std::fs::read_to_string(csv).unwrap();
-    for one in ["HOTA", "MOTA", "IDF1", "SIAP_C", "alpha", "beta", "JSC", "AP", "Recall"] {
+    for one in ["HOTA", "MOTA", "IDF1", "SIAP_C", "particle_alpha", "particle_beta", "JSC", "AP", "Recall"] {
         assert_eq!(csv_value(&csv, "gt", one), 1.0, "{one}");
     }
-    for zero in ["OSPA", "OSPA2", "GOSPA", "TGOSPA", "switch", "RMSPE", "PFE_x", "IDSW", "FP/frame"] {
+    for zero in ["OSPA", "OSPA2", "GOSPA", "TGOSPA", "TGOSPA_switch", "RMSPE", "PFE_x", "IDSW", "FP/frame"] {
         assert_eq!(csv_value(&csv, "gt", zero), 0.0, "{zero}");
     }
     let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();

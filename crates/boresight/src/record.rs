@@ -25,7 +25,7 @@ pub enum TrackStatus {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackInnovation {
     /// Measured minus predicted (weighted by the hypotheses), px.
-    pub residual: Vector2<f64>,
+    pub innovation: Vector2<f64>,
     /// Its covariance S = H P Hᵀ + R, px².
     pub cov: Matrix2<f64>,
     /// Normalised square νᵀ S⁻¹ ν (no unit; χ² with 2 degrees of freedom if the filter is consistent).

@@ -1,4 +1,4 @@
-//! Benchmark worker for peerbench W4 (tracking from detections): kind `worker` of its PLUGIN.md.
+//! Worker for the comparison with peers, workload W4: tracking from detections.
 //!
 //! The work starts with positions and ends with the confirmed tracks' positions, as for every peer there.
 

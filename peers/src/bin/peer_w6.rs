@@ -1,4 +1,4 @@
-//! Benchmark worker for peerbench W6 (metrics of long sequences): kind `worker` of its PLUGIN.md.
+//! Worker for the comparison with peers, workload W6: metrics of long sequences.
 //!
 //! `peer_w6` scores by CLEAR, identity and HOTA; `peer_w6 gospa` and `peer_w6 ospa` give the mean set distance (c = 10,
 //! p = 2) of all frames. The work starts with the boxes by frame, as for every peer there.

@@ -1,4 +1,4 @@
-//! Benchmark worker for peerbench W7 (linear assignment, dense and sparse): kind `worker` of its PLUGIN.md.
+//! Worker for the comparison with peers, workload W7: linear assignment, dense and sparse.
 
 use boresight::associate::assignment::{Csr, Dense};
 use peers::{Fault, Job};

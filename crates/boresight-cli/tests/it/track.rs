@@ -69,7 +69,7 @@ fn the_drone_is_held_and_nothing_else_is_reported() {
     for t in read_csv(&tracked().join("tracks.csv")).iter().filter(|t| t["status"] != "tentative") {
         let b = truth[&(number(t, "frame") as u64)];
         let (dx, dy) = (number(t, "x_px") - b[0] - b[2] / 2.0, number(t, "y_px") - b[1] - b[3] / 2.0);
-        // The issue's own measure: inside the truth box grown by 3 px.
+        // Held: inside the truth box grown by 3 px.
         if dx.abs() <= b[2] / 2.0 + 3.0 && dy.abs() <= b[3] / 2.0 + 3.0 {
             held += 1;
             errors2.push(dx * dx + dy * dy);

@@ -82,7 +82,7 @@ pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker:
     *tracker = TrackerConfig::default();
     tracker.acceleration_std_px_per_s2 = round((1.0 * side_px).max(0.02 / (interval_s * interval_s)));
     tracker.extra_noise_px = round((0.05 * side_px).max(0.5));
-    tracker.extra_noise_of_size = 0.03;
+    tracker.extra_noise_per_height = 0.03;
     tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);
     tracker.initiation = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(2.0 * side_px) });
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 4, scans: 6, ..MOfNConfig::default() });

@@ -28,6 +28,8 @@ pub(super) const RENAMED: &[(&str, &str)] = &[
     ("tracker.terms", "tracker.association-cost"),
     ("tracker.terms.overlap.least", "tracker.association-cost.overlap.min-overlap"),
     ("tracker.look-gain", "tracker.appearance-gain"),
+    ("tracker.extra-noise-of-size", "tracker.extra-noise-per-height"),
+    ("tracker.acceleration-of-size-per-s2", "tracker.acceleration-per-height-per-s2"),
     ("tracker.sharing", "tracker.merged-measurements"),
     ("tracker.sharing.longest-s", "tracker.merged-measurements.max-secondary-s"),
     ("tracker.mht.birth-density-per-px2", "tracker.mht.new-target-density-per-px2"),

@@ -7,7 +7,7 @@
 
 use super::numbered::{self, Numbering};
 use super::options::OpenOptions;
-use super::sniff::{self, Format, sniff};
+use super::sniff::{self, Content, sniff};
 use super::stack::tiff::{TiffPages, count_pages};
 use super::still;
 use crate::{
@@ -154,19 +154,19 @@ fn open_image(path: &Path, options: &OpenOptions, bytes: &mut Vec<u8>) -> Result
     let mut file = File::open(path).map_err(cannot)?;
     let head = sniff::read_up_to(&mut file, sniff::SNIFF_BYTES).map_err(cannot)?;
     let format = match sniff(&head) {
-        Format::Empty => return Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)")),
-        Format::Tiff => {
+        Content::Empty => return Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)")),
+        Content::Tiff => {
             std::io::Seek::rewind(&mut file).map_err(cannot)?;
             let pages = TiffPages::new(BufReader::new(file), options.colour, options.max_pixels)?
                 .every(options.page_step, options.first_page);
             return Ok(Opened::Pages(Box::new(pages)));
         }
-        Format::Apng => Format::Png,
+        Content::Apng => Content::Png,
         format if format.is_image() => format,
         format => {
             let what = format!("expected an image (PNG, JPEG, TIFF, PNM or BMP), found {}", format.name());
             let error = Error::new(ErrorKind::Damaged, what);
-            let video = matches!(format, Format::Mp4 | Format::Y4m | Format::Gif);
+            let video = matches!(format, Content::Mp4 | Content::Y4m | Content::Gif);
             return Err(if video {
                 error.hint("a glob or a folder takes images; give videos one at a time")
             } else {

@@ -2,7 +2,7 @@
 
 use super::natural::natural_order;
 use super::options::OpenOptions;
-use super::sniff::{self, Format, sniff};
+use super::sniff::{self, Content, sniff};
 use super::stream::raw::RawFrames;
 use super::stream::y4m::Y4m;
 use crate::{Error, ErrorKind, FrameSource, Result};
@@ -49,7 +49,7 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
 pub fn is_table(input: &str) -> bool {
     let path = Path::new(input);
     let head = path.is_file().then(|| sniff::read_up_to(&mut File::open(path).ok()?, sniff::SNIFF_BYTES).ok());
-    head.flatten().is_some_and(|head| matches!(sniff(&head), Format::Text | Format::Utf16))
+    head.flatten().is_some_and(|head| matches!(sniff(&head), Content::Text | Content::Utf16))
 }
 
 fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
@@ -62,16 +62,18 @@ fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn 
     let head = sniff::read_up_to(&mut file, sniff::SNIFF_BYTES).map_err(cannot)?;
     let whole = BufReader::new(Cursor::new(head.clone()).chain(file));
     match sniff(&head) {
-        Format::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
-        Format::Text | Format::Utf16 => {
+        Content::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
+        Content::Text | Content::Utf16 => {
             Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
                 .at(input)
                 .hint("a table of detections goes to 'boresight track' as it is, and needs no frames"))
         }
-        Format::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
-        Format::Gif => open_gif(input, whole, options),
-        format if format.is_image() && format != Format::Apng => open_images(input, vec![path.to_path_buf()], options),
-        Format::Mp4 => open_mp4(path, options),
+        Content::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
+        Content::Gif => open_gif(input, whole, options),
+        content if content.is_image() && content != Content::Apng => {
+            open_images(input, vec![path.to_path_buf()], options)
+        }
+        Content::Mp4 => open_mp4(path, options),
         _ => open_other_video(input, options),
     }
 }
@@ -87,9 +89,9 @@ fn open_stdin(options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let head = sniff::read_up_to(&mut input, sniff::SNIFF_BYTES).map_err(cannot)?;
     let whole = BufReader::new(Cursor::new(head.clone()).chain(input));
     match sniff(&head) {
-        Format::Y4m => Ok(Box::new(Y4m::open(LABEL, whole, None, options)?)),
-        Format::Gif => open_gif(LABEL, whole, options),
-        Format::Empty => Err(Error::new(ErrorKind::Damaged, "nothing came (0 bytes)").at(LABEL)),
+        Content::Y4m => Ok(Box::new(Y4m::open(LABEL, whole, None, options)?)),
+        Content::Gif => open_gif(LABEL, whole, options),
+        Content::Empty => Err(Error::new(ErrorKind::Damaged, "nothing came (0 bytes)").at(LABEL)),
         other => Err(Error::new(ErrorKind::Unsupported, format!("expected YUV4MPEG2, found {}", other.name()))
             .at(LABEL)
             .hint("pipe video in with: ffmpeg -i INPUT -f yuv4mpegpipe - | boresight track -; raw frames need their size and type")),

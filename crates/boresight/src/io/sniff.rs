@@ -7,7 +7,7 @@ pub(crate) const SNIFF_BYTES: usize = 64;
 
 /// A kind of content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Format {
+pub(crate) enum Content {
     Png,
     /// An animated PNG: several frames in one file.
     Apng,
@@ -27,7 +27,7 @@ pub(crate) enum Format {
     Other,
 }
 
-impl Format {
+impl Content {
     pub fn name(self) -> &'static str {
         match self {
             Self::Png => "PNG",
@@ -60,30 +60,30 @@ pub(crate) fn read_up_to(reader: &mut impl Read, n: usize) -> std::io::Result<Ve
 }
 
 /// Tells the content from the first bytes of a file.
-pub(crate) fn sniff(head: &[u8]) -> Format {
+pub(crate) fn sniff(head: &[u8]) -> Content {
     match head {
-        [] => Format::Empty,
+        [] => Content::Empty,
         [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => {
             // The animation chunk stands right behind the header in every writer's files.
-            if head.get(37..41) == Some(b"acTL") { Format::Apng } else { Format::Png }
+            if head.get(37..41) == Some(b"acTL") { Content::Apng } else { Content::Png }
         }
-        [0xff, 0xd8, 0xff, ..] => Format::Jpeg,
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Format::Tiff,
-        [b'G', b'I', b'F', b'8', b'7' | b'9', b'a', ..] => Format::Gif,
-        [b'P', b'1'..=b'6' | b'f' | b'F', c, ..] if c.is_ascii_whitespace() || *c == b'#' => Format::Pnm,
-        _ if head.starts_with(b"YUV4MPEG2") => Format::Y4m,
+        [0xff, 0xd8, 0xff, ..] => Content::Jpeg,
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Content::Tiff,
+        [b'G', b'I', b'F', b'8', b'7' | b'9', b'a', ..] => Content::Gif,
+        [b'P', b'1'..=b'6' | b'f' | b'F', c, ..] if c.is_ascii_whitespace() || *c == b'#' => Content::Pnm,
+        _ if head.starts_with(b"YUV4MPEG2") => Content::Y4m,
         // A bitmap's header has one of a few lengths, so that text which starts with "BM" is not taken for one.
         [b'B', b'M', ..] if matches!(head.get(14..18), Some([12 | 16 | 40 | 52 | 56 | 64 | 108 | 124, 0, 0, 0])) => {
-            Format::Bmp
+            Content::Bmp
         }
         _ if matches!(head.get(4..8), Some(b"ftyp" | b"moov" | b"mdat" | b"wide" | b"free" | b"skip" | b"styp")) => {
-            Format::Mp4
+            Content::Mp4
         }
         // Audio frames may begin with FF FE as well; Latin letters in UTF-16 leave every second byte 0.
-        [0xff, 0xfe, rest @ ..] if rest.iter().skip(1).step_by(2).all(|b| *b == 0) => Format::Utf16,
-        [0xfe, 0xff, rest @ ..] if rest.iter().step_by(2).all(|b| *b == 0) => Format::Utf16,
-        _ if is_text(head) => Format::Text,
-        _ => Format::Other,
+        [0xff, 0xfe, rest @ ..] if rest.iter().skip(1).step_by(2).all(|b| *b == 0) => Content::Utf16,
+        [0xfe, 0xff, rest @ ..] if rest.iter().step_by(2).all(|b| *b == 0) => Content::Utf16,
+        _ if is_text(head) => Content::Text,
+        _ => Content::Other,
     }
 }
 
@@ -97,15 +97,15 @@ mod tests {
 
     #[test]
     fn content_is_told_by_its_first_bytes() {
-        assert_eq!(sniff(b""), Format::Empty);
-        assert_eq!(sniff(b"\x89PNG\r\n\x1a\n"), Format::Png);
-        assert_eq!(sniff(b"II\x2b\0\x08\0\0\0"), Format::Tiff);
-        assert_eq!(sniff(b"P5\n3 3"), Format::Pnm);
-        assert_eq!(sniff(b"P5,a,b"), Format::Text);
-        assert_eq!(sniff(b"BMW,x,y\n1,2,3\n4,5,6"), Format::Text);
-        assert_eq!(sniff(b"\0\0\0\x20ftypisom"), Format::Mp4);
-        assert_eq!(sniff(b"\xff\xfef\0r\0"), Format::Utf16);
-        assert_eq!(sniff(b"\xfe\xff\0f\0r"), Format::Utf16);
-        assert_eq!(sniff(b"RIFF\0\0\0\0AVI "), Format::Other);
+        assert_eq!(sniff(b""), Content::Empty);
+        assert_eq!(sniff(b"\x89PNG\r\n\x1a\n"), Content::Png);
+        assert_eq!(sniff(b"II\x2b\0\x08\0\0\0"), Content::Tiff);
+        assert_eq!(sniff(b"P5\n3 3"), Content::Pnm);
+        assert_eq!(sniff(b"P5,a,b"), Content::Text);
+        assert_eq!(sniff(b"BMW,x,y\n1,2,3\n4,5,6"), Content::Text);
+        assert_eq!(sniff(b"\0\0\0\x20ftypisom"), Content::Mp4);
+        assert_eq!(sniff(b"\xff\xfef\0r\0"), Content::Utf16);
+        assert_eq!(sniff(b"\xfe\xff\0f\0r"), Content::Utf16);
+        assert_eq!(sniff(b"RIFF\0\0\0\0AVI "), Content::Other);
     }
 }

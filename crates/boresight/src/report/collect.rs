@@ -227,7 +227,7 @@ impl Collected {
             if log.confirmed {
                 self.nis.add(i.nis);
             }
-            let values = [i.residual.x, i.residual.y, i.cov[(0, 0)].sqrt(), i.cov[(1, 1)].sqrt(), i.nis];
+            let values = [i.innovation.x, i.innovation.y, i.cov[(0, 0)].sqrt(), i.cov[(1, 1)].sqrt(), i.nis];
             innovation = values.map(|v| v as f32);
         }
         if let Some(detail) = &mut log.detail {

@@ -100,7 +100,7 @@ mod tests {
                     let x = if k == 3 { f64::NAN } else { (k + id) as f64 % 64.0 };
                     let mean = SVector::<f64, 4>::new(x, 25.0, 24.0, -1e-9);
                     let innovation = crate::record::TrackInnovation {
-                        residual: Vector2::new(0.1, -0.2),
+                        innovation: Vector2::new(0.1, -0.2),
                         cov: Matrix2::identity(),
                         nis: if k == 5 { f64::INFINITY } else { 2.0 },
                     };

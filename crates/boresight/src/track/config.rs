@@ -7,7 +7,7 @@ use super::association_cost::AssociationCostConfig;
 use super::clutter::ClutterConfig;
 use super::confirm::confirmation_gate::ConfirmationGateConfig;
 use super::confirm::rule::ConfirmationConfig;
-use super::filter::{Belief, FilterConfig, presets};
+use super::filter::{FilterConfig, TrackedFilter, presets};
 use super::initial_tracks::InitialTrackConfig;
 use super::initiation::InitiationConfig;
 use super::merged_measurements::MergedMeasurementsConfig;
@@ -32,9 +32,9 @@ pub struct TrackerConfig {
     pub acceleration_std_px_per_s2: f64,
     /// Acceleration added to it in proportion to the target's box, 1/s²: `box height × this`, 0 or more. For scenes with
     /// near and far targets, where a tall box moves more pixels.
-    pub acceleration_of_size_per_s2: f64,
+    pub acceleration_per_height_per_s2: f64,
     /// Measurement noise in proportion to the detection's box: `box height × this` per axis, standard deviation, 0 or more.
-    pub extra_noise_of_size: f64,
+    pub extra_noise_per_height: f64,
     /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
     pub extra_noise_px: f64,
     /// Probability that a target's detection lies in its gate, in (0, 1); the gate is χ² with 2 degrees of freedom.
@@ -93,8 +93,8 @@ impl Default for TrackerConfig {
         Self {
             filter: FilterConfig::default(),
             acceleration_std_px_per_s2: 28.0,
-            acceleration_of_size_per_s2: 0.0,
-            extra_noise_of_size: 0.0,
+            acceleration_per_height_per_s2: 0.0,
+            extra_noise_per_height: 0.0,
             extra_noise_px: 0.3,
             gate_probability: 0.99,
             max_speed_px_per_s: 150.0,
@@ -152,8 +152,8 @@ impl TrackerConfig {
     }
 
     /// Builds the filter of a new track of that height.
-    pub(super) fn belief(&self, start: &Gaussian<4>, height_px: f64) -> Result<Belief, FilterError> {
-        let std = self.acceleration_std_px_per_s2.hypot(self.acceleration_of_size_per_s2 * height_px);
+    pub(super) fn start_filter(&self, start: &Gaussian<4>, height_px: f64) -> Result<TrackedFilter, FilterError> {
+        let std = self.acceleration_std_px_per_s2.hypot(self.acceleration_per_height_per_s2 * height_px);
         self.filter.start(start, std)
     }
 
@@ -223,8 +223,18 @@ impl TrackerConfig {
             "a gain in (0, 1]",
             "0.3 smooths over about five scans",
         )?;
-        not_negative(at, "acceleration-of-size-per-s2", self.acceleration_of_size_per_s2, "1 suits people in video")?;
-        not_negative(at, "extra-noise-of-size", self.extra_noise_of_size, "0.05 is usual for detectors of people")?;
+        not_negative(
+            at,
+            "acceleration-per-height-per-s2",
+            self.acceleration_per_height_per_s2,
+            "1 suits people in video",
+        )?;
+        not_negative(
+            at,
+            "extra-noise-per-height",
+            self.extra_noise_per_height,
+            "0.05 is usual for detectors of people",
+        )?;
         not_negative(at, "coast-s", self.coast_s, "0.5 bridges half a second without detections")?;
         for side in self.field_px.iter().flatten() {
             positive(at, "field-px", *side, "the image's width and height: [640, 512]")?;

@@ -8,7 +8,7 @@
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
 use super::appearance::Appearance;
-use super::scan_table::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
+use super::scan_table::{Cov2, MOST_LOOKED_AT, Predicted, ScanTable};
 use crate::validate::not_negative;
 use crate::{Result, Scan};
 use schemars::JsonSchema;
@@ -53,7 +53,7 @@ pub(super) struct Part {
     pub track: u32,
     pub detection: u32,
     pub position: [f64; 2],
-    pub noise: Noise,
+    pub noise: Cov2,
     /// Whether this member fits best.
     pub primary: bool,
 }
@@ -145,7 +145,7 @@ impl MergedMeasurements {
         let primary = if took != u32::MAX { Some(took) } else { nearest };
         let edge = config.edge_std_px * config.edge_std_px;
         for i in group {
-            let noise = Noise { xx: noise.xx + edge, xy: noise.xy, yy: noise.yy + edge };
+            let noise = Cov2 { xx: noise.xx + edge, xy: noise.xy, yy: noise.yy + edge };
             self.parts.push(Part { track: *i, detection: j, position: [0.0; 2], noise, primary: Some(*i) == primary });
         }
         for axis in 0..2 {
@@ -191,7 +191,7 @@ mod tests {
         let mut table = ScanTable::default();
         table.read(&scan, 0.0, 0.0).unwrap();
         table.sort(&scan);
-        let cov = Noise { xx: 1.0, xy: 0.0, yy: 1.0 };
+        let cov = Cov2 { xx: 1.0, xy: 0.0, yy: 1.0 };
         let predicted: Vec<Predicted> = x.iter().map(|x| Predicted { x: *x, y: 2.0, cov, reach: 99.0 }).collect();
         let appearance = |i: u32| Appearance { size: [width[i as usize], 4.0], sum: 1.0, class: None };
         let mut merged = MergedMeasurements::default();

@@ -1,7 +1,7 @@
 //! From detections to tracks; never sees pixels.
 //!
 //! [`build()`] turns a [`TrackerConfig`] into a [`Tracking`]; each scan goes in, the tracks come out. `tracker` is the order of a step,
-//! `step/` its parts (predict, gate, associate, update, delete, initiate, report), `confirm/` the confirmation rules.
+//! `step/` its parts (predict, gate, associate, update, delete, report, initiate), `confirm/` the confirmation rules.
 
 mod appearance;
 pub(crate) mod association_cost;

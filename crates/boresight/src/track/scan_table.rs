@@ -14,7 +14,7 @@ pub const MOST_LOOKED_AT: usize = 4096;
 
 /// A detection's covariance with the extra noise, three numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Noise {
+pub struct Cov2 {
     /// Variance along x, px².
     pub xx: f64,
     /// Covariance, px².
@@ -23,7 +23,7 @@ pub struct Noise {
     pub yy: f64,
 }
 
-impl Noise {
+impl Cov2 {
     /// The covariance as a matrix.
     #[inline]
     pub fn matrix(&self) -> Matrix2<f64> {
@@ -39,7 +39,7 @@ pub struct Predicted {
     /// Position, px.
     pub y: f64,
     /// Covariance H P Hᵀ, px².
-    pub cov: Noise,
+    pub cov: Cov2,
     /// Farthest distance from the prediction that the largest speed allows, px.
     pub reach: f64,
 }
@@ -47,8 +47,8 @@ pub struct Predicted {
 /// A scan made ready for gating: checked, noise added, sorted into a grid.
 #[derive(Clone, Debug, Default)]
 pub struct ScanTable {
-    /// Noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
-    noise: Vec<Noise>,
+    /// Measurement noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
+    noise: Vec<Cov2>,
     /// Largest variances in the scan, px².
     max_xx: f64,
     max_yy: f64,
@@ -63,13 +63,13 @@ impl ScanTable {
     /// Checks a scan and takes its noise; nothing else changes before the check is over.
     /// # Errors
     /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
-    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_of_size: f64) -> Result<()> {
+    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_per_height: f64) -> Result<()> {
         self.noise.clear();
         (self.max_xx, self.max_yy) = (0.0, 0.0);
         self.largest_half_px = [0.0; 2];
         for (i, d) in scan.detections.iter().enumerate() {
-            let extra = extra_noise_px * extra_noise_px + (extra_of_size * d.extent.height_px).powi(2);
-            let n = Noise {
+            let extra = extra_noise_px * extra_noise_px + (extra_per_height * d.extent.height_px).powi(2);
+            let n = Cov2 {
                 xx: d.cov[(0, 0)] + extra,
                 xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
                 yy: d.cov[(1, 1)] + extra,
@@ -99,9 +99,9 @@ impl ScanTable {
         Ok(())
     }
 
-    /// Noise of a detection.
+    /// Measurement noise of a detection.
     #[inline]
-    pub fn noise(&self, detection: u32) -> Noise {
+    pub fn noise(&self, detection: u32) -> Cov2 {
         let at = if self.noise.len() == 1 { 0 } else { detection as usize };
         self.noise[at]
     }

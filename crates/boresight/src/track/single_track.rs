@@ -3,8 +3,8 @@
 use super::appearance::Appearance;
 use super::confirm::confirmation_gate::GateProgress;
 use super::confirm::history::History;
-use super::filter::Belief;
-use super::scan_table::Noise;
+use super::filter::TrackedFilter;
+use super::scan_table::Cov2;
 use crate::Detection;
 use crate::record::TrackInnovation;
 
@@ -15,7 +15,7 @@ pub(super) const BATCH: usize = 16;
 #[derive(Clone)]
 pub(super) struct Track {
     pub id: u64,
-    pub belief: Belief,
+    pub filter: TrackedFilter,
     pub history: History,
     pub appearance: Appearance,
     /// Since when it follows the same detections as an older track, ns.
@@ -44,7 +44,7 @@ pub(super) struct Outcome {
 impl Track {
     /// Takes in the box and place of a detection that is (most likely) its own.
     #[inline]
-    pub(super) fn follow(&mut self, d: &Detection, noise: &Noise, appearance_gain: f64) {
+    pub(super) fn follow(&mut self, d: &Detection, noise: &Cov2, appearance_gain: f64) {
         self.appearance.follow(d, appearance_gain);
         self.last_place = place_of(d, noise);
         self.gate_progress.add_score(d.score);
@@ -53,6 +53,6 @@ impl Track {
 
 /// Position of a detection and its larger standard deviation, px.
 #[inline]
-pub(super) fn place_of(d: &Detection, noise: &Noise) -> [f64; 3] {
+pub(super) fn place_of(d: &Detection, noise: &Cov2) -> [f64; 3] {
     [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()]
 }

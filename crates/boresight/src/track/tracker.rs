@@ -1,4 +1,4 @@
-//! The tracker: predict, gate, associate, update, confirm, delete, initiate; one scan at a time.
+//! The tracker: predict, gate, associate, update, confirm, delete, report, initiate; one scan at a time.
 //!
 //! Source: docs/theory/track-management.md. Confirmed tracks choose first, tentative ones among what is left, what is left then
 //! initiates tracks. The parts are in [`step`](super::step), the confirmation rules in [`confirm`](super::confirm).
@@ -153,7 +153,7 @@ impl Tracking for Tracker {
         if scan.detections.len() >= u32::MAX as usize {
             return Err(Error::new(ErrorKind::Unsupported, "more than 2³² − 2 detections in one scan"));
         }
-        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_of_size)?;
+        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_per_height)?;
 
         match step_s {
             None => from_initial_tracks(&self.config, scan.time, &mut self.tracks, &mut self.next_id)?,

@@ -101,6 +101,24 @@ fn every_chapter_that_is_cited_exists() {
     assert!(n_cited > 50, "only {n_cited} citations seen");
 }
 
+#[test]
+fn every_source_file_that_a_text_names_exists() {
+    let texts = texts();
+    let (mut wrong, mut n_named) = (Vec::new(), 0);
+    for (path, text) in texts.iter().filter(|(p, _)| p.extension().is_some_and(|e| e == "md")) {
+        let quoted = text.split('`').skip(1).step_by(2);
+        for name in quoted.filter(|q| q.ends_with(".rs") && !q.contains([' ', '*', '{', '\n'])) {
+            n_named += 1;
+            // This file is not among the texts.
+            if !texts.iter().any(|(p, _)| p.ends_with(name)) && !name.ends_with("it/citations.rs") {
+                wrong.push(format!("{} names {name}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "files that are not there:\n{}", wrong.join("\n"));
+    assert!(n_named > 50, "only {n_named} names seen");
+}
+
 /// The anchor that a heading gets on GitHub.
 fn anchor(heading: &str) -> String {
     // A link in a heading counts with its text only.

@@ -73,6 +73,9 @@ pub struct Args {
     /// Measurement noise that the tracker added to the detections' own (tracker.extra-noise-px), px, for the NIS.
     #[arg(long, default_value_t = 0.0)]
     pub extra_noise: f64,
+    /// The part of it in proportion to a detection's box (tracker.extra-noise-per-height), for the NIS.
+    #[arg(long, default_value_t = 0.0)]
+    pub extra_noise_per_height: f64,
     /// Posterior Cramer-Rao bound of a constant-velocity target: variance of a measurement per axis (px²), density of its
     /// acceleration (px²/s³), and if wanted its probability of detection: R,Q or R,Q,PD.
     #[arg(long, value_name = "R,Q[,PD]", value_parser = bound)]
@@ -219,6 +222,7 @@ impl Args {
         o.switch_px = self.switch_cost;
         o.max_unknowns = self.max_unknowns;
         o.extra_noise_px = self.extra_noise;
+        o.extra_noise_per_height = self.extra_noise_per_height;
         o.bound = self.bound;
         o.keep_pieces = !self.compare.is_empty();
         o

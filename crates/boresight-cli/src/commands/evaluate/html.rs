@@ -60,11 +60,11 @@ fn plots(e: &ResultEvaluation) -> Markup {
     let lines = [curve("HOTA", h.hota()), curve("DetA", h.det_a()), curve("AssA", h.ass_a), curve("LocA", h.loc_a)];
     html! {
         (plot("HOTA and its parts", "threshold α", "score", &lines, Some(1.0)))
-        @if e.sequences.iter().any(|s| s.further.is_some()) { (further_plots(e)) }
+        @if e.sequences.iter().any(|s| s.optional.is_some()) { (optional_plots(e)) }
     }
 }
 
-fn further_plots(e: &ResultEvaluation) -> Markup {
+fn optional_plots(e: &ResultEvaluation) -> Markup {
     let operating = by_sequence(e, |s| curve(s).iter().map(|p| (p.recall, p.precision)).collect());
     let alarms = by_sequence(e, |s| curve(s).iter().map(|p| (p.fp_per_frame, p.recall)).collect());
     let errors =
@@ -87,11 +87,11 @@ fn further_plots(e: &ResultEvaluation) -> Markup {
 }
 
 fn curve(s: &Evaluation) -> &[OperatingPoint] {
-    s.further.as_ref().map_or(&[], |f| &f.curve)
+    s.optional.as_ref().map_or(&[], |f| &f.curve)
 }
 
 fn gospa_parts(s: &Evaluation) -> [Line; 3] {
-    let gospa = s.further.as_ref().map_or(&[][..], |f| &f.gospa);
+    let gospa = s.optional.as_ref().map_or(&[][..], |f| &f.gospa);
     let part = |name: &str, f: fn(&Gospa) -> f64| Line { name: name.into(), points: thinned(gospa.iter().map(f)) };
     [part("localisation", |g| g.localisation), part("missed", |g| g.missed), part("false", |g| g.false_)]
 }

@@ -65,8 +65,8 @@ pub fn sequences(e: &ResultEvaluation) -> String {
     let mut out = format!("{}\n\n", e.label);
     out.push_str(&block(e, Evaluation::mot_values, &e.mot_values()));
     out.push('\n');
-    for part in e.further_values().chunks(12) {
-        out.push_str(&block(e, Evaluation::further_values, part));
+    for part in e.optional_values().chunks(12) {
+        out.push_str(&block(e, Evaluation::optional_values, part));
         out.push('\n');
     }
     for sequence in &e.sequences {
@@ -82,7 +82,7 @@ pub fn sequences(e: &ResultEvaluation) -> String {
 
 /// The state measures of a sequence, if it has any.
 pub fn state(sequence: &Evaluation) -> Option<&StateMeasures> {
-    sequence.further.as_ref()?.state.as_ref()
+    sequence.optional.as_ref()?.state.as_ref()
 }
 
 /// What the consistency tests say.

@@ -11,16 +11,16 @@ mod pnm;
 
 use super::guard::guarded;
 use super::options::Colour;
-use super::sniff::Format;
+use super::sniff::Content;
 use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Decodes one image file held in memory.
-pub(crate) fn decode(bytes: &[u8], format: Format, colour: Colour, max_pixels: u64) -> Result<Pixels> {
+pub(crate) fn decode(bytes: &[u8], format: Content, colour: Colour, max_pixels: u64) -> Result<Pixels> {
     guarded(|| match format {
-        Format::Png => png::decode(bytes, colour, max_pixels),
-        Format::Jpeg => jpeg::decode(bytes, colour, max_pixels),
-        Format::Pnm => pnm::decode(bytes, colour, max_pixels),
-        Format::Bmp => bmp::decode(bytes, colour, max_pixels),
+        Content::Png => png::decode(bytes, colour, max_pixels),
+        Content::Jpeg => jpeg::decode(bytes, colour, max_pixels),
+        Content::Pnm => pnm::decode(bytes, colour, max_pixels),
+        Content::Bmp => bmp::decode(bytes, colour, max_pixels),
         other => Err(Error::new(ErrorKind::Unsupported, format!("{} is not read as a still image", other.name()))),
     })
 }

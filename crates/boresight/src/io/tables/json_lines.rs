@@ -92,7 +92,7 @@ fn track(out: &mut String, t: &TrackState) {
     }
     if let Some(i) = &t.innovation {
         out.push_str(",\"innovation\":{\"residual_px\":");
-        numbers(out, [i.residual.x, i.residual.y]);
+        numbers(out, [i.innovation.x, i.innovation.y]);
         out.push_str(",\"cov_px2\":");
         numbers(out, [i.cov[(0, 0)], i.cov[(0, 1)], i.cov[(1, 1)]]);
         fields(out, &[("nis", i.nis)]);

@@ -3,8 +3,8 @@
 //! Order: both tables are brought to one origin of coordinates, rows that do not count are left out, the tables are looked
 //! at for signs that they do not belong together, and what is left goes through every measure.
 
-use super::further::FurtherMeasures;
 use super::note::Note;
+use super::optional::OptionalMeasures;
 use super::options::{ClearConvention, EvaluateOptions, MeasureSet};
 use super::sequence::Sequence;
 use crate::metrics::clear_classic::{ClearClassic, clear_classic};
@@ -30,7 +30,7 @@ pub struct Evaluation {
     pub classic: Option<ClearClassic>,
     /// All other measures, unless only CLEAR, identity and HOTA were asked for.
     #[serde(flatten, serialize_with = "or_default")]
-    pub further: Option<FurtherMeasures>,
+    pub optional: Option<OptionalMeasures>,
     /// Frame rate, frames/s.
     pub rate_hz: Option<f64>,
     /// Width and height of the frames, px.
@@ -44,10 +44,10 @@ pub struct Evaluation {
 }
 
 /// Measures that were not asked for stand as zeros and nulls, so that a reader finds the same keys in every file.
-fn or_default<S: Serializer>(further: &Option<FurtherMeasures>, to: S) -> Result<S::Ok, S::Error> {
-    match further {
-        Some(further) => further.serialize(to),
-        None => FurtherMeasures::default().serialize(to),
+fn or_default<S: Serializer>(optional: &Option<OptionalMeasures>, to: S) -> Result<S::Ok, S::Error> {
+    match optional {
+        Some(optional) => optional.serialize(to),
+        None => OptionalMeasures::default().serialize(to),
     }
 }
 
@@ -97,7 +97,7 @@ impl Sequence<'_> {
         }
         if options.measures == MeasureSet::All {
             let counted = Sequence { truth: &truth, result: &result, ..*self };
-            out.further = Some(FurtherMeasures::of(&counted, options, &matching, &mut out.notes)?);
+            out.optional = Some(OptionalMeasures::of(&counted, options, &matching, &mut out.notes)?);
         }
         Ok(out)
     }
@@ -166,19 +166,22 @@ mod tests {
         let e = s.evaluate(&o).unwrap();
         // GOSPA of order 1: 4, then 4 + 3, then 3: mean 14/3. OSPA: 4, (4 + 6) / 2, 6: mean 5.
         assert!((value(&e, "GOSPA") - 14.0 / 3.0).abs() < 1e-12);
-        assert!((value(&e, "location") - 8.0 / 3.0).abs() < 1e-12);
-        assert!((value(&e, "missed") - 1.0).abs() < 1e-12 && (value(&e, "false") - 1.0).abs() < 1e-12);
+        assert!((value(&e, "GOSPA_location") - 8.0 / 3.0).abs() < 1e-12);
+        assert!((value(&e, "GOSPA_missed") - 1.0).abs() < 1e-12 && (value(&e, "GOSPA_false") - 1.0).abs() < 1e-12);
         assert!((value(&e, "OSPA") - 5.0).abs() < 1e-12);
         // OSPA(2): the tracks are (4 + 4 + 6) / 3 apart, the false one counts 6: mean of both.
         assert!((value(&e, "OSPA2") - (14.0 / 3.0 + 6.0) / 2.0).abs() < 1e-12);
         // Trajectory GOSPA: the sums of GOSPA over 3 frames, no switch; per frame.
         #[cfg(feature = "trajectory-gospa")]
-        assert!((value(&e, "TGOSPA") - 14.0 / 3.0).abs() < 1e-9 && value(&e, "switch") == 0.0);
+        assert!((value(&e, "TGOSPA") - 14.0 / 3.0).abs() < 1e-9 && value(&e, "TGOSPA_switch") == 0.0);
         // SIAP: 2 of 3 truth rows associated; 1 of 3 result rows spurious; accuracy 4 px.
         assert!((value(&e, "SIAP_C") - 2.0 / 3.0).abs() < 1e-12 && (value(&e, "SIAP_S") - 1.0 / 3.0).abs() < 1e-12);
         assert!((value(&e, "SIAP_PA") - 4.0).abs() < 1e-12 && value(&e, "SIAP_A") == 1.0);
         // Particle measures with the gate 8: d = 4 + 4 + 8 of 24; the false row adds 8.
-        assert!((value(&e, "alpha") - 1.0 / 3.0).abs() < 1e-12 && (value(&e, "beta") - 8.0 / 32.0).abs() < 1e-12);
+        assert!(
+            (value(&e, "particle_alpha") - 1.0 / 3.0).abs() < 1e-12
+                && (value(&e, "particle_beta") - 8.0 / 32.0).abs() < 1e-12
+        );
         assert!((value(&e, "RMSE") - 4.0).abs() < 1e-12 && (value(&e, "JSC") - 0.5).abs() < 1e-12);
         // Detections: bias 4 px without scatter; a false alarm in 3 frames of 5000 px at 2 frames/s.
         assert_eq!((value(&e, "bias_x"), value(&e, "bias_y"), value(&e, "scatter_x")), (4.0, 0.0, 0.0));
@@ -199,10 +202,12 @@ mod tests {
         // 4 frames at 1 px and one switch of 5 px over 4 frames.
         #[cfg(feature = "trajectory-gospa")]
         {
-            assert!((value(&e, "TGOSPA") - 9.0 / 4.0).abs() < 1e-9 && (value(&e, "switch") - 5.0 / 4.0).abs() < 1e-9);
+            assert!(
+                (value(&e, "TGOSPA") - 9.0 / 4.0).abs() < 1e-9 && (value(&e, "TGOSPA_switch") - 5.0 / 4.0).abs() < 1e-9
+            );
             o.switch_px = Some(2.0);
             let e = evaluate(&truth, &cut, &o).unwrap();
-            assert!((value(&e, "switch") - 2.0 / 4.0).abs() < 1e-9);
+            assert!((value(&e, "TGOSPA_switch") - 2.0 / 4.0).abs() < 1e-9);
         }
         // One change of number; two associations of one step of 0.04 s each.
         assert!((value(&e, "SIAP_R") - 1.0 / 0.08).abs() < 1e-9, "{}", value(&e, "SIAP_R"));
@@ -239,7 +244,7 @@ mod tests {
         // A cutoff that set distances refuse is not looked at.
         o.set.cutoff_px = 0.0;
         let e = evaluate(&t, &r, &o).unwrap();
-        assert!(e.further.is_none() && e.further_values().is_empty() && e.scores.clear.tp == 2);
+        assert!(e.optional.is_none() && e.optional_values().is_empty() && e.scores.clear.tp == 2);
         let json = serde_json::to_value(&e).unwrap();
         assert_eq!((json["ospa2"].as_f64(), json["state"].is_null()), (Some(0.0), true));
         assert_eq!(evaluate(&t, &r, &EvaluateOptions::default()).unwrap().scores.clear.tp, 0);
@@ -274,6 +279,6 @@ mod tests {
         assert_eq!(e.notes, [Note::Sanity(SanityWarning::EmptyResult("t".into()))]);
         // Without truth the particle measures are not defined; they stay 0.
         let e = evaluate(&empty, &r, &EvaluateOptions::default()).unwrap();
-        assert_eq!((value(&e, "alpha"), value(&e, "FP")), (0.0, 3.0));
+        assert_eq!((value(&e, "particle_alpha"), value(&e, "FP")), (0.0, 3.0));
     }
 }

@@ -5,8 +5,8 @@
 
 mod comparison;
 mod evaluate;
-mod further;
 mod note;
+mod optional;
 mod options;
 mod result;
 mod sequence;
@@ -16,8 +16,8 @@ mod values;
 pub use crate::metrics::value::{Better, Value};
 pub use comparison::{Comparison, compare};
 pub use evaluate::{Evaluation, evaluate};
-pub use further::FurtherMeasures;
 pub use note::Note;
+pub use optional::OptionalMeasures;
 pub use options::{BoundModel, ClearConvention, EvaluateOptions, Matching, MeasureSet};
 pub use result::ResultEvaluation;
 pub use sequence::Sequence;

@@ -74,6 +74,8 @@ pub struct EvaluateOptions {
     pub max_unknowns: usize,
     /// Standard deviation of the noise that the tracker added to the detections' own, px, for the NIS.
     pub extra_noise_px: f64,
+    /// The part of it in proportion to the detection's box: box height × this, for the NIS.
+    pub extra_noise_per_height: f64,
     /// Model whose posterior Cramér-Rao bound the position errors are held against.
     pub bound: Option<BoundModel>,
     /// Whether pieces of the sequence are judged as well, from which [`super::compare`] draws where there are few sequences.
@@ -94,6 +96,7 @@ impl Default for EvaluateOptions {
             switch_px: None,
             max_unknowns: TrajectoryOptions::default().max_unknowns,
             extra_noise_px: 0.0,
+            extra_noise_per_height: 0.0,
             bound: None,
             keep_pieces: false,
         }

@@ -29,7 +29,7 @@ impl ResultEvaluation {
     /// of the sequences, weighted by their frames.
     pub fn values(&self) -> Vec<Value> {
         let mut values = self.mot_values();
-        values.extend(self.further_values());
+        values.extend(self.optional_values());
         values
     }
 
@@ -41,11 +41,11 @@ impl ResultEvaluation {
     }
 
     /// The other measures: means over the sequences, weighted by their frames.
-    pub fn further_values(&self) -> Vec<Value> {
+    pub fn optional_values(&self) -> Vec<Value> {
         let mut sums: Vec<(Value, f64, f64)> = Vec::new();
         for sequence in &self.sequences {
-            let weight = sequence.further.as_ref().map_or(0.0, |f| f.gospa.len() as f64);
-            for v in sequence.further_values() {
+            let weight = sequence.optional.as_ref().map_or(0.0, |f| f.gospa.len() as f64);
+            for v in sequence.optional_values() {
                 match sums.iter_mut().find(|s| s.0.name == v.name) {
                     Some(s) => {
                         s.1 += v.value * weight;
@@ -92,7 +92,7 @@ mod tests {
         // Overlaps 9/11 and 7/13; the classic MOTP is the mean distance over all pairs.
         let distance = (3.0 * (1.0 - 9.0 / 11.0) + (1.0 - 7.0 / 13.0)) / 4.0;
         assert!((value(&two(&classic), "MOTP") - distance).abs() < 1e-12);
-        assert!(ResultEvaluation::default().further_values().is_empty());
+        assert!(ResultEvaluation::default().optional_values().is_empty());
     }
 
     #[test]
@@ -101,11 +101,11 @@ mod tests {
         let names: BTreeSet<&str> = values.iter().map(|v| v.name).collect();
         assert_eq!(names.len(), values.len());
         let better = |name: &str| values.iter().find(|v| v.name == name).unwrap().better;
-        for name in ["HOTA", "MOTA", "IDF1", "Recall", "MT", "SIAP_C", "SIAP_LS", "alpha", "JSC", "AP"] {
+        for name in ["HOTA", "MOTA", "IDF1", "Recall", "MT", "SIAP_C", "SIAP_LS", "particle_alpha", "JSC", "AP"] {
             assert_eq!(better(name), Better::Higher, "{name}");
         }
         for name in
-            ["FP", "FN", "IDSW", "ML", "GOSPA", "missed", "OSPA2", "TGOSPA", "SIAP_S", "RMSE", "RMSPE", "RMSPE/2"]
+            ["FP", "FN", "IDSW", "ML", "GOSPA", "GOSPA_missed", "OSPA2", "TGOSPA", "SIAP_S", "RMSE", "RMSPE", "RMSPE/2"]
         {
             assert_eq!(better(name), Better::Lower, "{name}");
         }
@@ -114,7 +114,7 @@ mod tests {
         }
         let unit = |name: &str| values.iter().find(|v| v.name == name).unwrap().unit;
         assert_eq!(
-            (unit("GOSPA"), unit("missed"), unit("SIAP_R"), unit("PFE_x"), unit("HOTA")),
+            (unit("GOSPA"), unit("GOSPA_missed"), unit("SIAP_R"), unit("PFE_x"), unit("HOTA")),
             ("px", "px^p", "1/s", "%", "")
         );
     }

@@ -95,7 +95,7 @@ impl StateMeasures {
         out.rsspe = mean_by_frame(m.frames.iter().copied().zip(squares)).map(|(f, v)| (f, v.sqrt())).collect();
         out.consistency(r, &m)?;
         if let Some(scans) = s.detections {
-            out.nis = nis(r, scans, options.extra_noise_px, notes)?;
+            out.nis = nis(r, scans, options, notes)?;
         }
         if let Some(model) = options.bound {
             out.bound_px = Some(least_rmspe(&model, t, &m.rows, s.dt_s())?);
@@ -169,7 +169,12 @@ fn mean_by_frame(values: impl Iterator<Item = (u32, f64)>) -> impl Iterator<Item
 }
 
 /// NIS of the rows that name the detection which updated them.
-fn nis(r: &TrackTable, scans: &[Scan], extra_noise_px: f64, notes: &mut Vec<Note>) -> Result<Option<Consistency>> {
+fn nis(
+    r: &TrackTable,
+    scans: &[Scan],
+    options: &EvaluateOptions,
+    notes: &mut Vec<Note>,
+) -> Result<Option<Consistency>> {
     if !r.has_detections() {
         notes.push(Note::NoDetectionColumn);
         return Ok(None);
@@ -184,7 +189,8 @@ fn nis(r: &TrackTable, scans: &[Scan], extra_noise_px: f64, notes: &mut Vec<Note
                 continue;
             };
             let [x, y] = centre(r, row);
-            let noise = d.cov + Matrix2::identity() * extra_noise_px.powi(2);
+            let extra = options.extra_noise_px.powi(2) + (options.extra_noise_per_height * d.extent.height_px).powi(2);
+            let noise = d.cov + Matrix2::identity() * extra;
             match nis_of_residual(&(d.position - Vector2::new(x, y)), &noise, &p) {
                 Ok(v) => values.push(v),
                 Err(_) => n_left_out += 1,
@@ -274,7 +280,7 @@ mod tests {
     }
 
     fn state(e: &Evaluation) -> &StateMeasures {
-        e.further.as_ref().unwrap().state.as_ref().unwrap()
+        e.optional.as_ref().unwrap().state.as_ref().unwrap()
     }
 
     #[test]
@@ -310,7 +316,7 @@ mod tests {
         assert!((s.errors.rmspe - 5.0).abs() < 1e-12);
         assert!(s.values().iter().all(|v| v.name != "RMSVE"));
         let far = table(&[(0, 500.0, 24.0, RowState::default())]);
-        assert!(by_centres(&truth, &far, None, &mut EvaluateOptions::default()).further.unwrap().state.is_none());
+        assert!(by_centres(&truth, &far, None, &mut EvaluateOptions::default()).optional.unwrap().state.is_none());
     }
 
     #[test]

@@ -66,7 +66,7 @@ impl Evaluation {
     /// All measures by name.
     pub fn values(&self) -> Vec<Value> {
         let mut values = self.mot_values();
-        values.extend(self.further_values());
+        values.extend(self.optional_values());
         values
     }
 
@@ -76,20 +76,23 @@ impl Evaluation {
     }
 
     /// The other measures by name.
-    pub fn further_values(&self) -> Vec<Value> {
-        let Some(f) = &self.further else { return Vec::new() };
+    pub fn optional_values(&self) -> Vec<Value> {
+        let Some(f) = &self.optional else { return Vec::new() };
         let d = &f.detection;
         let mut values = vec![
             Value::lower("GOSPA", mean_of(f.gospa.iter().map(|g| g.distance)), "px"),
-            Value::lower("location", mean_of(f.gospa.iter().map(|g| g.localisation)), "px^p"),
-            Value::lower("missed", mean_of(f.gospa.iter().map(|g| g.missed)), "px^p"),
-            Value::lower("false", mean_of(f.gospa.iter().map(|g| g.false_)), "px^p"),
+            Value::lower("GOSPA_location", mean_of(f.gospa.iter().map(|g| g.localisation)), "px^p"),
+            Value::lower("GOSPA_missed", mean_of(f.gospa.iter().map(|g| g.missed)), "px^p"),
+            Value::lower("GOSPA_false", mean_of(f.gospa.iter().map(|g| g.false_)), "px^p"),
             Value::lower("OSPA", mean_of(f.ospa.iter().copied()), "px"),
             Value::lower("OSPA2", f.ospa2, "px"),
         ];
         if let Some(g) = &f.trajectory_gospa {
             let n = f.gospa.len().max(1) as f64;
-            values.extend([Value::lower("TGOSPA", g.per_frame, "px"), Value::lower("switch", g.switch / n, "px^p")]);
+            values.extend([
+                Value::lower("TGOSPA", g.per_frame, "px"),
+                Value::lower("TGOSPA_switch", g.switch / n, "px^p"),
+            ]);
         }
         values.extend([
             Value::higher("SIAP_C", f.siap.completeness),
@@ -98,8 +101,8 @@ impl Evaluation {
             Value::lower("SIAP_PA", f.siap.position_accuracy, "px"),
             Value::lower("SIAP_R", f.siap.rate_of_track_number_change, "1/s"),
             Value::higher("SIAP_LS", f.siap.longest_track_segment),
-            Value::higher("alpha", f.particle.alpha),
-            Value::higher("beta", f.particle.beta),
+            Value::higher("particle_alpha", f.particle.alpha),
+            Value::higher("particle_beta", f.particle.beta),
             Value::higher("JSC", f.particle.jsc),
             Value::higher("JSC_tracks", f.particle.jsc_tracks),
             Value::lower("RMSE", f.particle.rmse_px, "px"),
@@ -143,7 +146,7 @@ impl StateMeasures {
         }
         if !self.bounded.is_empty() {
             let within = share_within(&self.bounded);
-            values.extend([Value::neither("x_in_2s", within[0], ""), Value::neither("y_in_2s", within[2], "")]);
+            values.extend([Value::neither("x_in_2sigma", within[0], ""), Value::neither("y_in_2sigma", within[2], "")]);
         }
         let tests: [([&str; 3], &Option<Consistency>); 3] = [
             (["ANEES", "ANEES_lower", "ANEES_upper"], &self.nees),

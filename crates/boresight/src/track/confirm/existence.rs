@@ -87,9 +87,9 @@ impl ExistenceConfig {
         history.value = (history.value * likelihood_ratio).clamp(ODDS.0, ODDS.1);
         let psi = probability_of(history.value);
         if psi >= self.confirm_probability {
-            history.confirmed = true;
+            history.accepted = true;
         } else if psi < self.demotion_probability {
-            history.confirmed = false;
+            history.accepted = false;
         }
         if psi < self.delete_probability { Decision::Delete } else { Decision::Keep }
     }
@@ -151,7 +151,7 @@ mod tests {
         let mut history = rule.begin(1, 0, 1e-6, 1.0);
         let mut to = |ratio: f64| {
             let decision = rule.decide(&mut history, evidence(ratio), 0);
-            (history.confirmed, decision)
+            (history.accepted, decision)
         };
         assert_eq!(to(18.99), (false, Decision::Keep));
         assert_eq!(to(1.001), (true, Decision::Keep));

@@ -24,7 +24,7 @@ pub struct History {
     pub(super) scans: u8,
     /// Whether the rule holds the track for confirmed. It then chooses its detections before tentative tracks and coasts; whether it
     /// is reported as confirmed is said by [`super::status`].
-    pub confirmed: bool,
+    pub accepted: bool,
 }
 
 impl History {

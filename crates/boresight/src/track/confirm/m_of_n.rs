@@ -48,13 +48,13 @@ impl MOfNConfig {
 
     /// Decides after a scan that `history` has recorded.
     pub(super) fn decide(&self, history: &mut History, now_ns: i64) -> Decision {
-        if history.confirmed {
+        if history.accepted {
             return Decision::Keep;
         }
         let scans = u32::from(history.scans);
         let hits = history.hits_in(self.scans);
         if hits >= self.hits && scans >= self.hits {
-            history.confirmed = true;
+            history.accepted = true;
             return Decision::Keep;
         }
         let late = (now_ns.saturating_sub(history.initiated_ns)) as f64 * 1e-9 > self.tentative_s;
@@ -108,7 +108,7 @@ mod tests {
                     let mut got = Vec::new();
                     for hit in &scans {
                         let evidence = Evidence { hit: *hit, merged: false, likelihood_ratio: 1.0 };
-                        got.push((rule.decide(&mut history, evidence, 0), history.confirmed));
+                        got.push((rule.decide(&mut history, evidence, 0), history.accepted));
                         if got.last().is_some_and(|g| g.0 == Decision::Delete) {
                             break;
                         }

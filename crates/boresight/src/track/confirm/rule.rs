@@ -53,7 +53,7 @@ impl ConfirmationConfig {
             Self::Sprt(c) => first(c.new_target_density_per_px2).ln(),
             Self::Existence(c) => first(c.new_target_density_per_px2),
         };
-        let confirmed = match self {
+        let accepted = match self {
             Self::MOfN(c) => c.hits <= n_points,
             Self::Sprt(c) => value >= c.confirm_score(),
             Self::Existence(c) => probability_of(value) >= c.confirm_probability,
@@ -61,7 +61,7 @@ impl ConfirmationConfig {
         History {
             hits: (1 << n_points) - 1,
             scans: n_points as u8,
-            confirmed,
+            accepted,
             misses: 0,
             value,
             best: value,

@@ -69,9 +69,9 @@ impl SprtConfig {
     pub(super) fn decide(&self, history: &mut History, likelihood_ratio: f64) -> Decision {
         history.value = (history.value + likelihood_ratio.ln()).clamp(-LARGEST, LARGEST);
         history.best = history.best.max(history.value);
-        if !history.confirmed {
+        if !history.accepted {
             if history.value >= self.confirm_score() {
-                history.confirmed = true;
+                history.accepted = true;
                 history.best = history.value;
             } else if history.best - history.value
                 > -(self.true_delete_probability / (1.0 - self.false_confirm_probability)).ln()
@@ -98,7 +98,7 @@ mod tests {
         let mut step = |ln: &f64| {
             let decision =
                 rule.decide(&mut history, Evidence { hit: *ln > 0.0, merged: false, likelihood_ratio: ln.exp() }, 0);
-            (history.confirmed, decision)
+            (history.accepted, decision)
         };
         ln_ratios.iter().map(&mut step).collect()
     }
@@ -147,6 +147,6 @@ mod tests {
         // 1e-6 / 4e-6 · 2 = 1/2: probability 1/3.
         assert!((rule.score(&rule.begin(2, 0, 4e-6, 2.0)) - 1.0 / 3.0).abs() < 1e-6);
         // A second point of large likelihood confirms at once.
-        assert!(rule.begin(2, 0, 1e-6, 1000.0).confirmed && !rule.begin(2, 0, 1e-6, 900.0).confirmed);
+        assert!(rule.begin(2, 0, 1e-6, 1000.0).accepted && !rule.begin(2, 0, 1e-6, 900.0).accepted);
     }
 }

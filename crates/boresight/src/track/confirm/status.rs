@@ -10,7 +10,7 @@ use crate::TrackStatus;
 /// The reported status after a scan with (`hit`) or without a detection.
 #[inline]
 pub(in crate::track) fn status(history: &History, passed_gate: bool, hit: bool) -> TrackStatus {
-    match (history.confirmed && passed_gate, hit) {
+    match (history.accepted && passed_gate, hit) {
         (false, _) => TrackStatus::Tentative,
         (true, true) => TrackStatus::Confirmed,
         (true, false) => TrackStatus::Coasting,

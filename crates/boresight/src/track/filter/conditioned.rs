@@ -2,9 +2,9 @@
 //!
 //! Both need only the predicted position, so they are one wrapper around the boxed form, not a type for each combination.
 
-use super::belief::TrackFilter;
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
+use super::tracked_filter::TrackFilter;
 use boresight_filters::{
     Filter, FilterError, FuzzyInnovation, Gaussian, GaussianFilter, InnovationRule, NoiseLearner, ScaleNoise, Tracked,
     Weighted,

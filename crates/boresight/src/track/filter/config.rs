@@ -4,12 +4,12 @@
 //! [`TrackFilter`](super::TrackFilter). The process noise is the tracker's `acceleration-std-px-per-s2`. Names for whole
 //! filters stand in `presets`.
 
-use super::belief::Belief;
 use super::constant_velocity::ConstantVelocityKf;
 use super::form::FormConfig;
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
 use super::model::ModelConfig;
+use super::tracked_filter::TrackedFilter;
 use crate::Result;
 use crate::validate::check;
 use boresight_filters::{FilterError, Gaussian};
@@ -52,11 +52,15 @@ impl FilterConfig {
     }
 
     /// Builds the filter of a new track.
-    pub(in crate::track) fn start(&self, start: &Gaussian<4>, acceleration_std: f64) -> Result<Belief, FilterError> {
+    pub(in crate::track) fn start(
+        &self,
+        start: &Gaussian<4>,
+        acceleration_std: f64,
+    ) -> Result<TrackedFilter, FilterError> {
         if *self == Self::default() {
-            return Ok(Belief::Cv(ConstantVelocityKf::new(start, acceleration_std)));
+            return Ok(TrackedFilter::Cv(ConstantVelocityKf::new(start, acceleration_std)));
         }
         let adaptive = self.adaptive.as_ref();
-        self.form.start(&self.model, &self.innovation, adaptive, start, acceleration_std).map(Belief::Boxed)
+        self.form.start(&self.model, &self.innovation, adaptive, start, acceleration_std).map(TrackedFilter::Boxed)
     }
 }

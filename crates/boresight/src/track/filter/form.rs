@@ -1,11 +1,11 @@
 //! The form of a track's filter by name: how it keeps its covariance.
 
-use super::belief::TrackFilter;
 use super::conditioned::{ScaledFilter, conditioned};
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
 use super::model::ModelConfig;
 use super::own_model::{Ar1Config, DisplacementConfig, ImmConfig, LmsConfig};
+use super::tracked_filter::TrackFilter;
 use crate::Result as Checked;
 use boresight_filters::model::{
     ConstantAcceleration, ConstantTurn, ConstantVelocity, NearlyConstantTurn, OrnsteinUhlenbeck, RandomWalk, Scaled,

@@ -1,6 +1,5 @@
 //! The filter of a track: form x model x innovation x learning of the noise, and names for whole filters.
 
-mod belief;
 mod conditioned;
 pub(crate) mod config;
 pub(crate) mod constant_velocity;
@@ -10,11 +9,10 @@ pub(crate) mod learning;
 pub(crate) mod model;
 pub(crate) mod own_model;
 pub(crate) mod presets;
+mod tracked_filter;
 pub use constant_velocity::ConstantVelocityKf;
 pub use own_model::{Ar1Config, AsPrintedConfig, DisplacementConfig, ImmConfig, ImmForm, LmsConfig, LmsRuleConfig};
 
-pub(super) use belief::Belief;
-pub use belief::TrackFilter;
 pub use config::FilterConfig;
 pub use form::FormConfig;
 pub use innovation::{CorrelatorConfig, HuberConfig, InnovationConfig, StudentTConfig};
@@ -24,3 +22,5 @@ pub use model::{
     WhiteNoiseConfig,
 };
 pub use presets::{PRESETS, Preset};
+pub use tracked_filter::TrackFilter;
+pub(super) use tracked_filter::TrackedFilter;

@@ -1,6 +1,6 @@
 //! Forms that bring a model of their own: IMM, LMS weights, AR(1), displacement.
 
-use super::belief::TrackFilter;
+use super::tracked_filter::TrackFilter;
 use crate::Result;
 use crate::validate::{check, not_negative, positive};
 use boresight_filters::model::ConstantVelocity;

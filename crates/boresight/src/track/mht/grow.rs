@@ -43,10 +43,10 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
         let parents = std::mem::take(&mut tree.leaves);
         for mut leaf in parents {
             let t = &mut leaf.track;
-            t.belief.predict(dt_s)?;
+            t.filter.predict(dt_s)?;
             config.confirmation.predict_existence(&mut t.history, survival);
             let now = growth.context.now();
-            leaf.predicted = predicted_of(&t.belief, t.history.last_seen_ns(), t.last_place, now, config);
+            leaf.predicted = predicted_of(&t.filter, t.history.last_seen_ns(), t.last_place, now, config);
             children(growth, &leaf, gates, &mut tree.leaves);
         }
         tree.leaves.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.path.cmp(&b.path)));
@@ -108,7 +108,7 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
     let noise = table.noise(pair.detection);
     let mut child = leaf.clone();
     let measurement = Measurement { position: d.position, cov: noise.matrix() };
-    child.track.belief.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
+    child.track.filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
     let log_ratio = config.detection_probability.ln() + pair.log_likelihood
         - growth.clutter.at(d.position.x, d.position.y).max(1e-200).ln();
     child.score += log_ratio;
@@ -141,14 +141,14 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
         }
         let noise = table.noise(j as u32);
         let start = &from_one_point(&d.position, &noise.matrix(), velocity, variance);
-        let Ok(belief) = config.belief(start, d.extent.height_px) else { continue };
+        let Ok(filter) = config.start_filter(start, d.extent.height_px) else { continue };
         let density = growth.clutter.at(d.position.x, d.position.y).max(1e-200);
         let mut path = [NONE; WINDOW];
         path[0] = j as u32;
         let leaf = Hypothesis {
             track: Track {
                 id: 0,
-                belief,
+                filter,
                 history: config.confirmation.begin(1, scan.time.ns, density, 1.0),
                 appearance: Appearance::of(d),
                 duplicate_since_ns: None,

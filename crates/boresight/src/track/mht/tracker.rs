@@ -88,7 +88,7 @@ impl Mht {
         self.taken_by_confirmed.clear();
         self.taken_by_confirmed.resize(n_detections, false);
         for leaf in self.trees.iter().filter_map(Tree::answer) {
-            if let (true, Some(j)) = (leaf.track.history.confirmed, leaf.outcome.detection) {
+            if let (true, Some(j)) = (leaf.track.history.accepted, leaf.outcome.detection) {
                 self.taken_by_confirmed[j as usize] = true;
             }
         }
@@ -113,7 +113,7 @@ impl Mht {
 impl Tracking for Mht {
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
         let step_s = self.clock.step_s(scan)?;
-        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_of_size)?;
+        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_per_height)?;
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
         }

@@ -84,7 +84,7 @@ pub(in crate::track) fn gate_confirmed(
 ) {
     let high = context.high_score();
     for (k, t) in tracks.iter().enumerate() {
-        if !t.history.confirmed {
+        if !t.history.accepted {
             association.tentative.push((first + k) as u32);
             continue;
         }

@@ -6,7 +6,7 @@
 //! Limits: [`MOST_LOOKED_AT`] candidates are looked at per track and the `max_gated` nearest kept, so that 10⁵ detections
 //! in one pixel cost bounded time and memory.
 
-use super::super::scan_table::{MOST_LOOKED_AT, Noise, Predicted, ScanTable};
+use super::super::scan_table::{Cov2, MOST_LOOKED_AT, Predicted, ScanTable};
 use crate::associate::{Gates, Pair};
 use nalgebra::{Matrix2, Vector2};
 
@@ -61,7 +61,7 @@ pub fn gate_row(
 }
 
 /// Innovation covariance of a track and a detection, px².
-pub fn innovation_cov(track: &Predicted, r: &Noise) -> Matrix2<f64> {
+pub fn innovation_cov(track: &Predicted, r: &Cov2) -> Matrix2<f64> {
     track.cov.matrix() + r.matrix()
 }
 
@@ -105,7 +105,7 @@ mod tests {
             let track = Predicted {
                 x: p.mean.x,
                 y: p.mean.y,
-                cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
+                cov: Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
                 reach: f64::INFINITY,
             };
             let mut table = ScanTable::default();
@@ -122,7 +122,7 @@ mod tests {
             let all = gates_to(1e9);
             let ours: Vec<f64> = all.row(0).iter().map(|p| p.cost).collect();
             golden.all_close(&ours, &numbers(&case["outputs"]["d2"]), &format!("case {n}: d2"));
-            let s = innovation_cov(&track, &Noise { xx: r[(0, 0)], xy: r[(0, 1)], yy: r[(1, 1)] });
+            let s = innovation_cov(&track, &Cov2 { xx: r[(0, 0)], xy: r[(0, 1)], yy: r[(1, 1)] });
             golden.all_close(s.transpose().as_slice(), &rows(&case["outputs"]["S"]).concat(), &format!("case {n}: S"));
             let mut answer = Assignment::new();
             AssociatorConfig::Nearest(Default::default()).build().associate(&gates_to(gamma), &mut answer);
@@ -139,7 +139,7 @@ mod tests {
         let mut table = ScanTable::default();
         table.read(&scan, 0.0, 0.0).unwrap();
         table.sort(&scan);
-        let track = Predicted { x: 0.0, y: 0.0, cov: Noise { xx: 1.0, xy: 0.0, yy: 1.0 }, reach };
+        let track = Predicted { x: 0.0, y: 0.0, cov: Cov2 { xx: 1.0, xy: 0.0, yy: 1.0 }, reach };
         let mut gates = Gates::new();
         gates.reset(places.len(), 1.0);
         let asked = Cell::new(0);

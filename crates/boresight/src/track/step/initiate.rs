@@ -10,9 +10,9 @@ use super::super::appearance::Appearance;
 use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
 use super::super::confirm::confirmation_gate::GateProgress;
-use super::super::filter::Belief;
+use super::super::filter::TrackedFilter;
 use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points};
-use super::super::scan_table::{MOST_LOOKED_AT, Noise};
+use super::super::scan_table::{Cov2, MOST_LOOKED_AT};
 use super::super::single_track::{BATCH, Outcome, Track, place_of};
 use super::context::Context;
 use super::gate::normalised_square;
@@ -25,7 +25,7 @@ use nalgebra::Vector2;
 #[derive(Clone, Copy, Debug)]
 struct Unassociated {
     position: Vector2<f64>,
-    noise: Noise,
+    noise: Cov2,
 }
 
 /// What waits for a second point.
@@ -98,16 +98,16 @@ pub(in crate::track) fn from_initial_tracks(
     next_id: &mut u64,
 ) -> Result<()> {
     for initial in &config.initial_tracks {
-        let mut belief = config.belief(&initial.belief(), initial.size_px[1])?;
-        belief.predict(initial.age_s)?;
-        let k = belief.kinematics();
+        let mut filter = config.start_filter(&initial.belief(), initial.size_px[1])?;
+        filter.predict(initial.age_s)?;
+        let k = filter.kinematics();
         let mut history = config.confirmation.begin(2, now.ns, config.clutter_density_per_px2, 1.0);
-        history.confirmed = true;
+        history.accepted = true;
         // Reach of the first gate: where it can be, and where its detection can then lie.
         let spread = k.cov[(0, 0)].max(k.cov[(2, 2)]).sqrt() + config.extra_noise_px;
         tracks.push(Track {
             id: *next_id,
-            belief,
+            filter,
             history,
             appearance: Appearance { size: initial.size_px, sum: 0.0, class: None },
             duplicate_since_ns: None,
@@ -132,12 +132,12 @@ fn begin(
     let Context { scan, table, config, .. } = *context;
     let d = &scan.detections[detection];
     let noise = table.noise(detection as u32);
-    let Some((belief, likelihood_ratio)) = first_belief(config, clutter, d, &noise, first, prior, dt_s) else { return };
+    let Some((filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else { return };
     let n_points = if first.is_some() { 2 } else { 1 };
     let clutter_density = clutter.at(d.position.x, d.position.y);
     let mut track = Track {
         id: *out.next_id,
-        belief,
+        filter,
         history: config.confirmation.begin(n_points, scan.time.ns, clutter_density, likelihood_ratio),
         appearance: Appearance::of(d),
         duplicate_since_ns: None,
@@ -150,40 +150,40 @@ fn begin(
     *out.next_id += 1;
 }
 
-/// First belief of a track and Λ of its second point (1 if there is none); nothing if the filter refuses it.
-fn first_belief(
+/// The filter of a new track and Λ of its second point (1 if there is none); nothing if the filter refuses it.
+fn first_filter(
     config: &TrackerConfig,
     clutter: &Clutter,
     d: &Detection,
-    noise: &Noise,
+    noise: &Cov2,
     first: Option<&Unassociated>,
     prior: VelocityPrior,
     dt_s: f64,
-) -> Option<(Belief, f64)> {
+) -> Option<(TrackedFilter, f64)> {
     let height_px = d.extent.height_px;
     match (first, prior) {
         (Some(first), Some((velocity, variance))) => {
             let start = from_one_point(&first.position, &first.noise.matrix(), velocity, variance);
-            let mut belief = config.belief(&start, height_px).ok()?;
-            belief.predict(dt_s).ok()?;
-            let p = belief.predicted();
+            let mut filter = config.start_filter(&start, height_px).ok()?;
+            filter.predict(dt_s).ok()?;
+            let p = filter.predicted();
             let s = p.cov + noise.matrix();
             let density = (-0.5 * normalised_square(&(d.position - p.mean), &s)).exp()
                 / (std::f64::consts::TAU * s.determinant().sqrt());
             let measurement = Measurement { position: d.position, cov: noise.matrix() };
-            belief.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
+            filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
             let clutter_density = clutter.at(d.position.x, d.position.y).max(1e-200);
-            Some((belief, config.detection_probability * density / clutter_density))
+            Some((filter, config.detection_probability * density / clutter_density))
         }
         (Some(first), None) => {
             let start = from_two_points(&first.position, &first.noise.matrix(), &d.position, &noise.matrix(), dt_s);
-            let belief = config.belief(&start, height_px).ok()?;
-            Some((belief, uniform_ratio(config, dt_s, clutter.at(d.position.x, d.position.y))))
+            let filter = config.start_filter(&start, height_px).ok()?;
+            Some((filter, uniform_ratio(config, dt_s, clutter.at(d.position.x, d.position.y))))
         }
         (None, prior) => {
             let (velocity, variance) = prior.unwrap_or_default();
             let start = from_one_point(&d.position, &noise.matrix(), velocity, variance);
-            Some((config.belief(&start, height_px).ok()?, 1.0))
+            Some((config.start_filter(&start, height_px).ok()?, 1.0))
         }
     }
 }

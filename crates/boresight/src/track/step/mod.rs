@@ -1,4 +1,4 @@
-//! One scan's step, part by part: predict, gate, associate, update, delete, report, initiate.
+//! One scan's step, part by part: predict, gate, associate, update, (confirm,) delete, report, initiate.
 //!
 //! Free functions over explicit state; the order of their calls stands in [`super::tracker`]: confirmed tracks are gated while they are
 //! predicted, tentative ones once the confirmed have chosen; confirmation ([`super::confirm`]), deletion and report follow each update. A part reads what it needs from

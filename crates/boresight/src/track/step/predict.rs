@@ -4,8 +4,8 @@
 //! Symbols: reach, the farthest distance (px) from the prediction at which the largest speed still allows the target.
 
 use super::super::config::TrackerConfig;
-use super::super::filter::Belief;
-use super::super::scan_table::{Noise, Predicted};
+use super::super::filter::TrackedFilter;
+use super::super::scan_table::{Cov2, Predicted};
 use super::super::single_track::Track;
 use crate::{Result, Timestamp};
 use boresight_filters::Filter;
@@ -25,9 +25,9 @@ pub(in crate::track) fn predict(
     predicted: &mut Vec<Predicted>,
 ) -> Result<()> {
     for t in tracks {
-        t.belief.predict(dt_s)?;
+        t.filter.predict(dt_s)?;
         config.confirmation.predict_existence(&mut t.history, survival);
-        predicted.push(predicted_of(&t.belief, t.history.last_seen_ns(), t.last_place, now, config));
+        predicted.push(predicted_of(&t.filter, t.history.last_seen_ns(), t.last_place, now, config));
     }
     Ok(())
 }
@@ -35,13 +35,13 @@ pub(in crate::track) fn predict(
 /// What gating needs of a predicted track that was last seen at `last_place` (x, y, standard deviation; px).
 #[inline]
 pub(in crate::track) fn predicted_of(
-    belief: &Belief,
+    filter: &TrackedFilter,
     last_seen_ns: i64,
     last_place: [f64; 3],
     now: Timestamp,
     config: &TrackerConfig,
 ) -> Predicted {
-    let p = belief.predicted();
+    let p = filter.predicted();
     let elapsed_s = now.seconds_since(Timestamp::from_ns(last_seen_ns));
     // From where it was last seen the target came at most this far; the prediction may already lie off it.
     let [x, y, std] = last_place;
@@ -50,7 +50,7 @@ pub(in crate::track) fn predicted_of(
     Predicted {
         x: p.mean.x,
         y: p.mean.y,
-        cov: Noise { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
+        cov: Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
         reach: if config.gate_within_max_speed { far + off } else { f64::INFINITY },
     }
 }

@@ -17,7 +17,7 @@ pub(in crate::track) fn report(
     config: &TrackerConfig,
     camera: CameraPath,
 ) -> TrackState {
-    let kinematics = track.belief.kinematics();
+    let kinematics = track.filter.kinematics();
     let at = [kinematics.mean[0], kinematics.mean[2]];
     let passed = track.gate_progress.passes(&config.confirmation_gate, at, track.appearance.size, camera, outcome.hit);
     state_of(track.id, kinematics, &track.appearance, &track.history, passed, outcome, config)

@@ -64,7 +64,7 @@ fn hard(
     let detection = &context.scan.detections[share.detection as usize];
     let noise = context.table.noise(share.detection);
     let measurement = Measurement { position: detection.position, cov: noise.matrix() };
-    if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
+    if track.filter.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
         return missed;
     }
     let innovation = innovation_of(&detection.position, predicted, &innovation_cov(predicted, &noise));
@@ -107,7 +107,7 @@ fn soft(
     };
 
     weighted.clear();
-    let mut innovation = TrackInnovation { residual: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
+    let mut innovation = TrackInnovation { innovation: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
     for share in shares {
         let noise = context.table.noise(share.detection);
         let position = context.scan.detections[share.detection as usize].position;
@@ -117,11 +117,11 @@ fn soft(
         // the square of the mean innovation is not.
         let given_seen = share.weight / seen.max(1e-300);
         let one = innovation_of(&position, predicted, &innovation_cov(predicted, &noise));
-        innovation.residual += one.residual * given_seen;
+        innovation.innovation += one.innovation * given_seen;
         innovation.nis += one.nis * given_seen;
         innovation.cov += one.cov * given_seen;
     }
-    if track.belief.update(weighted).is_err() {
+    if track.filter.update(weighted).is_err() {
         return missed;
     }
     // With M-of-N any gated detection is a hit; else the target was seen if that is likelier than not.
@@ -144,7 +144,7 @@ fn soft(
 fn merged(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
     let position = Vector2::from(part.position);
     let measurement = Measurement { position, cov: part.noise.matrix() };
-    if track.belief.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
+    if track.filter.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
         return Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
     }
     let [x, y] = part.position;
@@ -166,8 +166,8 @@ pub(in crate::track) fn innovation_of(
     predicted: &Predicted,
     cov: &Matrix2<f64>,
 ) -> TrackInnovation {
-    let residual = position - Vector2::new(predicted.x, predicted.y);
-    TrackInnovation { residual, cov: *cov, nis: normalised_square(&residual, cov) }
+    let innovation = position - Vector2::new(predicted.x, predicted.y);
+    TrackInnovation { innovation, cov: *cov, nis: normalised_square(&innovation, cov) }
 }
 
 fn best_share(shares: &[Share]) -> Option<Share> {

@@ -22,7 +22,7 @@ const CURVE_POINTS: usize = 25;
 /// Measures beside CLEAR, identity and HOTA.
 #[derive(Clone, Debug, Default, Serialize)]
 #[non_exhaustive]
-pub struct FurtherMeasures {
+pub struct OptionalMeasures {
     /// GOSPA of each frame.
     pub gospa: Vec<Gospa>,
     /// OSPA of each frame, px.
@@ -47,7 +47,7 @@ pub struct FurtherMeasures {
     pub cells: Option<CellScores>,
 }
 
-impl FurtherMeasures {
+impl OptionalMeasures {
     pub(super) fn of(
         s: &Sequence<'_>,
         options: &EvaluateOptions,

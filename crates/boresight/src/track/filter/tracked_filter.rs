@@ -16,14 +16,14 @@ impl<F: Filter + Clone + Send + Sync + 'static> TrackFilter for F {
 }
 
 /// A filter in place, or behind its trait.
-pub enum Belief {
+pub enum TrackedFilter {
     /// Constant velocity, 15 numbers in the track itself: no pointer to follow at a hundred thousand tracks.
     Cv(ConstantVelocityKf),
     /// Any other filter.
     Boxed(Box<dyn TrackFilter>),
 }
 
-impl Clone for Belief {
+impl Clone for TrackedFilter {
     fn clone(&self) -> Self {
         match self {
             Self::Cv(f) => Self::Cv(*f),
@@ -32,7 +32,7 @@ impl Clone for Belief {
     }
 }
 
-impl Filter for Belief {
+impl Filter for TrackedFilter {
     #[inline]
     fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
         match self {
