@@ -9,12 +9,12 @@ mod data;
 mod detect_exam;
 mod detect_scenes;
 mod docs;
+mod exam;
 mod filter_table;
 mod ir_exam;
 mod link_table;
 mod mot_table;
 mod video_check;
-mod vision_exam;
 
 use clap::{Parser, Subcommand};
 
@@ -43,6 +43,8 @@ enum Chore {
     CrossingTable(crossing_table::Args),
     /// The detector of a stated false-alarm rate: alarms, detection, bounds, time.
     DetectExam(detect_exam::Args),
+    /// All public data with no options, one table, written to docs/exam.md.
+    Exam(exam::Args),
     /// Every filter by name over the sample clip: held, error, NIS.
     FilterTable(filter_table::Args),
     /// Links against trackpy's and btrack's published ones.
@@ -51,8 +53,6 @@ enum Chore {
     MotTable(mot_table::Args),
     /// Compare decoded video with ffmpeg's frames, live.
     VideoCheck(video_check::Args),
-    /// Track the public clips that are not infrared with no options and score the tracks.
-    VisionExam(vision_exam::Args),
 }
 
 fn main() -> anyhow::Result<()> {
@@ -65,10 +65,10 @@ fn main() -> anyhow::Result<()> {
         Chore::ClutterTable(args) => clutter_table::run(&args),
         Chore::CrossingTable(args) => crossing_table::run(&args),
         Chore::DetectExam(args) => detect_exam::run(&args),
+        Chore::Exam(args) => exam::run(&args),
         Chore::FilterTable(args) => filter_table::table(&args),
         Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
-        Chore::VisionExam(args) => vision_exam::run(&args),
     }
 }

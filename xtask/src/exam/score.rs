@@ -1,0 +1,159 @@
+//! One clip's figures: tracked as the command does without options, held against its truth.
+
+use super::clips::{Clip, Near, truth};
+use anyhow::Result;
+use boresight::metrics::{MatchOptions, Rules, Similarity, mot_scores, preprocess};
+use boresight::pipeline::{Input, run};
+use boresight::{Config, FrameSource, PixelOrigin, Sink, TrackRow, TrackStatus, TrackTable, View, auto, track, vision};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What the tracks of a run say.
+#[derive(Default)]
+struct Reported {
+    rows: Vec<TrackRow>,
+    nis_sum: f64,
+    n_nis: u64,
+}
+
+struct Collect(Arc<Mutex<Reported>>);
+
+impl Sink for Collect {
+    fn put(&mut self, view: &View<'_>) -> boresight::Result<()> {
+        let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for t in view.tracks.iter().filter(|t| t.status != TrackStatus::Tentative) {
+            let m = t.kinematics.mean;
+            let (frame, id) = (view.scan.index.0 as u32, t.id.0 as i64);
+            seen.rows.push(TrackRow { frame, id, bbox: [m[0], m[2], 0.0, 0.0], score: 1.0, ..TrackRow::default() });
+            if let Some(i) = &t.innovation {
+                seen.nis_sum += i.nis;
+                seen.n_nis += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> boresight::Result<()> {
+        Ok(())
+    }
+}
+
+/// The figures of a clip.
+pub struct Score {
+    /// Share of the truth's rows with a reported track near.
+    pub held: f64,
+    /// Share of the reported rows that are near a target.
+    pub precision: Option<f64>,
+    pub idf1: Option<f64>,
+    /// Reported tracks that are a target's in half of their rows or more, per target.
+    pub ids_a_target: f64,
+    /// Other reported tracks.
+    pub n_false: Option<usize>,
+    pub minutes: f64,
+    /// Mean normalised innovation squared: 2 is honest.
+    pub nis: f64,
+    pub ms_a_frame: f64,
+    /// What was chosen, in the words of the choice.
+    pub chosen: String,
+}
+
+/// Tracks a clip without options and scores the result.
+pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
+    let truth = truth(&clip.truth, &clip.columns)?;
+    let started = std::time::Instant::now();
+    let (source, choice) = auto::open_and_choose(&clip.input.display().to_string(), &Config::default())?;
+    let info = source.info().clone();
+    let mut config = choice.config;
+    for set in sets {
+        config = config.with(set)?;
+    }
+    let detector = vision::build(&config.detector, &info)?;
+    let tracker = track::build(&config.tracker)?;
+    let seen = Arc::new(Mutex::new(Reported::default()));
+    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&seen)))];
+    let go_on = &mut |_: &boresight::pipeline::Summary| ControlFlow::Continue(());
+    let (summary, broken) = run(Input::Frames(Box::new(source), detector), Some(tracker), sinks, go_on)?;
+    if let Some(e) = broken {
+        return Err(e.into());
+    }
+    let ms_a_frame = 1e3 * started.elapsed().as_secs_f64() / summary.frames.max(1) as f64;
+    let mut seen = std::mem::take(&mut *seen.lock().unwrap_or_else(PoisonError::into_inner));
+    // Beyond the last frame of the truth nothing is known.
+    let last = truth.iter().map(|r| r.frame).max().unwrap_or(0);
+    seen.rows.retain(|r| r.frame <= last);
+    let near = nearness(&truth, &seen.rows, clip.near);
+    let n_targets = truth.iter().map(|r| r.id).collect::<BTreeSet<_>>().len().max(1);
+    Ok(Score {
+        held: near.n_held as f64 / truth.len().max(1) as f64,
+        precision: clip.whole.then(|| near.n_near as f64 / seen.rows.len().max(1) as f64),
+        idf1: if clip.whole { Some(idf1(&truth, seen.rows, clip.near)?) } else { None },
+        ids_a_target: near.n_true_tracks as f64 / n_targets as f64,
+        n_false: clip.whole.then_some(near.n_false_tracks),
+        minutes: summary.duration_s / 60.0,
+        nis: seen.nis_sum / seen.n_nis as f64,
+        ms_a_frame,
+        chosen: choice.reasons.get(1).cloned().unwrap_or_default(),
+    })
+}
+
+struct Nearness {
+    n_held: usize,
+    n_near: usize,
+    n_true_tracks: usize,
+    n_false_tracks: usize,
+}
+
+fn is_near(r: &TrackRow, t: &TrackRow, near: Near) -> bool {
+    let (dx, dy) = ((r.bbox[0] - t.bbox[0]).abs(), (r.bbox[1] - t.bbox[1]).abs());
+    match near {
+        Near::Px(px) => dx.hypot(dy) <= px,
+        Near::Box(px) => dx <= 0.5 * t.bbox[2] + px && dy <= 0.5 * t.bbox[3] + px,
+    }
+}
+
+fn by_frame(rows: &[TrackRow]) -> BTreeMap<u32, Vec<&TrackRow>> {
+    let mut out: BTreeMap<u32, Vec<&TrackRow>> = BTreeMap::new();
+    for r in rows {
+        out.entry(r.frame).or_default().push(r);
+    }
+    out
+}
+
+fn at<'a, 'r>(rows: &'a BTreeMap<u32, Vec<&'r TrackRow>>, frame: u32) -> &'a [&'r TrackRow] {
+    rows.get(&frame).map_or(&[], Vec::as_slice)
+}
+
+/// Who is near whom, without pairing one to one: a second track on one target is no false one, it costs IDF1.
+fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
+    let (results, truths) = (by_frame(result), by_frame(truth));
+    let n_held = truth.iter().filter(|t| at(&results, t.frame).iter().any(|r| is_near(r, t, near))).count();
+    let mut tracks: BTreeMap<i64, (usize, usize)> = BTreeMap::new();
+    let mut n_near = 0;
+    for r in result {
+        let hit = at(&truths, r.frame).iter().any(|t| is_near(r, t, near));
+        n_near += usize::from(hit);
+        let track = tracks.entry(r.id).or_default();
+        *track = (track.0 + usize::from(hit), track.1 + 1);
+    }
+    let n_true_tracks = tracks.values().filter(|(hits, n)| 2 * hits >= *n).count();
+    Nearness { n_held, n_near, n_true_tracks, n_false_tracks: tracks.len() - n_true_tracks }
+}
+
+/// IDF1 by positions; a target's reach is one for the whole clip: half the median diagonal of its boxes and what they grow by.
+fn idf1(truth: &[TrackRow], result: Vec<TrackRow>, near: Near) -> Result<f64> {
+    let reach = match near {
+        Near::Px(px) => px,
+        Near::Box(px) => {
+            let mut diagonals: Vec<f64> = truth.iter().map(|t| t.bbox[2].hypot(t.bbox[3])).collect();
+            diagonals.sort_by(f64::total_cmp);
+            0.5 * diagonals.get(diagonals.len() / 2).copied().unwrap_or(0.0) + px
+        }
+    };
+    let point = |r: &TrackRow| TrackRow { bbox: [r.bbox[0], r.bbox[1], 0.0, 0.0], ..r.clone() };
+    let truth = TrackTable::from_rows("truth", PixelOrigin::Centre0, truth.iter().map(point))?;
+    let result = TrackTable::from_rows("boresight", PixelOrigin::Centre0, result)?;
+    let (truth, result) = preprocess(&truth, &result, Rules::None)?;
+    let similarity = Similarity::Centre { zero_distance_px: 2.0 * reach };
+    Ok(mot_scores(&truth, &result, &MatchOptions { similarity, threshold: 0.5 })?.identity.idf1())
+}
