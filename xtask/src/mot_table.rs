@@ -6,10 +6,10 @@
 
 use anyhow::{Context, Result};
 use boresight::io::tracks::{Format, ReadOptions, read};
-use boresight::io::{TableOptions, mot_box_of_extent, read_detections};
+use boresight::io::{mot_box_of_extent, read_detections};
 use boresight::metrics::{MatchOptions, MotScores, Rules, hota, mot_scores, preprocess};
-use boresight::track::{self, TrackerConfig, TwoStageConfig};
-use boresight::{PixelOrigin, TrackRow, TrackStatus, TrackTable};
+use boresight::track::{self, TwoStageConfig};
+use boresight::{Config, PixelOrigin, TrackRow, TrackStatus, TrackTable};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct Args {
     /// Folder with `mot15_text` and `mot17_text`.
     #[arg(long, env = "BORESIGHT_TEST_DATA", default_value = "../shared/data")]
     data: PathBuf,
-    /// Tracker configuration (JSON) instead of the built-in one for people.
+    /// Configuration (TOML) instead of `configs/detections-mot.toml`.
     #[arg(long)]
     config: Option<PathBuf>,
     /// Folder with SORT's results on MOT17 (`MOT17-02.txt` …), made by `scripts/sort_peer.py`.
@@ -29,13 +29,13 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// The one configuration for all sequences, as JSON.
-pub const PEOPLE: &str = include_str!("mot_people.json");
+/// The one configuration for all sequences.
+const PEOPLE: &str = include_str!("../../configs/detections-mot.toml");
 
 pub fn run(args: &Args) -> Result<()> {
-    let config: TrackerConfig = match &args.config {
-        Some(path) => serde_json::from_str(&std::fs::read_to_string(path)?)?,
-        None => serde_json::from_str(PEOPLE)?,
+    let config = match &args.config {
+        Some(path) => Config::from_file(path)?,
+        None => Config::from_toml(PEOPLE, "configs/detections-mot.toml")?,
     };
     // Score thresholds are in each detector's own scale; all else is the same.
     let frcnn = TwoStageConfig { high_score: 0.9, low_score: 0.0 };
@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> Result<()> {
     for (set, detections, peer, rules, two_stage) in sets {
         let mut config = config.clone();
         if args.config.is_none() {
-            config.two_stage = Some(two_stage);
+            config.tracker.two_stage = Some(two_stage);
         }
         println!("\n{set}, {detections}            HOTA   IDF1   MOTA   IDSW    FP     FN");
         let mut folders: Vec<PathBuf> = std::fs::read_dir(args.data.join(set))?
@@ -83,9 +83,9 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 /// Runs the tracker over a detection file; rows are confirmed tracks with a detection in the frame.
-fn tracked(config: &TrackerConfig, detections: &Path) -> Result<TrackTable> {
-    let mut tracker = track::build(config)?;
-    let table = read_detections(detections, &TableOptions::default())?;
+fn tracked(config: &Config, detections: &Path) -> Result<TrackTable> {
+    let mut tracker = track::build(&config.tracker)?;
+    let table = read_detections(detections, &config.input.table)?;
     let mut rows = Vec::new();
     for scan in &table.scans {
         for s in tracker.step(scan)?.iter().filter(|s| s.status == TrackStatus::Confirmed) {

@@ -1,0 +1,92 @@
+//! The tracker for detections made elsewhere: what a score means, noise, motion and speeds, measured on the table itself.
+//!
+//! Boxes are followed from scan to scan by their overlap (`links`), which needs no tracker; from that come the probability that a
+//! detection of a given score is a target's (`scores`), the noise of a centre, the targets' acceleration and speeds. A table of
+//! points, or of boxes that are hardly ever linked, keeps assumptions from the boxes' size alone, and says so.
+
+mod links;
+mod scores;
+
+use super::digits::round;
+use crate::track::{
+    AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
+    OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
+};
+use crate::{Config, Scan};
+use links::{Links, Motion};
+use scores::Calibration;
+
+/// A detection that is a target's with at least this probability may initiate a track: below it it is more likely false.
+const INITIATES: f64 = 0.5;
+/// With at least this one it may continue a track: the track's own prediction speaks for it as well.
+const CONTINUES: f64 = 0.1;
+/// The largest speed over that which one step in a thousand exceeds: steps of the whole table are not all those of its targets.
+const SPEED_RESERVE: f64 = 1.5;
+
+/// Writes the tracker's configuration for a table of detections.
+pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
+    let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { 25.0 };
+    let mut sides: Vec<f64> = scans
+        .iter()
+        .flat_map(|s| &s.detections)
+        .map(|d| d.extent.width_px.min(d.extent.height_px))
+        .filter(|s| s.is_finite() && *s > 0.0)
+        .collect();
+    sides.sort_by(f64::total_cmp);
+    let tracker = &mut config.tracker;
+    // One size for all is the reader's own, for points.
+    let boxes = sides.first() < sides.last();
+    let links = boxes.then(|| Links::of(scans));
+    let calibration = links.as_ref().and_then(|l| Calibration::of(l.supported()));
+    let high_score = calibration.as_ref().map_or(f32::NEG_INFINITY, |c| c.score_at(INITIATES));
+    if let Some(motion) = links.and_then(|l| l.motion(high_score, 1.0 / rate)) {
+        for_boxes(tracker, &motion);
+        reasons.push(format!(
+            "{} steps of boxes that overlap: centres to {:.3} of a box height, acceleration {:.2} heights/s², speeds to {:.0} px/s, {:.0} % go on.",
+            motion.n_steps,
+            motion.noise,
+            motion.acceleration_per_s2,
+            motion.fastest_px_per_s,
+            100.0 * motion.p_detection
+        ));
+        if let Some(c) = calibration {
+            let low_score = c.score_at(CONTINUES).min(high_score);
+            tracker.two_stage = Some(TwoStageConfig { high_score, low_score });
+            reasons.push(format!(
+                "Scores by what the scans around say: from {high_score:.3} more likely a target's than not (initiates), from {low_score:.3} with {:.0} % (continues).",
+                100.0 * CONTINUES
+            ));
+        }
+        return;
+    }
+    let side = sides.get(sides.len() / 2).copied().unwrap_or(0.0);
+    // Boxes of larger things jump more: a tenth of the side is what detectors leave in the centre.
+    tracker.extra_noise_px = round((0.1 * side).max(0.3));
+    tracker.acceleration_std_px_per_s2 = round((0.005 * side).max(0.03) * rate * rate);
+    tracker.max_speed_px_per_s = round((0.3 * side).max(5.0) * rate);
+    reasons.push(format!(
+        "Median shorter side {side:.1} px: noise {} px, acceleration {} px/s², at most {} px/s.",
+        tracker.extra_noise_px, tracker.acceleration_std_px_per_s2, tracker.max_speed_px_per_s
+    ));
+}
+
+/// Boxes of an object detector: every number in heights and seconds, as measured; boxes must overlap to be one target's.
+fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion) {
+    tracker.extra_noise_per_height = round(motion.noise);
+    tracker.acceleration_per_height_per_s2 = round(motion.acceleration_per_s2);
+    tracker.max_speed_px_per_s = round(SPEED_RESERVE * motion.fastest_px_per_s).max(1.0);
+    tracker.detection_probability = round(motion.p_detection.clamp(0.1, 0.99));
+    tracker.initiation =
+        InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(motion.speed_std_px_per_s).max(1.0) });
+    tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 2, scans: 3, ..MOfNConfig::default() });
+    // As in `configs/detections-mot.toml`: sizes and overlap decide where places do not.
+    tracker.association_cost = AssociationCostConfig {
+        size_log_std: Some(0.3),
+        overlap: Some(OverlapConfig { kind: OverlapKind::Iou, weight: 40.0, min_overlap: 0.3, buffer: 0.2 }),
+        ..AssociationCostConfig::default()
+    };
+    tracker.appearance_gain = 0.5;
+    tracker.merged_measurements = MergedMeasurementsConfig::off();
+    tracker.coast_s = 1.0;
+    tracker.coast_scans = 1;
+}
