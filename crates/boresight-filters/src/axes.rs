@@ -51,3 +51,18 @@ pub(crate) fn unpack_axes<T: Real, const N: usize>(b: &Gaussian<N, T>) -> Gaussi
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_entry_in_either_off_diagonal_block_couples_the_halves() {
+        assert!(halves_apart(&SMatrix::<f64, 4, 4>::from_fn(|r, c| f64::from(u8::from(r / 2 == c / 2)))));
+        for (r, c) in [(0, 2), (1, 3), (2, 0), (3, 0), (3, 1)] {
+            let mut m = SMatrix::<f64, 4, 4>::identity();
+            m[(r, c)] = 1e-300;
+            assert!(!halves_apart(&m), "{r} {c}");
+        }
+    }
+}

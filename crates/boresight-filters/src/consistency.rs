@@ -296,6 +296,13 @@ mod tests {
     }
 
     #[test]
+    fn the_start_of_the_quantiles_is_as_good_as_it_says() {
+        for (p, z) in [(0.975, 1.959_964), (0.025, -1.959_964), (0.5, 0.0), (0.999, 3.090_232), (0.1, -1.281_552)] {
+            assert!((normal_quantile(p) - z).abs() < 5e-4, "{p}: {}", normal_quantile(p));
+        }
+    }
+
+    #[test]
     fn each_verdict_is_reached_and_said_in_words() {
         for (value, want) in [(2.0, Verdict::Consistent), (3.0, Verdict::OverConfident), (1.0, Verdict::UnderConfident)]
         {

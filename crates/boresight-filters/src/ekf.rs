@@ -51,3 +51,24 @@ where
     filter.set_belief(&update.belief)?;
     Ok(update)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::ConstantVelocity;
+    use crate::sensor::Bearing;
+    use crate::{Gaussian, Kf, Start};
+    use nalgebra::{Matrix1, Matrix4, Vector1, Vector2, Vector4};
+
+    #[test]
+    fn a_measurement_or_a_noise_that_is_no_number_is_refused_as_such() {
+        let start = Gaussian { mean: Vector4::new(3.0, 0.0, 4.0, 0.0), cov: Matrix4::identity() };
+        let mut filter = Kf::<_, 4>::start(ConstantVelocity::continuous(1.0).unwrap(), start).unwrap();
+        let sensor = Bearing { origin: Vector2::zeros(), position_at: [0, 2] };
+        for (z, r) in [(f64::NAN, 0.1), (0.5, f64::NAN), (f64::INFINITY, 0.1), (0.5, f64::INFINITY)] {
+            let e = correct_extended(&mut filter, &sensor, &Vector1::new(z), &Matrix1::new(r), 1).unwrap_err();
+            assert_eq!(e, FilterError::NotFinite("the measurement"));
+            assert_eq!(filter.belief(), start);
+        }
+    }
+}

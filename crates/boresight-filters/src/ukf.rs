@@ -212,4 +212,25 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn any_spread_gives_the_kalman_filter_of_a_linear_problem() {
+        let cv = ConstantVelocity::continuous(2.0).unwrap();
+        let cov = SMatrix::<f64, 4, 4>::from_diagonal(&SVector::<f64, 4>::new(4.0, 9.0, 1.0, 25.0));
+        let prior = Gaussian { mean: SVector::<f64, 4>::new(1.0, -2.0, 3.0, 0.5), cov };
+        for kappa in [0.0, 0.5, 1.0, 7.0] {
+            let mut ukf = Ukf::start(cv, prior).unwrap().with_kappa(kappa).unwrap();
+            let mut kf = crate::Kf::<_, 4>::start(cv, prior).unwrap();
+            for k in 0..5 {
+                let position = nalgebra::Vector2::new(f64::from(k), 3.0 - f64::from(k));
+                let z = Measurement { position, cov: Matrix2::new(2.0, 0.3, 0.3, 0.7) };
+                ukf.predict(0.3).unwrap();
+                kf.predict(0.3).unwrap();
+                ukf.correct(&z).unwrap();
+                kf.correct(&z).unwrap();
+            }
+            assert!((ukf.belief().mean - kf.belief().mean).amax() < 1e-9, "{kappa}");
+            assert!((ukf.belief().cov - kf.belief().cov).amax() < 1e-9, "{kappa}");
+        }
+    }
 }

@@ -193,4 +193,18 @@ mod tests {
         assert!(l[(0, 1)] == 0.0 && l[(0, 2)] == 0.0 && l[(1, 2)] == 0.0);
         assert!((0..3).all(|i| l[(i, i)] >= 0.0));
     }
+
+    #[test]
+    fn triangularising_keeps_the_normal_equations() {
+        let full = SMatrix::<f64, 4, 4>::from_fn(|r, c| ((3 * r + 5 * c * c + 1) % 7) as f64 - 2.5);
+        let right = SVector::<f64, 4>::new(1.0, -2.0, 0.5, 3.0);
+        let (mut r, mut y) = (full, right);
+        triangularize(&mut r, &mut y);
+        assert!((r.transpose() * r - full.transpose() * full).amax() < 1e-12);
+        assert!((r.transpose() * y - full.transpose() * right).amax() < 1e-12);
+        assert!((y.norm() - right.norm()).abs() < 1e-12);
+        for j in 0..4 {
+            assert!(r[(j, j)] >= 0.0 && (j + 1..4).all(|i| r[(i, j)] == 0.0), "{r}");
+        }
+    }
 }

@@ -179,3 +179,18 @@ pub fn kinematics_from_point<T: Real>(m: &Measurement<T>, velocity_std: T) -> Re
     k.cov[(3, 3)] = velocity_std * velocity_std;
     Ok(k)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn a_velocity_deviation_out_of_its_range_is_refused() {
+        let m = Measurement { position: Vector2::new(1.0, 2.0), cov: Matrix2::identity() };
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            assert!(kinematics_from_point(&m, wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(kinematics_from_point(&m, 3.0).unwrap().cov[(1, 1)], 9.0);
+    }
+}

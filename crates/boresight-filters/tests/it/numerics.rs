@@ -3,9 +3,9 @@
 //! `docs/theory/filters.md` (independent reference, 200 steps): relative error 0.99 conventional, 0.74 Joseph, 1.2e-6
 //! U-D.
 
-use boresight_filters::model::{ConstantVelocity, Dense};
+use boresight_filters::model::{ConstantAcceleration, ConstantVelocity, Dense};
 use boresight_filters::{CovarianceForm, Gaussian, GaussianFilter, Kf, Measurement, SquareRoot, Srif, Start, Ud};
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix4, SMatrix, SVector, Vector2, Vector4};
 
 type Cv = Dense<ConstantVelocity<f32>>;
 
@@ -50,4 +50,25 @@ fn in_f64_the_factored_forms_agree_on_the_same_problem_and_joseph_keeps_three_di
     }
     // Joseph's form keeps some four digits even here: 1e12 between prior and noise, squared by the product.
     assert!((run(Kf::start(model, start()).unwrap()).cov - exact.cov).norm() < 1e-3 * exact.cov.norm());
+}
+
+#[test]
+fn three_states_an_axis_by_factors_are_those_of_joseph() {
+    let model = ConstantAcceleration::discrete(3.0, 5.0).unwrap();
+    let cov = SMatrix::<f64, 6, 6>::from_diagonal(&SVector::from([4.0, 9.0, 25.0, 1.0, 16.0, 9.0]));
+    let belief = Gaussian { mean: SVector::zeros(), cov };
+    let mut ud = Ud::<_, 6>::start(model, belief).unwrap();
+    let mut kf = Kf::<_, 6>::start(model, belief).unwrap();
+    for k in 0..60 {
+        let t = f64::from(k) * 0.1;
+        // Uncorrelated axes of different noise: the way of two axes side by side.
+        let z = Measurement { position: Vector2::new(t * t, 3.0 * t), cov: Matrix2::new(0.7, 0.0, 0.0, 1.9) };
+        ud.predict(0.1).unwrap();
+        kf.predict(0.1).unwrap();
+        ud.correct(&z).unwrap();
+        kf.correct(&z).unwrap();
+        let scale = kf.belief().cov.amax();
+        assert!((ud.belief().cov - kf.belief().cov).amax() < 1e-10 * scale, "scan {k}");
+        assert!((ud.belief().mean - kf.belief().mean).amax() < 1e-9, "scan {k}");
+    }
 }
