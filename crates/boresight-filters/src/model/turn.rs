@@ -181,6 +181,15 @@ mod tests {
     }
 
     #[test]
+    fn a_new_track_turns_by_nothing_with_the_deviation_given() {
+        let m = NearlyConstantTurn::new(0.1, 0.1, 0.3).unwrap();
+        let k = Gaussian { mean: SVector::<f64, 4>::new(1.0, 2.0, 3.0, 4.0), cov: SMatrix::<f64, 4, 4>::identity() };
+        let b = m.lift(&k);
+        assert_eq!((b.mean[4], b.cov[(3, 3)], b.cov[(0, 4)]), (0.0, 1.0, 0.0));
+        assert!((b.cov[(4, 4)] - 0.09).abs() < 1e-15);
+    }
+
+    #[test]
     fn the_jacobian_is_the_slope_of_the_motion() {
         let m = NearlyConstantTurn::new(0.1, 0.1, 0.1).unwrap();
         for w in [0.0, 1e-3, 0.4, -2.0] {
