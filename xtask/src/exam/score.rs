@@ -150,7 +150,7 @@ fn idf1(truth: &[TrackRow], result: Vec<TrackRow>, near: Near) -> Result<f64> {
             0.5 * diagonals.get(diagonals.len() / 2).copied().unwrap_or(0.0) + px
         }
     };
-    let point = |r: &TrackRow| TrackRow { bbox: [r.bbox[0], r.bbox[1], 0.0, 0.0], ..r.clone() };
+    let point = |r: &TrackRow| TrackRow { bbox: [r.bbox[0], r.bbox[1], 0.0, 0.0], ..*r };
     let truth = TrackTable::from_rows("truth", PixelOrigin::Centre0, truth.iter().map(point))?;
     let result = TrackTable::from_rows("boresight", PixelOrigin::Centre0, result)?;
     let (truth, result) = preprocess(&truth, &result, Rules::None)?;

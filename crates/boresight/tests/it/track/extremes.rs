@@ -1,8 +1,7 @@
 //! Bad input and extremes: an error that changes nothing, or a sane track, in bounded time and memory.
 
 use super::{detection, scan, trackers};
-use boresight::{ErrorKind, FrameIndex, Scan, Timestamp, TrackState, track};
-use std::time::Instant;
+use boresight::{ErrorKind, FrameIndex, Scan, Timestamp, TrackState, TrackStatus, track};
 
 /// Three targets on straight lines.
 fn ordinary(k: u64) -> Scan {
@@ -60,35 +59,44 @@ fn a_gap_of_an_hour_ends_all_tracks_and_new_ones_start() {
 }
 
 #[test]
-fn a_hundred_thousand_detections_in_one_pixel_take_bounded_time() {
+fn a_hundred_thousand_detections_in_one_pixel_leave_bounded_and_sane_tracks() {
+    // That the search is bounded is counted beside it (`track/step/gate.rs`); without bounds this would run for hours.
     for config in trackers().into_iter().map(|c| track::TrackerConfig { max_tracks: 2000, ..c }) {
         let mut tracker = track::build(&config).unwrap();
         for k in 0..4 {
             tracker.step(&ordinary(k)).unwrap();
         }
-        let begin = Instant::now();
         for k in 4..6u64 {
             let points: Vec<_> = (0..100_000u32).map(|i| (10.0 + f64::from(i % 7) * 0.1, 20.0)).collect();
             let states = tracker.step(&scan(k, &points)).unwrap();
             assert!(states.len() <= 2000);
             assert!(states.iter().all(|s| s.kinematics.mean.iter().all(|v| v.is_finite())));
         }
-        // Fifty times what it takes on a busy machine; without bounds it would be hours.
-        assert!(begin.elapsed().as_secs() < 60, "{:?}: {:?}", begin.elapsed(), config);
     }
 }
 
 #[test]
-fn duplicate_detections_do_not_make_lasting_doubles() {
+fn targets_detected_twice_are_confirmed_at_most_twice_and_nothing_else_is() {
     for config in trackers() {
         let mut tracker = track::build(&config).unwrap();
+        let mut confirmed: Vec<TrackState> = Vec::new();
         for k in 0..40 {
             let mut doubled = ordinary(k);
             doubled.detections.extend(doubled.detections.clone());
-            let n = tracker.step(&doubled).unwrap().len();
-            // Two detections, two targets: a hard tracker may believe both, no tracker makes more of them.
-            assert!(n <= 12, "{n} tracks of three targets seen twice: {config:?}");
+            let states = tracker.step(&doubled).unwrap();
+            confirmed = states.iter().filter(|s| s.status != TrackStatus::Tentative).cloned().collect();
         }
+        let mut n_near = 0;
+        for d in &ordinary(39).detections {
+            let near = |s: &&TrackState| {
+                (s.kinematics.mean[0] - d.position.x).hypot(s.kinematics.mean[2] - d.position.y) < 1.0
+            };
+            let n = confirmed.iter().filter(near).count();
+            n_near += n;
+            // One detection for each of two tracks: a tracker cannot know that they are one target's.
+            assert!((1..=2).contains(&n), "{n} tracks on one target: {config:?}");
+        }
+        assert_eq!(n_near, confirmed.len(), "tracks where nothing is: {config:?}");
     }
 }
 
