@@ -11,8 +11,8 @@ mod detect_scenes;
 mod docs;
 mod exam;
 mod filter_table;
-mod ir_exam;
 mod link_table;
+mod mot;
 mod mot_table;
 mod video_check;
 
@@ -31,8 +31,6 @@ enum Chore {
     BenchMetrics(bench_metrics::Args),
     /// Write the parameter reference and the JSON schema to docs/.
     Docs(docs::Args),
-    /// Track the public infrared clips with no options and score the tracks.
-    IrExam(ir_exam::Args),
     /// Scale: scans per second from 10 to 100 000 targets, with GOSPA.
     BenchTrack(bench_track::Args),
     /// What the automatic choice says of every public clip.
@@ -59,7 +57,6 @@ fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
         Chore::BenchMetrics(args) => bench_metrics::run(&args),
         Chore::Docs(args) => docs::run(&args),
-        Chore::IrExam(args) => ir_exam::exam(&args),
         Chore::BenchTrack(args) => bench_track::run(&args),
         Chore::Choices(args) => choices::run(&args),
         Chore::ClutterTable(args) => clutter_table::run(&args),

@@ -4,12 +4,12 @@
 //! Data: 2D MOT 2015 with SORT's Faster R-CNN detections (SORT's own result beside them) and MOT17 with DPM detections.
 //! Scores are those of `boresight::metrics`, which equal TrackEval's; `--out DIR` writes MOT files for TrackEval itself.
 
+use crate::mot::{SETS, judged, name_of, sequences, sort_of, table, tracked};
 use anyhow::{Context, Result};
-use boresight::io::tracks::{Format, ReadOptions, read};
-use boresight::io::{mot_box_of_extent, read_detections};
-use boresight::metrics::{MatchOptions, MotScores, Rules, hota, mot_scores, preprocess};
-use boresight::track::{self, TwoStageConfig};
-use boresight::{Config, PixelOrigin, TrackRow, TrackStatus, TrackTable};
+use boresight::io::read_detections;
+use boresight::metrics::{MotScores, hota};
+use boresight::track::TwoStageConfig;
+use boresight::{Config, TrackTable};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -40,37 +40,25 @@ pub fn run(args: &Args) -> Result<()> {
     // Score thresholds are in each detector's own scale; all else is the same.
     let frcnn = TwoStageConfig { high_score: 0.9, low_score: 0.0 };
     let dpm = TwoStageConfig { high_score: 0.3, low_score: -0.5 };
-    let sets = [
-        ("mot15_text", "det_frcnn_sort.txt", Some("result_sort.txt"), Rules::Mot15, frcnn),
-        ("mot17_text", "det_dpm.txt", None, Rules::Mot17, dpm),
-    ];
-    for (set, detections, peer, rules, two_stage) in sets {
+    for ((set, detections, rules), two_stage) in SETS.into_iter().zip([frcnn, dpm]) {
         let mut config = config.clone();
         if args.config.is_none() {
             config.tracker.two_stage = Some(two_stage);
         }
         println!("\n{set}, {detections}            HOTA   IDF1   MOTA   IDSW    FP     FN");
-        let mut folders: Vec<PathBuf> = std::fs::read_dir(args.data.join(set))?
-            .flatten()
-            .map(|e| e.path())
-            .filter(|p| p.join(detections).exists())
-            .collect();
-        folders.sort();
         let (mut ours, mut peers) = (Vec::new(), Vec::new());
-        for folder in &folders {
-            let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let truth = read(&folder.join("gt.txt"), Some(Format::Mot), ReadOptions::default(), false)?.table;
-            let result = tracked(&config, &folder.join(detections)).with_context(|| name.clone())?;
+        for folder in &sequences(&args.data.join(set), detections) {
+            let name = name_of(folder);
+            let truth = table(&folder.join("gt.txt"))?;
+            let scans = read_detections(&folder.join(detections), &config.input.table)?.scans;
+            let result = tracked(&config.tracker, &scans).with_context(|| name.clone())?;
             if let Some(out) = &args.out {
                 write(&out.join(format!("{name}.txt")), &result)?;
             }
             ours.push(judged(&truth, &result, rules)?);
             print_row(&format!("{name:16} boresight"), &ours[ours.len() - 1]);
-            let beside = peer.map(|p| folder.join(p)).or_else(|| Some(args.sort.as_ref()?.join(format!("{name}.txt"))));
-            if let Some(peer) = beside {
-                let result = read(&peer, Some(Format::Mot), ReadOptions::default(), false);
-                let result = result.with_context(|| peer.display().to_string())?.table;
-                peers.push(judged(&truth, &result, rules)?);
+            if let Some(peer) = sort_of(folder, args.sort.as_deref()) {
+                peers.push(judged(&truth, &table(&peer)?, rules)?);
                 print_row(&format!("{:16} SORT", ""), &peers[peers.len() - 1]);
             }
         }
@@ -80,25 +68,6 @@ pub fn run(args: &Args) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Runs the tracker over a detection file; rows are confirmed tracks with a detection in the frame.
-fn tracked(config: &Config, detections: &Path) -> Result<TrackTable> {
-    let mut tracker = track::build(&config.tracker)?;
-    let table = read_detections(detections, &config.input.table)?;
-    let mut rows = Vec::new();
-    for scan in &table.scans {
-        for s in tracker.step(scan)?.iter().filter(|s| s.status == TrackStatus::Confirmed) {
-            let bbox = mot_box_of_extent(&s.extent);
-            rows.push(TrackRow { frame: scan.index.0 as u32, id: s.id.0 as i64, bbox, ..TrackRow::default() });
-        }
-    }
-    Ok(TrackTable::from_rows("boresight", PixelOrigin::Pixel1, rows)?)
-}
-
-fn judged(truth: &TrackTable, result: &TrackTable, rules: Rules) -> Result<MotScores> {
-    let (truth, result) = preprocess(truth, result, rules)?;
-    Ok(mot_scores(&truth, &result, &MatchOptions::default())?)
 }
 
 fn print_row(name: &str, s: &MotScores) {

@@ -28,10 +28,16 @@ pub struct Args {
     /// Changes of the configuration chosen, as with `boresight track --set`; nothing is written then.
     #[arg(long = "set")]
     sets: Vec<String>,
+    /// Folder with SORT's tracks (`MOT17-02.txt` ...), made by `scripts/sort_peer.py`.
+    #[arg(long)]
+    sort: Option<PathBuf>,
+    /// Print each false track: frames, first and last position.
+    #[arg(long)]
+    list_false: bool,
 }
 
-const HEAD: &str = "| clip | half | contrast | held | precision | IDF1 | ids a target | false tracks | NIS | ms a frame |\n\
-                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+const HEAD: &str = "| clip | half | contrast | held | precision | IDF1 | ids a target | false tracks | error px | NIS | ms a frame |\n\
+                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 fn percent(v: Option<f64>) -> String {
     v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{:.1} %", 100.0 * v))
@@ -39,14 +45,15 @@ fn percent(v: Option<f64>) -> String {
 
 fn row(clip: &Clip, half: char, s: &Score) -> String {
     format!(
-        "| {} | {half} | {} | {} | {} | {} | {:.1} | {} | {:.2} | {:.1} |\n",
+        "| {} | {half} | {} | {} | {} | {} | {:.1} | {} | {:.2} | {:.2} | {:.1} |\n",
         clip.name,
         clip.contrast.map_or("-".into(), |c| format!("{c:.1}")),
         percent(Some(s.held)),
         percent(s.precision),
         percent(s.idf1),
         s.ids_a_target,
-        s.n_false.map_or("-".into(), |n| n.to_string()),
+        s.false_tracks.as_ref().map_or("-".into(), |f| f.len().to_string()),
+        s.error_px,
         s.nis,
         s.ms_a_frame
     )
@@ -64,7 +71,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 fn summary(kind: &str, half: char, scores: &[&(Clip, char, Score)]) -> String {
     let visible = |c: &Clip| c.contrast.is_none_or(|c| c > 3.0);
     let minutes: f64 = scores.iter().map(|s| s.2.minutes).sum();
-    let n_false: usize = scores.iter().filter_map(|s| s.2.n_false).sum();
+    let n_false: usize = scores.iter().filter_map(|s| Some(s.2.false_tracks.as_ref()?.len())).sum();
     let honest = scores.iter().filter(|s| (1.6..=2.4).contains(&s.2.nis)).count();
     format!(
         "| {kind} | {half} | {} | {} | {} | {} | {:.1} | {:.2} | {honest} of {} | {:.1} |\n",
@@ -99,6 +106,9 @@ pub fn run(args: &Args) -> Result<()> {
         if !args.only.is_empty() {
             println!("    {}", s.chosen);
         }
+        if args.list_false {
+            s.false_tracks.iter().flatten().for_each(|t| println!("    {t}"));
+        }
         text += &row;
         done.push((clip, half, s));
     }
@@ -120,7 +130,7 @@ pub fn run(args: &Args) -> Result<()> {
     let mut closing = String::new();
     writeln!(closing, "\nMean NIS within 1.6 to 2.4 on {n_honest} of {} clips.", done.len())?;
     print!("\n{head}{closing}");
-    let tables = tables::run(&data, &args.only)?;
+    let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
     print!("\n{tables}");
     if args.only.is_empty() && args.sets.is_empty() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
@@ -134,5 +144,5 @@ const INTRODUCTION: &str = "# The exam\n\n\
     Clips of a kind belong in turns to half A and half B: a figure that differs between the halves is a warning that it was fitted.\n\n\
     *Held*: share of the truth's rows with a reported track near (in the box grown by 3 px, 5 px in visible light; within 30 px for people and cells, 15 for the mouse, 10 for \
     the car, 3 for particles). *False*: reported tracks that are near a target in fewer than half of their rows. *Contrast*: height of the target over the deviation of \
-    its surroundings, median over the clip. *NIS*: mean normalised innovation squared of reported tracks; 2 if the filter's covariances are true. \
+    its surroundings, median over the clip. *Error*: median distance of the nearest reported track from a held target, box centre or point. *NIS*: mean normalised innovation squared of reported tracks; 2 if the filter's covariances are true. \
     The car's truth holds one car of many, so nothing can be called false there.\n\n";

@@ -48,8 +48,10 @@ pub struct Score {
     pub idf1: Option<f64>,
     /// Reported tracks that are a target's in half of their rows or more, per target.
     pub ids_a_target: f64,
-    /// Other reported tracks.
-    pub n_false: Option<usize>,
+    /// The other reported tracks, in words.
+    pub false_tracks: Option<Vec<String>>,
+    /// Median distance of the nearest reported track from a held target, px.
+    pub error_px: f64,
     pub minutes: f64,
     /// Mean normalised innovation squared: 2 is honest.
     pub nis: f64,
@@ -85,11 +87,12 @@ pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
     let near = nearness(&truth, &seen.rows, clip.near);
     let n_targets = truth.iter().map(|r| r.id).collect::<BTreeSet<_>>().len().max(1);
     Ok(Score {
-        held: near.n_held as f64 / truth.len().max(1) as f64,
+        held: near.errors.len() as f64 / truth.len().max(1) as f64,
         precision: clip.whole.then(|| near.n_near as f64 / seen.rows.len().max(1) as f64),
         idf1: if clip.whole { Some(idf1(&truth, seen.rows, clip.near)?) } else { None },
         ids_a_target: near.n_true_tracks as f64 / n_targets as f64,
-        n_false: clip.whole.then_some(near.n_false_tracks),
+        false_tracks: clip.whole.then_some(near.false_tracks),
+        error_px: median(near.errors),
         minutes: summary.duration_s / 60.0,
         nis: seen.nis_sum / seen.n_nis as f64,
         ms_a_frame,
@@ -97,11 +100,17 @@ pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
     })
 }
 
+fn median(mut v: Vec<f64>) -> f64 {
+    v.sort_by(f64::total_cmp);
+    v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
 struct Nearness {
-    n_held: usize,
+    /// Of each held target in each frame, px.
+    errors: Vec<f64>,
     n_near: usize,
     n_true_tracks: usize,
-    n_false_tracks: usize,
+    false_tracks: Vec<String>,
 }
 
 fn is_near(r: &TrackRow, t: &TrackRow, near: Near) -> bool {
@@ -127,28 +136,40 @@ fn at<'a, 'r>(rows: &'a BTreeMap<u32, Vec<&'r TrackRow>>, frame: u32) -> &'a [&'
 /// Who is near whom, without pairing one to one: a second track on one target is no false one, it costs IDF1.
 fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
     let (results, truths) = (by_frame(result), by_frame(truth));
-    let n_held = truth.iter().filter(|t| at(&results, t.frame).iter().any(|r| is_near(r, t, near))).count();
-    let mut tracks: BTreeMap<i64, (usize, usize)> = BTreeMap::new();
-    let mut n_near = 0;
+    let distance = |r: &TrackRow, t: &TrackRow| (r.bbox[0] - t.bbox[0]).hypot(r.bbox[1] - t.bbox[1]);
+    let nearest = |t: &TrackRow| {
+        let here = at(&results, t.frame).iter().filter(|r| is_near(r, t, near));
+        here.map(|r| distance(r, t)).min_by(f64::total_cmp)
+    };
+    let errors = truth.iter().filter_map(nearest).collect();
+    let mut tracks: BTreeMap<i64, (usize, Vec<&TrackRow>)> = BTreeMap::new();
     for r in result {
         let hit = at(&truths, r.frame).iter().any(|t| is_near(r, t, near));
-        n_near += usize::from(hit);
         let track = tracks.entry(r.id).or_default();
-        *track = (track.0 + usize::from(hit), track.1 + 1);
+        track.0 += usize::from(hit);
+        track.1.push(r);
     }
-    let n_true_tracks = tracks.values().filter(|(hits, n)| 2 * hits >= *n).count();
-    Nearness { n_held, n_near, n_true_tracks, n_false_tracks: tracks.len() - n_true_tracks }
+    let n_near = tracks.values().map(|t| t.0).sum();
+    let (true_tracks, false_tracks): (Vec<_>, Vec<_>) =
+        tracks.iter().partition(|(_, (hits, rows))| 2 * hits >= rows.len());
+    let in_words = |(id, (_, rows)): (&i64, &(usize, Vec<&TrackRow>))| {
+        let place = |r: &TrackRow| format!("frame {} ({:.0}, {:.0})", r.frame, r.bbox[0], r.bbox[1]);
+        let ends = rows.first().zip(rows.last()).map(|(a, b)| format!("{} to {}", place(a), place(b)));
+        format!("false track {id}: {}", ends.unwrap_or_default())
+    };
+    Nearness {
+        errors,
+        n_near,
+        n_true_tracks: true_tracks.len(),
+        false_tracks: false_tracks.into_iter().map(in_words).collect(),
+    }
 }
 
 /// IDF1 by positions; a target's reach is one for the whole clip: half the median diagonal of its boxes and what they grow by.
 fn idf1(truth: &[TrackRow], result: Vec<TrackRow>, near: Near) -> Result<f64> {
     let reach = match near {
         Near::Px(px) => px,
-        Near::Box(px) => {
-            let mut diagonals: Vec<f64> = truth.iter().map(|t| t.bbox[2].hypot(t.bbox[3])).collect();
-            diagonals.sort_by(f64::total_cmp);
-            0.5 * diagonals.get(diagonals.len() / 2).copied().unwrap_or(0.0) + px
-        }
+        Near::Box(px) => 0.5 * median(truth.iter().map(|t| t.bbox[2].hypot(t.bbox[3])).collect()) + px,
     };
     let point = |r: &TrackRow| TrackRow { bbox: [r.bbox[0], r.bbox[1], 0.0, 0.0], ..*r };
     let truth = TrackTable::from_rows("truth", PixelOrigin::Centre0, truth.iter().map(point))?;

@@ -4,7 +4,7 @@
 use super::Detector;
 use super::background::{Background, FrameDifference};
 use super::cfar::CfarDetector;
-use super::colour::{ColourMask, grey_image};
+use super::colour::{ColourMask, grey_image, needs_colour};
 use super::config::DetectorConfig;
 use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
@@ -26,9 +26,7 @@ use crate::{Detection, Error, ErrorKind, Frame, Image, PixelKind, Pixels, Result
 pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Detector>> {
     config.validate("detector")?;
     if matches!(config.threshold, ThresholdConfig::Colour(_)) && source.kind != PixelKind::Rgb8 {
-        return Err(Error::new(ErrorKind::Config, format!("expected colour frames, found {:?}", source.kind))
-            .at("detector.threshold.colour")
-            .hint("--set input.colour=rgb reads a video in colour; grey pictures have none"));
+        return Err(needs_colour(&format!("{:?}", source.kind)));
     }
     let detector = Box::new(FrameDetector::new(config, source)?);
     Ok(match config.camera {

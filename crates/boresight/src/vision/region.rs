@@ -1,6 +1,7 @@
 //! A region: what is kept of a cluster of pixels while rows go by, enough for its centroid and that centroid's covariance.
 
 use super::pixel::{Pixel, RunSums};
+use crate::Extent;
 use crate::union_find::Node;
 
 /// Moments of a cluster of pixels. Coordinates are whole pixels; sums of whole-number pixels are exact.
@@ -64,6 +65,16 @@ impl Node for Region {
 }
 
 impl Region {
+    /// The box around its pixels.
+    pub fn extent(&self) -> Extent {
+        Extent {
+            left_px: f64::from(self.left) - 0.5,
+            top_px: f64::from(self.top) - 0.5,
+            width_px: f64::from(self.right - self.left + 1),
+            height_px: f64::from(self.bottom - self.top + 1),
+        }
+    }
+
     /// The moments of the run of pixels `start..=end` of row `y`.
     #[inline(always)]
     pub(crate) fn of_run<T: Pixel>(parent: u32, y: u32, start: u32, end: u32, row: &[T]) -> Self {

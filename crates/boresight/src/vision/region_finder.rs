@@ -8,7 +8,7 @@ use super::region::Region;
 use super::segmenter::{PixelWeight, Regions, Segmenter};
 use super::target_finder::{PixelNoise, TargetFinder, TypedFrame};
 use super::threshold::BackgroundGrid;
-use crate::{Detection, Extent, Image, Result};
+use crate::{Detection, Image, Result};
 
 /// Cells of the background when the segmentation itself does not name a size, px.
 const DEFAULT_CELL_PX: u32 = 32;
@@ -92,12 +92,7 @@ fn detection<T: Pixel>(
     Detection {
         position: c.position,
         cov: c.cov,
-        extent: Extent {
-            left_px: f64::from(r.left) - 0.5,
-            top_px: f64::from(r.top) - 0.5,
-            width_px: f64::from(r.right - r.left + 1),
-            height_px: f64::from(r.bottom - r.top + 1),
-        },
+        extent: r.extent(),
         area_px: r.area,
         peak: if dark { r.min } else { r.max },
         sum: c.sum,

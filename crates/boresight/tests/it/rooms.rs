@@ -2,6 +2,7 @@
 //! ARCHITECTURE.md. No room uses what joins the rooms, and no files import each other in a circle.
 
 mod imports;
+mod tokens;
 
 use imports::Crate;
 use std::collections::{BTreeMap, BTreeSet};

@@ -7,30 +7,35 @@
 use crate::track::association_cost::iou;
 use crate::{Detection, Scan};
 
-/// Least overlap of two linked boxes, intersection over union: half of the box in common, an eighth moved away on each side.
+/// Least overlap of two linked boxes, intersection over union: that of a box and itself moved by 0.54 of its side.
 const MIN_OVERLAP: f64 = 0.3;
 /// Time over which a box's errors are one error: a detector's box wanders with the pose and the light, not from frame to frame, s.
 const WANDER_S: f64 = 0.15;
 /// Time over which a target's own manoeuvre shows, s.
 const MANOEUVRE_S: f64 = 0.5;
-/// Pairs of boxes compared at most: a second of work; what comes after is not looked at.
+/// Longest step that is linked, scan intervals: over a gap two boxes may be two targets'.
+const MAX_INTERVALS: f64 = 1.5;
+/// Pairs of boxes compared at most, a guard of time; what comes after is not looked at.
 const MAX_COMPARED: usize = 20_000_000;
+/// Detections at most that are followed for motion: the deviation of a 95 % point is then below half a percent.
+const MAX_FOLLOWED: usize = 50_000;
 
 /// Links from every looked-at scan to the next: the place there of each detection, or none.
 pub(super) struct Links<'a> {
     scans: &'a [Scan],
+    interval_s: f64,
     next: Vec<Vec<Option<u32>>>,
 }
 
 /// What the links of a table say, in units of a box height h.
 pub(super) struct Motion {
-    /// Deviation of a detection's centre, h.
-    pub(super) noise: f64,
+    /// Deviation of a detection's centre beyond its stated covariance, h.
+    pub(super) extra_noise: f64,
     /// Deviation of a target's acceleration from scan to scan, h/s².
     pub(super) acceleration_per_s2: f64,
     /// Deviation of a target's velocity per axis, px/s.
     pub(super) speed_std_px_per_s: f64,
-    /// Speed that one target in a thousand exceeds, px/s.
+    /// Speed that one step in a thousand exceeds, px/s.
     pub(super) fastest_px_per_s: f64,
     /// Share of linked detections that go on in the next scan.
     pub(super) p_detection: f64,
@@ -39,14 +44,19 @@ pub(super) struct Motion {
 }
 
 impl<'a> Links<'a> {
-    pub(super) fn of(scans: &'a [Scan]) -> Self {
+    /// Links the boxes of scans that lie `interval_s` apart, but for gaps.
+    pub(super) fn of(scans: &'a [Scan], interval_s: f64) -> Self {
         let mut next = Vec::new();
         let mut compared = 0;
         for pair in scans.windows(2) {
             let (a, b) = (&pair[0].detections, &pair[1].detections);
-            compared += a.len() * b.len();
+            compared += a.len().saturating_mul(b.len());
             if compared > MAX_COMPARED {
                 break;
+            }
+            if pair[1].time.seconds_since(pair[0].time) > MAX_INTERVALS * interval_s {
+                next.push(vec![None; a.len()]);
+                continue;
             }
             let best = |of: &Detection, among: &[Detection]| {
                 let overlaps = among.iter().map(|d| iou(&of.extent, &d.extent));
@@ -57,7 +67,7 @@ impl<'a> Links<'a> {
             let mutual = forward.enumerate().map(|(i, j)| j.filter(|&j| best(&b[j], a) == Some(i)).map(|j| j as u32));
             next.push(mutual.collect());
         }
-        Self { scans, next }
+        Self { scans, interval_s, next }
     }
 
     /// Score of each detection that has a scan before and behind it, and whether it is linked to both.
@@ -82,21 +92,25 @@ impl<'a> Links<'a> {
     /// With noise σ in each centre and an acceleration of deviation a, new in every scan, the second difference over `l` scans has the
     /// variance 6 σ² + a² Δt⁴ (2 l³ + l) / 3: two lags give both. The shorter is that over which a box's own errors change, the longer
     /// that over which a manoeuvre shows. Deviations are 95 % points, so that a wrong link in twenty counts little.
-    pub(super) fn motion(&self, min_score: f32, interval_s: f64) -> Option<Motion> {
+    pub(super) fn motion(&self, min_score: f32) -> Option<Motion> {
+        let interval_s = self.interval_s;
         let scans_in = |seconds: f64| (seconds / interval_s).round().clamp(1.0, 1000.0) as usize;
         let near_lag = scans_in(WANDER_S);
         let far_lag = scans_in(MANOEUVRE_S).max(near_lag + 1);
         let (mut near, mut far, mut speeds) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut n_before, mut n_through) = (0usize, 0usize);
-        for t in 0..self.next.len() {
+        let (mut n_before, mut n_through, mut stated2) = (0usize, 0usize, 0.0);
+        let n_detections: usize = self.scans.iter().map(|s| s.detections.len()).sum();
+        for t in (0..self.next.len()).step_by(n_detections.div_ceil(MAX_FOLLOWED).max(1)) {
             for (i, d) in self.scans[t].detections.iter().enumerate().filter(|(_, d)| d.score >= min_score) {
                 let height = d.extent.height_px;
                 if !(height > 0.0 && height.is_finite()) {
                     continue;
                 }
                 let Some(j) = self.follow(t, i, 1) else { continue };
-                let step = self.scans[t + 1].detections[j].position - d.position;
-                speeds.push(step.norm() / interval_s);
+                let (here, then) = (&self.scans[t], &self.scans[t + 1]);
+                let step = then.detections[j].position - d.position;
+                speeds.push(step.norm() / then.time.seconds_since(here.time));
+                stated2 += 0.5 * d.cov.trace() / (height * height);
                 if t + 1 < self.next.len() {
                     n_before += 1;
                     n_through += usize::from(self.follow(t + 1, j, 1).is_some());
@@ -117,12 +131,14 @@ impl<'a> Links<'a> {
         let growth = |lag: usize| (2.0 * (lag as f64).powi(3) + lag as f64) / 3.0 * interval_s.powi(4);
         let (v1, v2) = (deviation(&mut near).powi(2), deviation(&mut far).powi(2));
         let (g1, g2) = (growth(near_lag), growth(far_lag));
-        let acceleration2 = ((v2 - v1) / (g2 - g1)).max(0.0);
-        let noise = ((v1 - acceleration2 * g1).max(0.1 * v1) / 6.0).sqrt();
-        let acceleration = acceleration2.sqrt();
+        // A 95 % point of n normal numbers is known to 0.95/√n of itself: a smaller growth than twice that, squared, is not seen.
+        let unseen = 4.0 * 0.95 / (far.len() as f64).sqrt() * v2 / g2;
+        let acceleration2 = ((v2 - v1) / (g2 - g1)).max(unseen);
+        // Errors of `near_lag` scans are one error, where the filter takes each for a new one: this white noise averages as slowly.
+        let noise2 = near_lag as f64 * (v1 - acceleration2 * g1).max(0.0) / 6.0;
         Some(Motion {
-            noise,
-            acceleration_per_s2: acceleration,
+            extra_noise: (noise2 - stated2 / speeds.len() as f64).max(0.0).sqrt(),
+            acceleration_per_s2: acceleration2.sqrt(),
             // The median of a length of two normal coordinates is 1.177 deviations.
             speed_std_px_per_s: quantile(&mut speeds, 0.5) / 1.177,
             fastest_px_per_s: quantile(&mut speeds, 0.999),
@@ -178,10 +194,28 @@ mod tests {
                 scan
             })
             .collect();
-        let m = Links::of(&scans).motion(f32::NEG_INFINITY, dt).unwrap();
-        assert!((m.noise * height / sigma - 1.0).abs() < 0.1, "{}", m.noise * height);
+        let m = Links::of(&scans, dt).motion(f32::NEG_INFINITY).unwrap();
+        // What the detections state themselves, 1 px, is no extra noise.
+        let noise = (m.extra_noise * height).hypot(1.0);
+        assert!((noise / sigma - 1.0).abs() < 0.1, "{noise}");
         assert!((m.acceleration_per_s2 * height / a - 1.0).abs() < 0.25, "{}", m.acceleration_per_s2 * height);
         assert!((m.p_detection - 0.95).abs() < 0.01, "{}", m.p_detection);
         assert!(m.fastest_px_per_s > m.speed_std_px_per_s && m.n_steps > 3000);
+    }
+
+    #[test]
+    fn no_link_leaps_over_a_gap() {
+        let boxed = |k: i64| Scan {
+            time: Timestamp::from_ns(k * 40_000_000),
+            detections: vec![Detection::at(Vector2::zeros(), Matrix2::identity()).with_extent(Extent::around(
+                Vector2::zeros(),
+                30.0,
+                80.0,
+            ))],
+            ..Scan::default()
+        };
+        let scans: Vec<Scan> = [0, 1, 2, 5, 6].map(boxed).into();
+        let supported: Vec<bool> = Links::of(&scans, 0.04).supported().iter().map(|s| s.1).collect();
+        assert_eq!(supported, [true, false, false]);
     }
 }

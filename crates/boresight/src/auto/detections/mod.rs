@@ -20,7 +20,9 @@ use scores::Calibration;
 const INITIATES: f64 = 0.5;
 /// With at least this one it may continue a track: the track's own prediction speaks for it as well.
 const CONTINUES: f64 = 0.1;
-/// The largest speed over that which one step in a thousand exceeds: steps of the whole table are not all those of its targets.
+/// Acceleration of things without height, px/s², of which the tracker wants more than 0: nothing beside any target's.
+const NO_ACCELERATION_PX_PER_S2: f64 = 0.01;
+/// The largest speed over the one that one step in a thousand exceeds: there are faster targets than those that were seen.
 const SPEED_RESERVE: f64 = 1.5;
 
 /// Writes the tracker's configuration for a table of detections.
@@ -36,15 +38,15 @@ pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons
     let tracker = &mut config.tracker;
     // One size for all is the reader's own, for points.
     let boxes = sides.first() < sides.last();
-    let links = boxes.then(|| Links::of(scans));
+    let links = boxes.then(|| Links::of(scans, 1.0 / rate));
     let calibration = links.as_ref().and_then(|l| Calibration::of(l.supported()));
     let high_score = calibration.as_ref().map_or(f32::NEG_INFINITY, |c| c.score_at(INITIATES));
-    if let Some(motion) = links.and_then(|l| l.motion(high_score, 1.0 / rate)) {
+    if let Some(motion) = links.and_then(|l| l.motion(high_score)) {
         for_boxes(tracker, &motion);
         reasons.push(format!(
-            "{} steps of boxes that overlap: centres to {:.3} of a box height, acceleration {:.2} heights/s², speeds to {:.0} px/s, {:.0} % go on.",
+            "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration {:.2} heights/s², speeds to {:.0} px/s, {:.0} % go on.",
             motion.n_steps,
-            motion.noise,
+            motion.extra_noise,
             motion.acceleration_per_s2,
             motion.fastest_px_per_s,
             100.0 * motion.p_detection
@@ -72,8 +74,11 @@ pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons
 
 /// Boxes of an object detector: every number in heights and seconds, as measured; boxes must overlap to be one target's.
 fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion) {
-    tracker.extra_noise_per_height = round(motion.noise);
+    tracker.extra_noise_per_height = round(motion.extra_noise);
     tracker.acceleration_per_height_per_s2 = round(motion.acceleration_per_s2);
+    // All of both was measured in heights.
+    tracker.extra_noise_px = 0.0;
+    tracker.acceleration_std_px_per_s2 = NO_ACCELERATION_PX_PER_S2;
     tracker.max_speed_px_per_s = round(SPEED_RESERVE * motion.fastest_px_per_s).max(1.0);
     tracker.detection_probability = round(motion.p_detection.clamp(0.1, 0.99));
     tracker.initiation =

@@ -8,6 +8,13 @@ use crate::vision::target_finder::TypedFrame;
 use crate::vision::threshold::BackgroundGrid;
 use crate::{Error, ErrorKind, Image, Result};
 
+/// Frames without colour were given, `found` in words.
+pub(crate) fn needs_colour(found: &str) -> Error {
+    Error::new(ErrorKind::Config, format!("expected colour frames, found {found}"))
+        .at("detector.threshold.colour")
+        .hint("--set input.colour=rgb reads a video in colour; grey pictures have none")
+}
+
 /// Finds the pixels of a colour in whole frames; keeps its memory.
 #[derive(Clone, Debug)]
 pub(crate) struct ColourMask {
@@ -41,9 +48,7 @@ impl<T: Pixel> Segmenter<T> for ColourMask {
 
     fn segment(&mut self, frame: &TypedFrame<T>, _: &BackgroundGrid, regions: &mut Regions) -> Result<Option<f64>> {
         let Some(colours) = frame.colours else {
-            return Err(Error::new(ErrorKind::Config, "expected colour frames, found grey ones")
-                .at("detector.threshold.colour")
-                .hint("--set input.colour=rgb reads a video in colour; grey pictures have none"));
+            return Err(needs_colour("grey ones"));
         };
         self.update(colours);
         mask_rows(&self.bits, frame.image, &mut regions.bright);

@@ -9,7 +9,7 @@ mod mask;
 mod reference;
 
 pub use hsi::{Hsi, distance, grey, grey_image, hsi};
-pub(super) use mask::ColourMask;
+pub(super) use mask::{ColourMask, needs_colour};
 pub use reference::{Reference, choose_reference};
 
 use crate::Result;

@@ -27,7 +27,7 @@ use crate::vision::strongest::Strongest;
 use crate::vision::target_finder::{TargetFinder, TypedFrame};
 use crate::vision::threshold::band::words;
 use crate::vision::threshold::{Polarity, Side};
-use crate::{Detection, Extent, Image, Result};
+use crate::{Detection, Image, Result};
 
 /// Finds isolated blobs; keeps its memory between frames.
 #[derive(Debug)]
@@ -177,12 +177,7 @@ fn detection<T: Pixel>(
     Some(Detection {
         position: c.position,
         cov: c.cov,
-        extent: Extent {
-            left_px: f64::from(region.left) - 0.5,
-            top_px: f64::from(region.top) - 0.5,
-            width_px: f64::from(region.right - region.left + 1),
-            height_px: f64::from(region.bottom - region.top + 1),
-        },
+        extent: region.extent(),
         area_px: region.area,
         peak: if side == Side::Bright { region.max } else { region.min },
         sum: c.sum,
