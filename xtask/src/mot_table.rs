@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<()> {
         for folder in &sequences(&args.data.join(set), detections) {
             let name = name_of(folder);
             let truth = table(&folder.join("gt.txt"))?;
-            let scans = read_detections(&folder.join(detections), &config.input.table)?.scans;
+            let scans = read_detections(folder.join(detections), &config.input.table)?.scans;
             let result = tracked(&config.tracker, &scans).with_context(|| name.clone())?;
             if let Some(out) = &args.out {
                 write(&out.join(format!("{name}.txt")), &result)?;

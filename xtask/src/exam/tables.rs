@@ -25,7 +25,7 @@ pub fn run(data: &Path, only: &str, sort: Option<&Path>) -> Result<String> {
             if !folder.display().to_string().contains(only) {
                 continue;
             }
-            let read = read_detections(&folder.join(detections), &TableOptions::default())?;
+            let read = read_detections(folder.join(detections), &TableOptions::default())?;
             let mut config = Config::default();
             auto::for_detections(&read.scans, read.rate_hz, &mut config, &mut Vec::new());
             let truth = table(&folder.join("gt.txt"))?;

@@ -195,9 +195,11 @@ mod tests {
             })
             .collect();
         let m = Links::of(&scans, dt).motion(f32::NEG_INFINITY).unwrap();
-        // What the detections state themselves, 1 px, is no extra noise.
+        // What the detections state themselves, 1 px, is no extra noise. Errors are taken to last `WANDER_S`: as if new in every scan,
+        // they weigh as the noise whose mean over so many scans has their variance.
+        let lag = (WANDER_S / dt).round();
         let noise = (m.extra_noise * height).hypot(1.0);
-        assert!((noise / sigma - 1.0).abs() < 0.1, "{noise}");
+        assert!((noise / (sigma * lag.sqrt()) - 1.0).abs() < 0.1, "{noise}");
         assert!((m.acceleration_per_s2 * height / a - 1.0).abs() < 0.25, "{}", m.acceleration_per_s2 * height);
         assert!((m.p_detection - 0.95).abs() < 0.01, "{}", m.p_detection);
         assert!(m.fastest_px_per_s > m.speed_std_px_per_s && m.n_steps > 3000);
