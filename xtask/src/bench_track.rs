@@ -96,7 +96,7 @@ fn scene(n: usize, clutter: f64) -> Result<Scene> {
 /// The tracker of the bench: existence by odds, two-point starts with a spread of velocities.
 pub fn tracker_config(clutter_density: f64, associator: AssociatorConfig) -> TrackerConfig {
     TrackerConfig {
-        acceleration_std_px_per_s2: 0.1,
+        acceleration_std_px_per_s2: Some(0.1),
         extra_noise_px: 0.0,
         gate_probability: 0.9999,
         max_speed_px_per_s: 8.0,

@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn methods(p_d: f64, lambda: f64) -> Vec<TrackerConfig> {
     let base = TrackerConfig {
-        acceleration_std_px_per_s2: 0.05,
+        acceleration_std_px_per_s2: Some(0.05),
         extra_noise_px: 0.0,
         max_speed_px_per_s: 10.0,
         gate_within_max_speed: false,

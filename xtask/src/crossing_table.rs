@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn methods() -> Vec<(&'static str, TrackerConfig)> {
     let base = TrackerConfig {
-        acceleration_std_px_per_s2: 1e-3f64.sqrt(),
+        acceleration_std_px_per_s2: Some(1e-3f64.sqrt()),
         extra_noise_px: 0.5f64.sqrt(),
         max_speed_px_per_s: 2.0,
         gate_within_max_speed: false,

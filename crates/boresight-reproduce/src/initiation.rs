@@ -49,7 +49,7 @@ pub fn paper_detector(size_limits: bool) -> DetectorConfig {
 /// The tracker of `docs/theory/track-management.md` at one scan a second.
 pub fn paper_tracker() -> TrackerConfig {
     TrackerConfig {
-        acceleration_std_px_per_s2: 1e-3f64.sqrt(),
+        acceleration_std_px_per_s2: Some(1e-3f64.sqrt()),
         extra_noise_px: 0.5f64.sqrt(),
         max_speed_px_per_s: 2.0,
         confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, tentative_s: 1e9 }),
@@ -62,7 +62,7 @@ pub fn paper_tracker() -> TrackerConfig {
 /// The same with Q = 1e-5 and the papers' known start, one step before the first scan.
 pub fn known_start_tracker() -> TrackerConfig {
     TrackerConfig {
-        acceleration_std_px_per_s2: 1e-5f64.sqrt(),
+        acceleration_std_px_per_s2: Some(1e-5f64.sqrt()),
         initial_tracks: vec![InitialTrackConfig {
             // The papers count pixels from 1.
             position_px: [PAPER_START[0] - 1.0, PAPER_START[2] - 1.0],

@@ -50,7 +50,7 @@ fn scans(n: usize) -> Vec<Scan> {
 
 fn config(associator: AssociatorConfig) -> TrackerConfig {
     TrackerConfig {
-        acceleration_std_px_per_s2: 0.1,
+        acceleration_std_px_per_s2: Some(0.1),
         extra_noise_px: 0.0,
         max_speed_px_per_s: 8.0,
         clutter_density_per_px2: 3e-5,

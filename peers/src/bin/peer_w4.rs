@@ -65,7 +65,7 @@ fn load(message: &serde_json::Value) -> Result<Box<dyn Job>, Fault> {
         points.get_mut(r[0] as usize).ok_or("frame beyond the last")?.push(Vector2::new(r[1], r[2]));
     }
     let mut config = TrackerConfig {
-        acceleration_std_px_per_s2: 0.1,
+        acceleration_std_px_per_s2: Some(0.1),
         extra_noise_px: 0.0,
         max_speed_px_per_s: 8.0,
         detection_probability: parameter("pd").unwrap_or(0.9),

@@ -2,7 +2,7 @@
 
 use boresight::io::{TableOptions, TracksCsv, read_tracks};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod};
-use boresight::track::smooth_table;
+use boresight::track::{AccelerationNoise, smooth_table};
 use boresight::{Config, Scan, Sink, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -32,12 +32,12 @@ pub struct Args {
     /// The smoothed table.
     #[arg(short, long, default_value = "smoothed.csv")]
     output: PathBuf,
-    /// Standard deviation of the acceleration, px/s²; that of config.toml beside the table if absent.
-    #[arg(long, value_name = "PX/S2")]
+    /// Power density of the white acceleration, px²/s³; that of config.toml beside the table if absent.
+    #[arg(long, value_name = "PX2/S3")]
+    acceleration_density: Option<f64>,
+    /// Discrete noise instead: standard deviation of an acceleration that is constant between two rows, px/s².
+    #[arg(long, value_name = "PX/S2", conflicts_with = "acceleration_density")]
     acceleration: Option<f64>,
-    /// White noise in continuous time with the density acceleration² times this, s; discrete noise if absent.
-    #[arg(long, value_name = "S")]
-    hold_s: Option<f64>,
     /// How it is computed.
     #[arg(long, value_enum, default_value = "rts", conflicts_with = "lag")]
     method: Method,
@@ -101,20 +101,21 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     let mut config = SmoothConfig::default();
     let beside = args.tracks.with_file_name("config.toml");
     if let Some(std) = args.acceleration {
-        config.acceleration_std_px_per_s2 = std;
+        config.acceleration = AccelerationNoise::Discrete(std);
+    } else if let Some(density) = args.acceleration_density {
+        config.acceleration = AccelerationNoise::Continuous(density);
     } else if own && beside.is_file() {
         let tracker = Config::from_file(&beside)?.tracker;
-        config.acceleration_std_px_per_s2 = tracker.acceleration_std_px_per_s2;
-        eprintln!("acceleration {} px/s², from {}", config.acceleration_std_px_per_s2, beside.display());
+        config.acceleration = tracker.acceleration_noise(0.0);
+        eprintln!("{}, from {}", config.acceleration, beside.display());
         if !tracker.filter.is_constant_velocity() {
             eprintln!(
                 "note: these tracks are of another model than constant velocity; their covariances become approximate"
             );
         }
     } else {
-        eprintln!("acceleration {} px/s², the tracker's default (--acceleration)", config.acceleration_std_px_per_s2);
+        eprintln!("{}, the tracker's default (--acceleration-density)", config.acceleration);
     }
-    config.hold_s = args.hold_s;
     config.method = match (args.lag, args.method) {
         (Some(lag), _) => SmoothMethod::FixedLag(lag),
         (None, Method::Rts) => SmoothMethod::Rts,

@@ -1,7 +1,7 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
 use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks};
-use boresight::track::{StitchConfig, join, with_empty_frames};
+use boresight::track::{AccelerationNoise, StitchConfig, join, with_empty_frames};
 use boresight::{Scan, Sink, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,9 +31,12 @@ pub struct Args {
     /// Fragments may overlap by this much, s.
     #[arg(long, default_value_t = StitchConfig::default().max_overlap_s)]
     max_overlap: f64,
-    /// Standard deviation of the targets' acceleration, px/s²; as in the tracker.
-    #[arg(long, default_value_t = StitchConfig::default().acceleration_std_px_per_s2)]
-    acceleration: f64,
+    /// Power density of the targets' white acceleration, px²/s³; as in the tracker.
+    #[arg(long, default_value_t = StitchConfig::default().acceleration.density(1.0))]
+    acceleration_density: f64,
+    /// Discrete noise instead: standard deviation of an acceleration that is constant during a gap, px/s².
+    #[arg(long, conflicts_with = "acceleration_density")]
+    acceleration: Option<f64>,
     /// Largest speed, px/s.
     #[arg(long, default_value_t = StitchConfig::default().max_speed_px_per_s)]
     max_speed: f64,
@@ -50,7 +53,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let config = StitchConfig {
         max_gap_s: args.max_gap,
         max_overlap_s: args.max_overlap,
-        acceleration_std_px_per_s2: args.acceleration,
+        acceleration: args
+            .acceleration
+            .map_or(AccelerationNoise::Continuous(args.acceleration_density), AccelerationNoise::Discrete),
         max_speed_px_per_s: args.max_speed,
         gate_probability: args.gate_probability,
     };

@@ -101,7 +101,7 @@ pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
     tracker.extra_noise_px = round((0.03 * side).max(0.5));
-    tracker.acceleration_std_px_per_s2 = round(0.06 * side / (interval_s * interval_s));
+    tracker.acceleration_density_px2_per_s3 = round((0.06 * side).powi(2) / interval_s.powi(3));
     tracker.max_speed_px_per_s = round(0.4 * side / interval_s);
     tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;

@@ -57,16 +57,16 @@ pub(super) fn choose_seen(
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
     if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
-        colour::configure(&reference, &scene, info, interval_s, &mut config, &mut reasons);
+        colour::configure(&reference, &scene, info, &mut config, &mut reasons);
     } else if moving::fits(&scene, info) {
-        moving::configure(&scene, info, interval_s, &mut config, &mut reasons);
+        moving::configure(&scene, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, &scene, info)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else if let Some(seen) = cells::look(frames, info)? {
         cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
         let evidence = spots::look(frames, info)?;
-        spots::configure(&evidence, info, interval_s, &mut config, &mut reasons);
+        spots::configure(&evidence, info, &mut config, &mut reasons);
     }
     Ok(Choice { config, reasons })
 }

@@ -38,7 +38,6 @@ pub fn configure(
     reference: &Reference,
     scene: &Scene,
     info: &SourceInfo,
-    interval_s: f64,
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) {
@@ -59,10 +58,10 @@ pub fn configure(
     config.detector.cluster.min_area_px = Some(round((0.15 * reference.area_px).max(6.0)) as u32);
     config.detector.cluster.distance_px = round((0.15 * side).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
-    super::moving::tracker(side, info, interval_s, &mut config.tracker);
+    super::moving::tracker(side, info, &mut config.tracker);
     let tracker = &mut config.tracker;
-    // A thrown thing: 1 g is 245 times the side of a ball of 4 cm a second squared, and a hand jerks as much.
-    tracker.acceleration_std_px_per_s2 = round((300.0 * side).max(0.2 / (interval_s * interval_s)));
+    // A thrown thing: 1 g is 245 times the side of a ball of 4 cm a second squared, and a hand jerks as much for 0.04 s.
+    tracker.acceleration_density_px2_per_s3 = round((60.0 * side).powi(2));
     tracker.max_speed_px_per_s = round(2.0 * info.width.max(info.height) as f64);
     // It comes into view at any speed up to that, and may be gone after ten frames.
     let velocity_std_px_per_s = round(tracker.max_speed_px_per_s / 3.0);

@@ -11,6 +11,7 @@ mod detections;
 mod digits;
 mod interval;
 mod moving;
+mod noise;
 mod open;
 mod particles;
 mod replay;

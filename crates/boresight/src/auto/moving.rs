@@ -41,7 +41,7 @@ pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
 }
 
 /// Writes detector and tracker.
-pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(scene: &Scene, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let [w, h] = scene.size_px;
     reasons.push(format!(
         "Fixed camera; in {} of {} frames looked at something moves: {:.1} regions a frame, median {w:.0} x {h:.0} px, of which {:.0} % are isolated \
@@ -67,7 +67,7 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
     // Parts of one thing lie nearer than a fifth of its shorter side.
     config.detector.cluster.distance_px = round((0.2 * w.min(h)).clamp(2.0, 12.0));
     config.detector.camera = CameraConfig::Fixed;
-    tracker(w.max(h), info, interval_s, &mut config.tracker);
+    tracker(w.max(h), info, &mut config.tracker);
     // People walk side by side for seconds.
     config.tracker.merged_measurements.max_secondary_s = 8.0;
     reasons.push(format!(
@@ -78,9 +78,9 @@ pub fn configure(scene: &Scene, info: &SourceInfo, interval_s: f64, config: &mut
 }
 
 /// The tracker for things whose outline changes: the noise grows with their size.
-pub(super) fn tracker(side_px: f64, info: &SourceInfo, interval_s: f64, tracker: &mut TrackerConfig) {
+pub(super) fn tracker(side_px: f64, info: &SourceInfo, tracker: &mut TrackerConfig) {
     *tracker = TrackerConfig::default();
-    tracker.acceleration_std_px_per_s2 = round((1.0 * side_px).max(0.02 / (interval_s * interval_s)));
+    tracker.acceleration_density_px2_per_s3 = round((0.2 * side_px).powi(2).max(1.0));
     tracker.extra_noise_px = round((0.05 * side_px).max(0.5));
     tracker.extra_noise_per_height = 0.03;
     tracker.max_speed_px_per_s = round(0.5 * info.width.max(info.height) as f64);

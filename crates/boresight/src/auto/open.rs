@@ -6,15 +6,19 @@
 //! 4. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
 use super::choose::{Choice, choose_seen};
+use super::noise;
 use super::replay::Replay;
 use super::scene::{self, Camera};
 use super::second_look;
 use crate::track::Tracking;
 use crate::vision::Detector;
-use crate::{Config, FrameSource, Result};
+use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
 
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
+
+/// Frames of the first pass that tells noise and motion.
+const LEARN_FRAMES: usize = 300;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
@@ -44,11 +48,44 @@ pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
     let scene = scene::look(frames.ahead(), &info)?;
     let look_again = scene.camera == Camera::Fixed && second_look::can_be_opened_twice(input);
     let second = if look_again { second_look::frames(input, base, PROBE_FRAMES) } else { Vec::new() };
-    let choice = choose_seen(frames.ahead(), scene, &second, &info, base)?;
+    let mut choice = choose_seen(frames.ahead(), scene, &second, &info, base)?;
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
     }
+    let scans = if second_look::can_be_opened_twice(input) {
+        let again = crate::io::open(input, &choice.config.input.open_options())?;
+        first_pass(again, &choice.config)?
+    } else {
+        detections(frames.ahead(), &choice.config, &info)?
+    };
+    let area_px2 = (info.width * info.height).max(1) as f64;
+    noise::learn(&scans, area_px2, &mut choice.config, &mut choice.reasons)?;
     Ok((frames, choice))
+}
+
+/// The detections of the first frames of a file; what cannot be read ends them.
+fn first_pass(mut source: Box<dyn FrameSource>, config: &Config) -> Result<Vec<Scan>> {
+    let mut detector = crate::vision::build(&config.detector, source.info())?;
+    let mut scans = Vec::new();
+    while scans.len() < LEARN_FRAMES
+        && let Ok(Some(frame)) = source.next_frame()
+    {
+        let mut scan = Scan::default();
+        detector.detect(&frame, &mut scan)?;
+        scans.push(scan);
+        source.recycle(frame);
+    }
+    Ok(scans)
+}
+
+/// The detections in frames at hand.
+fn detections(frames: &[Frame], config: &Config, info: &SourceInfo) -> Result<Vec<Scan>> {
+    let mut detector = crate::vision::build(&config.detector, info)?;
+    let detect = |frame: &Frame| {
+        let mut scan = Scan::default();
+        detector.detect(frame, &mut scan).map(|()| scan)
+    };
+    frames.iter().map(detect).collect()
 }
 
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.

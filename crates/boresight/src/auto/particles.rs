@@ -116,7 +116,7 @@ pub fn configure(
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
     let step_px = 0.1 * size_px;
-    tracker.acceleration_std_px_per_s2 = round(step_px / (interval_s * interval_s));
+    tracker.acceleration_density_px2_per_s3 = round(step_px * step_px / interval_s.powi(3));
     tracker.max_speed_px_per_s = round(0.5 * size_px / interval_s);
     tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;

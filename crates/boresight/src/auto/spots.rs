@@ -15,6 +15,10 @@ const SURE: f64 = 8.0;
 const MANY: f64 = 15.0;
 /// Targets with a longer side than this are large, px.
 const LARGE_PX: f64 = 24.0;
+/// How much the velocity of a target changes within one second before anything of it was measured, as a share of the largest speed.
+const SPEED_CHANGE: f64 = 0.08;
+/// The same for the changing outline of a large one, px/s for each px above [`LARGE_PX`].
+const OUTLINE_JERK: f64 = 3.75;
 /// Frames looked at; they are spread over those given.
 const LOOKS: usize = 12;
 
@@ -73,13 +77,7 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
 }
 
 /// Writes detector and tracker for isolated targets.
-pub fn configure(
-    evidence: &Evidence,
-    info: &SourceInfo,
-    interval_s: f64,
-    config: &mut Config,
-    reasons: &mut Vec<String>,
-) {
+pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let weight = |s: &Side| s.per_frame * s.mean_score;
     let (bright, dark) = (weight(&evidence.bright), weight(&evidence.dark));
     let polarity = if dark > 2.0 * bright { Polarity::Dark } else { Polarity::Bright };
@@ -119,7 +117,8 @@ pub fn configure(
     // Large targets change their outline: their middle wanders and jerks with them (a mouse of 41 px lost its track 11 times in 20 s).
     let large_px = (seen.side_px[0] - LARGE_PX).max(0.0);
     tracker.extra_noise_px += round(0.03 * large_px);
-    tracker.acceleration_std_px_per_s2 = round((0.1 + 0.03 * large_px) / (interval_s * interval_s));
+    let turns = SPEED_CHANGE * tracker.max_speed_px_per_s;
+    tracker.acceleration_density_px2_per_s3 = round(turns.powi(2) + (OUTLINE_JERK * large_px).powi(2));
     tracker.coast_s = 0.7;
     // An aircraft that falls in pieces for some frames is one track soon after.
     tracker.merged_measurements =

@@ -7,7 +7,7 @@ use super::association_cost::AssociationCostConfig;
 use super::clutter::ClutterConfig;
 use super::confirm::confirmation_gate::ConfirmationGateConfig;
 use super::confirm::rule::ConfirmationConfig;
-use super::filter::{FilterConfig, TrackedFilter, presets};
+use super::filter::{AccelerationNoise, DEFAULT_DENSITY_PX2_PER_S3, FilterConfig, TrackedFilter, presets};
 use super::initial_tracks::InitialTrackConfig;
 use super::initiation::InitiationConfig;
 use super::merged_measurements::MergedMeasurementsConfig;
@@ -27,11 +27,17 @@ pub struct TrackerConfig {
     #[serde(deserialize_with = "presets::name_or_parts")]
     #[schemars(schema_with = "presets::schema")]
     pub filter: FilterConfig,
-    /// Standard deviation of the target's acceleration, px/s², above 0; larger follows manoeuvres, smaller smooths more.
-    /// 28 px/s² is 0.03 px per frame² at 30 frames/s.
-    pub acceleration_std_px_per_s2: f64,
-    /// Acceleration added to it in proportion to the target's box, 1/s²: `box height × this`, 0 or more. For scenes with
+    /// Power density of the target's white acceleration, px²/s³, above 0; larger follows manoeuvres, smaller smooths more. Within t seconds
+    /// the velocity changes by the root of this times t: 25 is 5 px/s in one second, at any frame rate.
+    pub acceleration_density_px2_per_s3: f64,
+    /// Density added to it in proportion to the square of the target's box, 1/s³: `box height² × this`, 0 or more. For scenes with
     /// near and far targets, where a tall box moves more pixels.
+    pub acceleration_density_per_height2_per_s3: f64,
+    /// Discrete noise instead: standard deviation of an acceleration that is constant within each scan interval, px/s², above 0. Its effect
+    /// depends on the frame rate; left out, the densities above are used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_std_px_per_s2: Option<f64>,
+    /// Acceleration added to the discrete one in proportion to the target's box, 1/s²: `box height × this`, 0 or more.
     pub acceleration_per_height_per_s2: f64,
     /// Measurement noise in proportion to the detection's box: `box height × this` per axis, standard deviation, 0 or more.
     pub extra_noise_per_height: f64,
@@ -92,7 +98,9 @@ impl Default for TrackerConfig {
     fn default() -> Self {
         Self {
             filter: FilterConfig::default(),
-            acceleration_std_px_per_s2: 28.0,
+            acceleration_density_px2_per_s3: DEFAULT_DENSITY_PX2_PER_S3,
+            acceleration_density_per_height2_per_s3: 0.0,
+            acceleration_std_px_per_s2: None,
             acceleration_per_height_per_s2: 0.0,
             extra_noise_per_height: 0.0,
             extra_noise_px: 0.3,
@@ -153,20 +161,35 @@ impl TrackerConfig {
 
     /// Builds the filter of a new track of that height.
     pub(super) fn start_filter(&self, start: &Gaussian<4>, height_px: f64) -> Result<TrackedFilter, FilterError> {
-        let std = self.acceleration_std_px_per_s2.hypot(self.acceleration_per_height_per_s2 * height_px);
-        self.filter.start(start, std)
+        self.filter.start(start, self.acceleration_noise(height_px))
+    }
+
+    /// The white acceleration of a target of that height, px.
+    pub fn acceleration_noise(&self, height_px: f64) -> AccelerationNoise {
+        let (density, per_height2) =
+            (self.acceleration_density_px2_per_s3, self.acceleration_density_per_height2_per_s3);
+        match self.acceleration_std_px_per_s2 {
+            None => AccelerationNoise::Continuous(density + per_height2 * height_px * height_px),
+            Some(std) => AccelerationNoise::Discrete(std.hypot(self.acceleration_per_height_per_s2 * height_px)),
+        }
     }
 
     /// Checks all values; `at` names the place in the configuration (`tracker`).
     /// # Errors
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
-        positive(
-            at,
-            "acceleration-std-px-per-s2",
-            self.acceleration_std_px_per_s2,
-            "0.03 px per frame², squared rates apart: 28 at 30 frames/s",
-        )?;
+        let density = self.acceleration_density_px2_per_s3;
+        positive(at, "acceleration-density-px2-per-s3", density, "25 lets the velocity change by 5 px/s in a second")?;
+        let per_height2 = self.acceleration_density_per_height2_per_s3;
+        not_negative(at, "acceleration-density-per-height2-per-s3", per_height2, "0.05 suits people in video")?;
+        if let Some(std) = self.acceleration_std_px_per_s2 {
+            positive(at, "acceleration-std-px-per-s2", std, "left out, the density is used")?;
+        } else {
+            let none = self.acceleration_per_height_per_s2 == 0.0;
+            let mend = "give the density: acceleration-density-per-height2-per-s3";
+            let key = "acceleration-per-height-per-s2";
+            check(none, at, key, self.acceleration_per_height_per_s2, "0 without acceleration-std-px-per-s2", mend)?;
+        }
         not_negative(at, "extra-noise-px", self.extra_noise_px, "0.3 covers the heavy tails of thresholded centroids")?;
         let mend = "0.99 keeps 99 % of true detections inside the gate";
         probability(at, "gate-probability", self.gate_probability, mend)?;

@@ -96,7 +96,11 @@ mod tests {
             age_s: 2.0,
             ..InitialTrackConfig::default()
         };
-        TrackerConfig { acceleration_std_px_per_s2: 0.1, initial_tracks: vec![initial], ..TrackerConfig::default() }
+        TrackerConfig {
+            acceleration_std_px_per_s2: Some(0.1),
+            initial_tracks: vec![initial],
+            ..TrackerConfig::default()
+        }
     }
 
     #[test]

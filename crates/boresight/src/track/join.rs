@@ -37,8 +37,7 @@ type Row = (usize, TrackState);
 /// A configuration value outside its range; scans out of order; an id twice in a scan; a covariance that no filter makes.
 pub fn join(scans: &mut [TrackFrame], config: &StitchConfig, smooth: bool) -> Result<Joined> {
     config.validate("stitch")?;
-    let model =
-        SmoothConfig { acceleration_std_px_per_s2: config.acceleration_std_px_per_s2, ..SmoothConfig::default() };
+    let model = SmoothConfig { acceleration: config.acceleration, ..SmoothConfig::default() };
     let mut tracks = by_track(scans)?;
     let mut done = Joined { before: tracks.len(), ..Joined::default() };
     let still = |s: &TrackState| s.kinematics.mean[1] == 0.0 && s.kinematics.mean[3] == 0.0;
@@ -212,6 +211,7 @@ mod tests {
     use super::*;
     use crate::Extent;
     use crate::FrameIndex;
+    use crate::track::AccelerationNoise;
     use nalgebra::{Matrix4, Vector4};
 
     /// One target at 1 px a scan (10 scans a second), seen under id 1 until scan 20 and under id 2 from scan 26, with noise.
@@ -255,7 +255,11 @@ mod tests {
     }
 
     fn config() -> StitchConfig {
-        StitchConfig { acceleration_std_px_per_s2: 1.0, max_speed_px_per_s: 30.0, ..StitchConfig::default() }
+        StitchConfig {
+            acceleration: AccelerationNoise::Discrete(1.0),
+            max_speed_px_per_s: 30.0,
+            ..StitchConfig::default()
+        }
     }
 
     #[test]

@@ -38,7 +38,9 @@ pub use confirm::existence::ExistenceConfig;
 pub use confirm::m_of_n::MOfNConfig;
 pub use confirm::rule::ConfirmationConfig;
 pub use confirm::sprt::SprtConfig;
-pub use filter::{FilterConfig, FormConfig, InnovationConfig, ModelConfig, PRESETS, Preset, TrackFilter};
+pub use filter::{
+    AccelerationNoise, FilterConfig, FormConfig, InnovationConfig, ModelConfig, PRESETS, Preset, TrackFilter,
+};
 pub use gaps::with_empty_frames;
 pub use initial_tracks::InitialTrackConfig;
 pub use initiation::{InitiationConfig, OnePointConfig, TwoPointConfig, VelocityBoundsConfig};

@@ -7,7 +7,8 @@
 //! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
 
-use crate::validate::{check, positive};
+use super::filter::AccelerationNoise;
+use crate::validate::check;
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};
@@ -17,10 +18,8 @@ use nalgebra::{Matrix2, Vector2};
 /// How tracks are smoothed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothConfig {
-    /// Standard deviation of the acceleration, px/s², above 0: that of the tracker which made the tracks.
-    pub acceleration_std_px_per_s2: f64,
-    /// Noise in continuous time, its density std² × this, s, above 0; `None`: discrete noise, as the tracker's default.
-    pub hold_s: Option<f64>,
+    /// The white acceleration, above 0: that of the tracker which made the tracks.
+    pub acceleration: AccelerationNoise,
     /// Which rows tell of which.
     pub method: SmoothMethod,
 }
@@ -39,7 +38,7 @@ pub enum SmoothMethod {
 
 impl Default for SmoothConfig {
     fn default() -> Self {
-        Self { acceleration_std_px_per_s2: 28.0, hold_s: None, method: SmoothMethod::Rts }
+        Self { acceleration: AccelerationNoise::default(), method: SmoothMethod::Rts }
     }
 }
 
@@ -48,10 +47,7 @@ impl SmoothConfig {
     /// # Errors
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
-        positive(at, "acceleration-std-px-per-s2", self.acceleration_std_px_per_s2, "as in the tracker")?;
-        if let Some(s) = self.hold_s {
-            positive(at, "hold-s", s, "the frame time, 0.04 s at 25 Hz")?;
-        }
+        self.acceleration.validate(at)?;
         match self.method {
             SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
             _ => Ok(()),
@@ -59,11 +55,7 @@ impl SmoothConfig {
     }
 
     fn model(&self) -> Result<ConstantVelocity> {
-        let std = self.acceleration_std_px_per_s2;
-        Ok(match self.hold_s {
-            None => ConstantVelocity::discrete(std)?,
-            Some(s) => ConstantVelocity::continuous(std * std * s)?,
-        })
+        Ok(self.acceleration.constant_velocity(1.0)?)
     }
 }
 
@@ -178,7 +170,7 @@ mod tests {
     }
 
     fn config(method: SmoothMethod) -> SmoothConfig {
-        SmoothConfig { acceleration_std_px_per_s2: STD, method, ..SmoothConfig::default() }
+        SmoothConfig { acceleration: AccelerationNoise::Discrete(STD), method }
     }
 
     #[test]

@@ -102,6 +102,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::track::AccelerationNoise;
     use crate::{TrackId, TrackStatus};
     use nalgebra::{Matrix4, Vector4};
 
@@ -128,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_straight_track_stays_where_it_is_and_gets_its_missing_row() {
-        let config = SmoothConfig { acceleration_std_px_per_s2: 0.1, ..SmoothConfig::default() };
+        let config = SmoothConfig { acceleration: AccelerationNoise::Discrete(0.1), ..SmoothConfig::default() };
         let s = smooth_table(&table(), &config, None, true).unwrap();
         assert_eq!((s.n_tracks, s.n_rows, s.n_filled, s.frames.len()), (1, 6, 1, 6));
         for (k, frame) in s.frames.iter().enumerate() {
@@ -144,7 +145,7 @@ mod tests {
 
     #[test]
     fn positions_are_filtered_first_and_grow_surer_by_smoothing() {
-        let config = SmoothConfig { acceleration_std_px_per_s2: 0.01, ..SmoothConfig::default() };
+        let config = SmoothConfig { acceleration: AccelerationNoise::Discrete(0.01), ..SmoothConfig::default() };
         let s = smooth_table(&table(), &config, Some(100.0), false).unwrap();
         assert!(s.median_std_after_px < 0.8 * s.median_std_before_px, "{s:?}");
         // The last velocity is the slope of the positions, whatever the rows say of it.

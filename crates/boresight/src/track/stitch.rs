@@ -7,25 +7,23 @@
 //! Limits: constant velocity over the gap. Nothing is filled in between: rows stay as they are, only ids change; the
 //! smoother fills gaps.
 
+use super::filter::AccelerationNoise;
 use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, UniformGrid};
 use crate::validate::{not_negative, positive, probability};
 use crate::{Result, Timestamp, TrackId};
 use boresight_filters::Gaussian;
-use boresight_filters::model::{ConstantVelocity, Model};
+use boresight_filters::model::Model;
 use nalgebra::Vector4;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// How fragments are joined.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StitchConfig {
     /// Longest gap, s, above 0.
     pub max_gap_s: f64,
     /// Fragments may overlap by this much, s, 0 or more (a track that coasted on while its successor had begun).
     pub max_overlap_s: f64,
-    /// Standard deviation of the acceleration during the gap, px/s², above 0.
-    pub acceleration_std_px_per_s2: f64,
+    /// The white acceleration during the gap, above 0.
+    pub acceleration: AccelerationNoise,
     /// Largest speed, px/s, above 0.
     pub max_speed_px_per_s: f64,
     /// Probability that true fragments pass the gate, in (0, 1).
@@ -37,7 +35,7 @@ impl Default for StitchConfig {
         Self {
             max_gap_s: 2.0,
             max_overlap_s: 0.0,
-            acceleration_std_px_per_s2: 28.0,
+            acceleration: AccelerationNoise::default(),
             max_speed_px_per_s: 300.0,
             gate_probability: 0.99,
         }
@@ -51,7 +49,7 @@ impl StitchConfig {
     pub fn validate(&self, at: &str) -> Result<()> {
         positive(at, "max-gap-s", self.max_gap_s, "2 s bridges a lamp post")?;
         not_negative(at, "max-overlap-s", self.max_overlap_s, "0 if tracks end when their target does")?;
-        positive(at, "acceleration-std-px-per-s2", self.acceleration_std_px_per_s2, "as in the tracker")?;
+        self.acceleration.validate(at)?;
         positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "as in the tracker")?;
         probability(at, "gate-probability", self.gate_probability, "0.99 joins 99 % of true fragments")
     }
@@ -145,7 +143,7 @@ fn finite(v: f64) -> f64 {
 /// d² and ln det S of the end of `a`, moved over the gap, against the start of `b`.
 fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Option<(f64, f64)> {
     // Backwards in time the noise grows as forwards.
-    let model = ConstantVelocity::discrete(config.acceleration_std_px_per_s2).ok()?;
+    let model = config.acceleration.constant_velocity(1.0).ok()?;
     let (phi, noise) = (model.transition(gap_s, &a.last.mean), model.process_noise(gap_s.abs()));
     let s = phi * a.last.cov * phi.transpose() + noise + b.first.cov;
     let difference: Vector4<f64> = b.first.mean - phi * a.last.mean;

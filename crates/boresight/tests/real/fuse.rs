@@ -76,7 +76,7 @@ fn the_solent_radars_azimuth_bias_is_found_from_ais_and_taken_away() {
         scans.last_mut().unwrap().detections.push(point(m.position, m.cov));
     }
     let tracker = TrackerConfig {
-        acceleration_std_px_per_s2: 0.05,
+        acceleration_std_px_per_s2: Some(0.05),
         extra_noise_px: 0.1,
         max_speed_px_per_s: 25.0,
         confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 5, scans: 8, tentative_s: 60.0 }),
@@ -187,7 +187,7 @@ fn two_simulated_radars_on_real_aircraft_are_better_fused_than_alone() {
     // Crossed lines of sight; scans at times of their own, between the states.
     let sensors = [radar("west", [-60_000.0, 0.0], 2.0), radar("north", [0.0, -60_000.0], 7.0)];
     let tracker = TrackerConfig {
-        acceleration_std_px_per_s2: 1.0,
+        acceleration_std_px_per_s2: Some(1.0),
         extra_noise_px: 1.0,
         max_speed_px_per_s: 320.0,
         clutter_density_per_px2: 5e-11,

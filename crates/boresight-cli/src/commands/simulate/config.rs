@@ -29,7 +29,7 @@ pub fn for_scene(name: &str, scene: &SceneConfig) -> Option<Config> {
     }
     config.tracker = paper_tracker();
     let rate = scene.rate_hz;
-    config.tracker.acceleration_std_px_per_s2 *= rate * rate;
+    config.tracker.acceleration_std_px_per_s2 = config.tracker.acceleration_std_px_per_s2.map(|std| std * rate * rate);
     config.tracker.max_speed_px_per_s *= rate;
     config.tracker.coast_s /= rate;
     Some(config)

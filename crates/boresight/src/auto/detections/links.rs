@@ -32,7 +32,7 @@ pub(super) struct Motion {
     /// Deviation of a detection's centre beyond its stated covariance, h.
     pub(super) extra_noise: f64,
     /// Deviation of a target's acceleration from scan to scan, h/s².
-    pub(super) acceleration_per_s2: f64,
+    pub(super) density_per_s3: f64,
     /// Deviation of a target's velocity per axis, px/s.
     pub(super) speed_std_px_per_s: f64,
     /// Speed that one step in a thousand exceeds, px/s.
@@ -89,8 +89,8 @@ impl<'a> Links<'a> {
 
     /// Measures noise and motion on detections of at least this score; nothing if too few are linked.
     ///
-    /// With noise σ in each centre and an acceleration of deviation a, new in every scan, the second difference over `l` scans has the
-    /// variance 6 σ² + a² Δt⁴ (2 l³ + l) / 3: two lags give both. The shorter is that over which a box's own errors change, the longer
+    /// With noise σ in each centre and a white acceleration of density q, the second difference over a time T has the
+    /// variance 6 σ² + 2 q T³ / 3: two lags give both. The shorter is that over which a box's own errors change, the longer
     /// that over which a manoeuvre shows. Deviations are 95 % points, so that a wrong link in twenty counts little.
     pub(super) fn motion(&self, min_score: f32) -> Option<Motion> {
         let interval_s = self.interval_s;
@@ -128,17 +128,17 @@ impl<'a> Links<'a> {
         if near.len() < 100 || far.len() < 20 {
             return None;
         }
-        let growth = |lag: usize| (2.0 * (lag as f64).powi(3) + lag as f64) / 3.0 * interval_s.powi(4);
+        let growth = |lag: usize| 2.0 / 3.0 * (lag as f64 * interval_s).powi(3);
         let (v1, v2) = (deviation(&mut near).powi(2), deviation(&mut far).powi(2));
         let (g1, g2) = (growth(near_lag), growth(far_lag));
         // A 95 % point of n normal numbers is known to 0.95/√n of itself: a smaller growth than twice that, squared, is not seen.
         let unseen = 4.0 * 0.95 / (far.len() as f64).sqrt() * v2 / g2;
-        let acceleration2 = ((v2 - v1) / (g2 - g1)).max(unseen);
+        let density = ((v2 - v1) / (g2 - g1)).max(unseen);
         // Errors of `near_lag` scans are one error, where the filter takes each for a new one: this white noise averages as slowly.
-        let noise2 = near_lag as f64 * (v1 - acceleration2 * g1).max(0.0) / 6.0;
+        let noise2 = near_lag as f64 * (v1 - density * g1).max(0.0) / 6.0;
         Some(Motion {
             extra_noise: (noise2 - stated2 / speeds.len() as f64).max(0.0).sqrt(),
-            acceleration_per_s2: acceleration2.sqrt(),
+            density_per_s3: density,
             // The median of a length of two normal coordinates is 1.177 deviations.
             speed_std_px_per_s: quantile(&mut speeds, 0.5) / 1.177,
             fastest_px_per_s: quantile(&mut speeds, 0.999),
@@ -200,7 +200,12 @@ mod tests {
         let lag = (WANDER_S / dt).round();
         let noise = (m.extra_noise * height).hypot(1.0);
         assert!((noise / (sigma * lag.sqrt()) - 1.0).abs() < 0.1, "{noise}");
-        assert!((m.acceleration_per_s2 * height / a - 1.0).abs() < 0.25, "{}", m.acceleration_per_s2 * height);
+        let density = a * a * dt;
+        assert!(
+            (m.density_per_s3 * height * height / density - 1.0).abs() < 0.5,
+            "{} of {density}",
+            m.density_per_s3 * height * height
+        );
         assert!((m.p_detection - 0.95).abs() < 0.01, "{}", m.p_detection);
         assert!(m.fastest_px_per_s > m.speed_std_px_per_s && m.n_steps > 3000);
     }

@@ -20,8 +20,8 @@ use scores::Calibration;
 const INITIATES: f64 = 0.5;
 /// With at least this one it may continue a track: the track's own prediction speaks for it as well.
 const CONTINUES: f64 = 0.1;
-/// Acceleration of things without height, px/s², of which the tracker wants more than 0: nothing beside any target's.
-const NO_ACCELERATION_PX_PER_S2: f64 = 0.01;
+/// Acceleration density of things without height, px²/s³, of which the tracker wants more than 0: nothing beside any target's.
+const NO_ACCELERATION_PX2_PER_S3: f64 = 1e-4;
 /// The largest speed over the one that one step in a thousand exceeds: there are faster targets than those that were seen.
 const SPEED_RESERVE: f64 = 1.5;
 
@@ -44,10 +44,10 @@ pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons
     if let Some(motion) = links.and_then(|l| l.motion(high_score)) {
         for_boxes(tracker, &motion);
         reasons.push(format!(
-            "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration {:.2} heights/s², speeds to {:.0} px/s, {:.0} % go on.",
+            "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration of density {:.3} heights²/s³, speeds to {:.0} px/s, {:.0} % go on.",
             motion.n_steps,
             motion.extra_noise,
-            motion.acceleration_per_s2,
+            motion.density_per_s3,
             motion.fastest_px_per_s,
             100.0 * motion.p_detection
         ));
@@ -64,21 +64,21 @@ pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons
     let side = sides.get(sides.len() / 2).copied().unwrap_or(0.0);
     // Boxes of larger things jump more: a tenth of the side is what detectors leave in the centre.
     tracker.extra_noise_px = round((0.1 * side).max(0.3));
-    tracker.acceleration_std_px_per_s2 = round((0.005 * side).max(0.03) * rate * rate);
+    tracker.acceleration_density_px2_per_s3 = round((0.005 * side).max(0.03).powi(2) * rate.powi(3));
     tracker.max_speed_px_per_s = round((0.3 * side).max(5.0) * rate);
     reasons.push(format!(
-        "Median shorter side {side:.1} px: noise {} px, acceleration {} px/s², at most {} px/s.",
-        tracker.extra_noise_px, tracker.acceleration_std_px_per_s2, tracker.max_speed_px_per_s
+        "Median shorter side {side:.1} px: noise {} px, acceleration of density {} px²/s³, at most {} px/s.",
+        tracker.extra_noise_px, tracker.acceleration_density_px2_per_s3, tracker.max_speed_px_per_s
     ));
 }
 
 /// Boxes of an object detector: every number in heights and seconds, as measured; boxes must overlap to be one target's.
 fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion) {
     tracker.extra_noise_per_height = round(motion.extra_noise);
-    tracker.acceleration_per_height_per_s2 = round(motion.acceleration_per_s2);
+    tracker.acceleration_density_per_height2_per_s3 = round(motion.density_per_s3);
     // All of both was measured in heights.
     tracker.extra_noise_px = 0.0;
-    tracker.acceleration_std_px_per_s2 = NO_ACCELERATION_PX_PER_S2;
+    tracker.acceleration_density_px2_per_s3 = NO_ACCELERATION_PX2_PER_S3;
     tracker.max_speed_px_per_s = round(SPEED_RESERVE * motion.fastest_px_per_s).max(1.0);
     tracker.detection_probability = round(motion.p_detection.clamp(0.1, 0.99));
     tracker.initiation =

@@ -1,9 +1,10 @@
 //! The filter of each track: form, motion model, innovation, learning of the noise.
 //!
 //! The plain constant-velocity Kalman filter lives in the track itself; all others stand behind
-//! [`TrackFilter`](super::TrackFilter). The process noise is the tracker's `acceleration-std-px-per-s2`. Names for whole
+//! [`TrackFilter`](super::TrackFilter). The process noise is the tracker's white acceleration (`acceleration_noise`). Names for whole
 //! filters stand in `presets`.
 
+use super::acceleration_noise::AccelerationNoise;
 use super::constant_velocity::ConstantVelocityKf;
 use super::form::FormConfig;
 use super::innovation::InnovationConfig;
@@ -55,12 +56,12 @@ impl FilterConfig {
     pub(in crate::track) fn start(
         &self,
         start: &Gaussian<4>,
-        acceleration_std: f64,
+        noise: AccelerationNoise,
     ) -> Result<TrackedFilter, FilterError> {
         if *self == Self::default() {
-            return Ok(TrackedFilter::Cv(ConstantVelocityKf::new(start, acceleration_std)));
+            return Ok(TrackedFilter::Cv(ConstantVelocityKf::new(start, noise)));
         }
         let adaptive = self.adaptive.as_ref();
-        self.form.start(&self.model, &self.innovation, adaptive, start, acceleration_std).map(TrackedFilter::Boxed)
+        self.form.start(&self.model, &self.innovation, adaptive, start, noise).map(TrackedFilter::Boxed)
     }
 }

@@ -5,11 +5,11 @@
 //! Method: the covariance is kept as two axis blocks and their coupling; while every measurement covariance is diagonal
 //! the axes stay independent and a step is two 2x2 filters. Several hypotheses: each is corrected by itself and the
 //! mixture is matched in mean and covariance, which is PDA's update when all share one R.
-//! Symbols: state `[x, vx, y, vy]` (px, px/s); q acceleration variance, px²/s⁴; r measurement variance, px².
-//! The prediction is [`boresight_filters::model::ConstantVelocity`]'s, written out for the numbers kept; its order of operations is
-//! that of all published tables, so it stands here once more.
-//! Limits: linear, constant velocity with piecewise-constant acceleration over each dt.
+//! Symbols: state `[x, vx, y, vy]` (px, px/s); q process covariance of a step; r measurement variance, px².
+//! The prediction is [`boresight_filters::model::ConstantVelocity`]'s, written out for the numbers kept.
+//! Limits: linear, constant velocity with white acceleration.
 
+use super::acceleration_noise::AccelerationNoise;
 use boresight_filters::mixture::mixture_update;
 use boresight_filters::{Filter, FilterError, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
@@ -26,12 +26,12 @@ struct Axis {
 
 impl Axis {
     #[inline]
-    fn predict(&mut self, dt_s: f64, q: f64) {
-        let (t, t2) = (dt_s, dt_s * dt_s);
+    fn predict(&mut self, dt_s: f64, q: &[f64; 3]) {
+        let t = dt_s;
         self.x += t * self.v;
-        self.xx += t * (2.0 * self.xv + t * self.vv) + 0.25 * q * t2 * t2;
-        self.xv += t * self.vv + 0.5 * q * t2 * t;
-        self.vv += q * t2;
+        self.xx += t * (2.0 * self.xv + t * self.vv) + q[0];
+        self.xv += t * self.vv + q[1];
+        self.vv += q[2];
     }
 
     #[inline]
@@ -49,23 +49,36 @@ impl Axis {
     }
 }
 
+/// Process covariance q00, q01, q11 of one axis over a step (px², px²/s, px²/s²).
+#[inline]
+fn step_noise(noise: AccelerationNoise, t: f64) -> [f64; 3] {
+    let t2 = t * t;
+    match noise {
+        AccelerationNoise::Continuous(q) => [q * (t2 * t) / 3.0, 0.5 * q * t2, q * t],
+        AccelerationNoise::Discrete(std) => {
+            let q = std * std;
+            [0.25 * q * t2 * t2, 0.5 * q * t2 * t, q * t2]
+        }
+    }
+}
+
 /// The belief of a constant-velocity track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantVelocityKf {
     axes: [Axis; 2],
     /// cov([x, vx], [y, vy]), row by row.
     coupling: [f64; 4],
-    q: f64,
+    noise: AccelerationNoise,
     coupled: bool,
 }
 
 impl ConstantVelocityKf {
-    /// Builds a filter from a first belief and the standard deviation of the acceleration, px/s².
-    pub fn new(start: &Gaussian<4>, acceleration_std_px_per_s2: f64) -> Self {
+    /// Builds a filter from a first belief and the white acceleration that drives it.
+    pub fn new(start: &Gaussian<4>, noise: AccelerationNoise) -> Self {
         let mut filter = Self {
             axes: [Axis { x: 0.0, v: 0.0, xx: 0.0, xv: 0.0, vv: 0.0 }; 2],
             coupling: [0.0; 4],
-            q: acceleration_std_px_per_s2 * acceleration_std_px_per_s2,
+            noise,
             coupled: false,
         };
         filter.set(&start.mean, &start.cov);
@@ -143,8 +156,9 @@ impl Filter for ConstantVelocityKf {
         if !(dt_s >= 0.0 && dt_s.is_finite()) {
             return Err(FilterError::OutOfRange("a time step of 0 s or more"));
         }
+        let q = step_noise(self.noise, dt_s);
         for axis in &mut self.axes {
-            axis.predict(dt_s, self.q);
+            axis.predict(dt_s, &q);
         }
         if self.coupled {
             let [xy, xw, vy, vw] = self.coupling;
@@ -213,7 +227,10 @@ mod tests {
 
     fn filter() -> ConstantVelocityKf {
         let cov = Matrix4::from_diagonal(&Vector4::new(1.0, 4.0, 2.0, 4.0));
-        let mut f = ConstantVelocityKf::new(&Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov }, 2.0);
+        let mut f = ConstantVelocityKf::new(
+            &Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov },
+            AccelerationNoise::Discrete(2.0),
+        );
         f.predict(0.5).unwrap();
         f
     }

@@ -1,5 +1,6 @@
 //! The form of a track's filter by name: how it keeps its covariance.
 
+use super::acceleration_noise::AccelerationNoise;
 use super::conditioned::{ScaledFilter, conditioned};
 use super::innovation::InnovationConfig;
 use super::learning::LearningConfig;
@@ -65,31 +66,34 @@ impl FormConfig {
         }
     }
 
-    /// Builds the filter of a new track from its first belief; `acceleration_std` is σ (px/s²).
+    /// Builds the filter of a new track from its first belief, driven by `noise`.
     pub(super) fn start(
         &self,
         model: &ModelConfig,
         innovation: &InnovationConfig,
         adaptive: Option<&LearningConfig>,
         start: &Gaussian<4>,
-        acceleration_std: f64,
+        noise: AccelerationNoise,
     ) -> Result<Box<dyn TrackFilter>, FilterError> {
         match self {
-            Self::Imm(c) => c.start(start, acceleration_std),
-            Self::Lms(c) => c.start(start, acceleration_std),
+            Self::Imm(c) => c.start(start, noise),
+            Self::Lms(c) => c.start(start, noise),
             Self::Ar1(c) => c.start(start),
-            Self::Displacement(c) => c.start(start, acceleration_std),
-            _ => conditioned(around(self, model, start, acceleration_std)?, innovation, adaptive),
+            Self::Displacement(c) => c.start(start, noise),
+            _ => conditioned(around(self, model, start, noise)?, innovation, adaptive),
         }
     }
 }
+
+/// How long an acceleration that is a state is taken to last where nothing says so, s: a manoeuvre.
+const ACCELERATION_LASTS_S: f64 = 1.0;
 
 /// Builds a form around a model.
 fn around(
     form: &FormConfig,
     model: &ModelConfig,
     start: &Gaussian<4>,
-    std: f64,
+    noise: AccelerationNoise,
 ) -> Result<Box<dyn ScaledFilter>, FilterError> {
     macro_rules! form {
         ($n:literal, $model:expr) => {{
@@ -106,28 +110,31 @@ fn around(
             }
         }};
     }
-    let var = std * std;
     Ok(match model {
         ModelConfig::ConstantVelocity(c) => form!(
             4,
             match c.hold_s {
-                None => ConstantVelocity::discrete(std)?,
-                Some(s) => ConstantVelocity::continuous(var * s)?,
+                None => noise.constant_velocity(1.0)?,
+                Some(s) => ConstantVelocity::continuous(noise.density(s))?,
             }
         ),
         ModelConfig::ConstantAcceleration(c) => form!(
             6,
-            match c.hold_s {
-                None => ConstantAcceleration::discrete(std, std)?,
-                Some(s) => ConstantAcceleration::continuous(var / s, std)?,
+            match (c.hold_s, noise) {
+                (None, AccelerationNoise::Discrete(std)) => ConstantAcceleration::discrete(std, std)?,
+                (hold_s, _) => {
+                    let s = hold_s.unwrap_or(ACCELERATION_LASTS_S);
+                    let std = noise.std(s);
+                    ConstantAcceleration::continuous(std * std / s, std)?
+                }
             }
         ),
-        ModelConfig::ConstantTurn(c) => form!(4, ConstantTurn::new(c.rate_rad_per_s, var * c.hold_s)?),
+        ModelConfig::ConstantTurn(c) => form!(4, ConstantTurn::new(c.rate_rad_per_s, noise.density(c.hold_s))?),
         ModelConfig::NearlyConstantTurn(c) => {
             let drift = c.rate_drift_rad_per_s * c.rate_drift_rad_per_s;
-            form!(5, NearlyConstantTurn::new(var * c.hold_s, drift, c.start_rate_std_rad_per_s)?)
+            form!(5, NearlyConstantTurn::new(noise.density(c.hold_s), drift, c.start_rate_std_rad_per_s)?)
         }
-        ModelConfig::Singer(c) => form!(6, Singer::new(std, c.manoeuvre_s)?),
+        ModelConfig::Singer(c) => form!(6, Singer::new(noise.std(2.0 * c.manoeuvre_s), c.manoeuvre_s)?),
         ModelConfig::OrnsteinUhlenbeck(c) => form!(4, OrnsteinUhlenbeck::new(c.speed_std_px_per_s, c.memory_s)?),
         ModelConfig::RandomWalk(c) => form!(2, RandomWalk::new(c.diffusion_px2_per_s)?),
     })

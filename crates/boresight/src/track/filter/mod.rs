@@ -1,5 +1,6 @@
 //! The filter of a track: form x model x innovation x learning of the noise, and names for whole filters.
 
+pub(crate) mod acceleration_noise;
 mod conditioned;
 pub(crate) mod config;
 pub(crate) mod constant_velocity;
@@ -10,6 +11,8 @@ pub(crate) mod model;
 pub(crate) mod own_model;
 pub(crate) mod presets;
 mod tracked_filter;
+pub use acceleration_noise::AccelerationNoise;
+pub(in crate::track) use acceleration_noise::DEFAULT_DENSITY_PX2_PER_S3;
 pub use constant_velocity::ConstantVelocityKf;
 pub use own_model::{Ar1Config, AsPrintedConfig, DisplacementConfig, ImmConfig, ImmForm, LmsConfig, LmsRuleConfig};
 

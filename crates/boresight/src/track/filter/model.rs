@@ -1,6 +1,7 @@
 //! The motion model of a track's filter by name.
 //!
-//! The process noise of every model follows from the tracker's `acceleration-std-px-per-s2` (σ), unless said otherwise.
+//! The process noise of every model follows from the tracker's white acceleration, unless said otherwise: a density q̃, or σ of discrete noise;
+//! where a model wants the other of the two, q̃ = σ² × the time for which an acceleration lasts.
 
 use crate::Result;
 use crate::validate::{check, not_negative, positive};
@@ -19,7 +20,7 @@ pub enum ModelConfig {
     ConstantTurn(ConstantTurnConfig),
     /// Turn whose rate is a state: for vehicles and aircraft that turn for seconds. Nonlinear: `ekf` or `ukf`.
     NearlyConstantTurn(NearlyConstantTurnConfig),
-    /// Acceleration of standard deviation σ that fades with a time constant (Singer 1970): for pilots' manoeuvres.
+    /// Acceleration of standard deviation σ (σ² = q̃ over twice the time constant) that fades with a time constant (Singer 1970): for pilots' manoeuvres.
     Singer(SingerConfig),
     /// Velocity that forgets itself: for cells, pedestrians, long gaps; a coasting track does not explode.
     OrnsteinUhlenbeck(OrnsteinUhlenbeckConfig),
@@ -37,9 +38,9 @@ impl Default for ModelConfig {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct WhiteNoiseConfig {
-    /// Left out: discrete noise, the acceleration (or its step) is constant within a frame. Given: noise in continuous
-    /// time of the density σ² × this (of a jerk: σ² over this), s, above 0; then two short steps are one long step, as
-    /// uneven frame times need. One frame time gives about the strength of the discrete noise.
+    /// How long an acceleration lasts, s, above 0. Of use beside `acceleration-std-px-per-s2`: given, the noise is continuous
+    /// with the density σ² × this (of a jerk: σ² over this); left out, it is discrete. With a density it only says how
+    /// the jerk of a constant-acceleration model follows from it (1 s where left out).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hold_s: Option<f64>,
 }
@@ -50,7 +51,7 @@ pub struct WhiteNoiseConfig {
 pub struct ConstantTurnConfig {
     /// Rate from +x towards +y, rad/s.
     pub rate_rad_per_s: f64,
-    /// The white acceleration has the density σ² × this, s, above 0.
+    /// Beside `acceleration-std-px-per-s2`: the white acceleration has the density σ² × this, s, above 0.
     pub hold_s: f64,
 }
 
@@ -68,7 +69,7 @@ pub struct NearlyConstantTurnConfig {
     pub start_rate_std_rad_per_s: f64,
     /// How much the rate drifts within one second, standard deviation, rad/s, 0 or more.
     pub rate_drift_rad_per_s: f64,
-    /// The white acceleration has the density σ² × this, s, above 0.
+    /// Beside `acceleration-std-px-per-s2`: the white acceleration has the density σ² × this, s, above 0.
     pub hold_s: f64,
 }
 

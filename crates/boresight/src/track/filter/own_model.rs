@@ -1,9 +1,9 @@
 //! Forms that bring a model of their own: IMM, LMS weights, AR(1), displacement.
 
+use super::acceleration_noise::AccelerationNoise;
 use super::tracked_filter::TrackFilter;
 use crate::Result;
 use crate::validate::{check, not_negative, positive};
-use boresight_filters::model::ConstantVelocity;
 use boresight_filters::{
     Ar1, Displacement, FilterError, Gaussian, Imm, Information, Kf, Lms, LmsRule, Measurement, SquareRoot, Srif, Start,
     Tracked, Ud, Ukf,
@@ -11,6 +11,9 @@ use boresight_filters::{
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// How long an acceleration whose weights are learnt is taken to last, s: a frame at 25 Hz.
+const ACCELERATION_LASTS_S: f64 = 0.04;
 
 /// Interacting multiple model of two constant-velocity filters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -138,10 +141,10 @@ impl ImmConfig {
     pub(super) fn start(
         &self,
         start: &Gaussian<4>,
-        acceleration_std: f64,
+        noise: AccelerationNoise,
     ) -> Result<Box<dyn TrackFilter>, FilterError> {
-        let quiet = ConstantVelocity::discrete(acceleration_std)?;
-        let fast = ConstantVelocity::discrete(acceleration_std * self.manoeuvre_factor)?;
+        let quiet = noise.constant_velocity(1.0)?;
+        let fast = noise.constant_velocity(self.manoeuvre_factor)?;
         let stays = [self.quiet_s, self.manoeuvre_s];
         macro_rules! imm {
             ($form:ident) => {{
@@ -174,8 +177,9 @@ impl LmsConfig {
     pub(super) fn start(
         &self,
         start: &Gaussian<4>,
-        acceleration_std: f64,
+        noise: AccelerationNoise,
     ) -> Result<Box<dyn TrackFilter>, FilterError> {
+        let acceleration_std = noise.std(ACCELERATION_LASTS_S);
         let rule = match &self.rule {
             LmsRuleConfig::Guarded {} => LmsRule::Guarded,
             LmsRuleConfig::AsPrinted(c) => LmsRule::AsPrinted { alpha: c.step_factor },
@@ -212,9 +216,9 @@ impl DisplacementConfig {
     pub(super) fn start(
         &self,
         start: &Gaussian<4>,
-        acceleration_std: f64,
+        noise: AccelerationNoise,
     ) -> std::result::Result<Box<dyn TrackFilter>, FilterError> {
-        let noise = self.noise_px.unwrap_or(acceleration_std * self.frame_s * self.frame_s);
+        let noise = self.noise_px.unwrap_or_else(|| noise.std(self.frame_s) * self.frame_s * self.frame_s);
         Ok(boxed(Tracked(Displacement::from_kinematics(start, noise * noise, self.frame_s)?)))
     }
 }

@@ -76,6 +76,7 @@ mod tests {
     use super::*;
     use crate::associate::{Assignment, AssociatorConfig, Prior};
     use crate::golden_file::{load, number, numbers, rows};
+    use crate::track::AccelerationNoise;
     use crate::track::filter::ConstantVelocityKf;
     use crate::{Detection, Scan};
     use boresight_filters::{Filter, Gaussian};
@@ -101,7 +102,7 @@ mod tests {
                 detections: rows(&i["Z"]).iter().map(|z| Detection::at(Vector2::new(z[0], z[1]), r)).collect(),
                 ..Scan::default()
             };
-            let p = ConstantVelocityKf::new(&belief(i), 1.0).predicted();
+            let p = ConstantVelocityKf::new(&belief(i), AccelerationNoise::Discrete(1.0)).predicted();
             let track = Predicted {
                 x: p.mean.x,
                 y: p.mean.y,

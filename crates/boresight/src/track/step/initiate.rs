@@ -253,7 +253,7 @@ mod tests {
             clutter_density_per_px2: 1e-3,
             detection_probability: 0.9,
             max_speed_px_per_s: 10.0,
-            acceleration_std_px_per_s2: 1e-9,
+            acceleration_std_px_per_s2: Some(1e-9),
             extra_noise_px: 0.0,
             ..TrackerConfig::default()
         }

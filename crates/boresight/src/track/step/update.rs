@@ -191,7 +191,7 @@ mod tests {
         let config = TrackerConfig {
             associator: AssociatorConfig::Pda(Default::default()),
             initial_tracks: vec![initial],
-            acceleration_std_px_per_s2: 0.1,
+            acceleration_std_px_per_s2: Some(0.1),
             extra_noise_px: 0.0,
             clutter_density_per_px2: (n_clutter as f64 / 1600.0).max(1e-9),
             coast_s: 1e9,

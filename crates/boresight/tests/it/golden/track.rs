@@ -2,7 +2,10 @@
 
 use super::file::{load, number, numbers, rows};
 use boresight::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior};
-use boresight::track::{self, ConfirmationConfig, MOfNConfig, TrackerConfig, filter::ConstantVelocityKf};
+use boresight::track::{
+    self, ConfirmationConfig, MOfNConfig, TrackerConfig,
+    filter::{AccelerationNoise, ConstantVelocityKf},
+};
 use boresight::{Detection, FrameIndex, Scan, Timestamp, TrackStatus};
 use boresight_filters::{Filter, Gaussian, Measurement, Weighted};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
@@ -24,7 +27,7 @@ fn the_tracker_keeps_the_golden_tracks() {
             other => panic!("mode {other}"),
         };
         let config = TrackerConfig {
-            acceleration_std_px_per_s2: get("q").sqrt(),
+            acceleration_std_px_per_s2: Some(get("q").sqrt()),
             extra_noise_px: 0.0,
             gate_probability: 1.0 - (-0.5 * get("gamma")).exp(),
             max_speed_px_per_s: get("vmax") / dt,
@@ -99,7 +102,7 @@ fn probabilistic_data_association_agrees_with_the_golden_vectors() {
         let i = &case["inputs"];
         let r = square(&i["R"]);
         let z: Vec<Vector2<f64>> = rows(&i["Z"]).iter().map(|z| Vector2::new(z[0], z[1])).collect();
-        let mut filter = ConstantVelocityKf::new(&belief(i), 1.0);
+        let mut filter = ConstantVelocityKf::new(&belief(i), AccelerationNoise::Discrete(1.0));
         let p = filter.predicted();
         let s = p.cov + r;
         let mut gates = Gates::new();

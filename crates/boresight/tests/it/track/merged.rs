@@ -8,7 +8,7 @@ use boresight::{Extent, TrackStatus};
 fn two_targets_that_pass_through_each_other_keep_their_ids_however_long_they_are_one_blob() {
     // They close at 2 px a scan and touch when 8 px apart: one blob for 9 scans, the coasting budget is 5.
     let config = TrackerConfig {
-        acceleration_std_px_per_s2: 10.0,
+        acceleration_std_px_per_s2: Some(10.0),
         coast_s: 0.1,
         coast_scans: 5,
         merged_measurements: MergedMeasurementsConfig { max_secondary_s: 1.0, ..MergedMeasurementsConfig::default() },

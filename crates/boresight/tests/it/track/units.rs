@@ -46,7 +46,7 @@ fn scans(u: Units) -> Vec<Scan> {
 fn configs(u: Units) -> Vec<TrackerConfig> {
     let (speed, new_target_density_per_px2) = (u.length / u.time, 1e-4 / (u.length * u.length));
     let base = TrackerConfig {
-        acceleration_std_px_per_s2: 0.1 * speed / u.time,
+        acceleration_std_px_per_s2: Some(0.1 * speed / u.time),
         extra_noise_px: 0.1 * u.length,
         max_speed_px_per_s: 8.0 * speed,
         clutter_density_per_px2: 4e-4 / (u.length * u.length),
