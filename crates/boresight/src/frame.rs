@@ -28,6 +28,18 @@ pub enum PixelKind {
     Rgb8,
 }
 
+impl PixelKind {
+    /// Bytes of a pixel.
+    pub(crate) fn bytes(self) -> usize {
+        match self {
+            Self::Gray8 => 1,
+            Self::Gray16 => 2,
+            Self::GrayF32 => 4,
+            Self::Rgb8 => 3,
+        }
+    }
+}
+
 impl Pixels {
     /// Width, px.
     pub fn width(&self) -> usize {

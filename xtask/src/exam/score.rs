@@ -4,7 +4,7 @@ use super::clips::{Clip, Near, truth};
 use anyhow::Result;
 use boresight::metrics::{MatchOptions, Rules, Similarity, mot_scores, preprocess};
 use boresight::pipeline::{Input, run};
-use boresight::{Config, FrameSource, PixelOrigin, Sink, TrackRow, TrackStatus, TrackTable, View, auto, track, vision};
+use boresight::{Config, PixelOrigin, Sink, TrackRow, TrackStatus, TrackTable, View, auto, track};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -64,13 +64,12 @@ pub struct Score {
 pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
     let truth = truth(&clip.truth, &clip.columns)?;
     let started = std::time::Instant::now();
-    let (source, choice) = auto::open_and_choose(&clip.input.display().to_string(), &Config::default())?;
-    let info = source.info().clone();
-    let mut config = choice.config;
-    for set in sets {
-        config = config.with(set)?;
-    }
-    let detector = vision::build(&config.detector, &info)?;
+    let (mut source, mut choice) = auto::open_and_choose(&clip.input.display().to_string(), &Config::default())?;
+    let changed = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
+    // As the command does: what is set holds for the first pass as well, and is not overruled by it.
+    choice.config = changed(choice.config)?;
+    let detector = auto::learn(&mut source, &mut choice)?;
+    let config = changed(choice.config)?;
     let tracker = track::build(&config.tracker)?;
     let seen = Arc::new(Mutex::new(Reported::default()));
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&seen)))];

@@ -1,6 +1,7 @@
 //! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
 
 use anyhow::Context;
+use boresight::FrameSource as _;
 use boresight::auto;
 use boresight::pipeline::{Input, Summary};
 use boresight::{Config, Error, ErrorKind, vision};
@@ -82,20 +83,22 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     if boresight::io::is_table(&args.input) {
         return plan_table(args, tracker, given, base);
     }
-    let (source, mut config, reasons): (Box<dyn boresight::FrameSource>, _, _) = match given {
-        Some(_) => {
-            let source = boresight::io::open(&args.input, &base.input.open_options())?;
-            (source, base, vec!["Configuration as given.".to_string()])
-        }
-        None => {
-            let (replay, choice) = auto::open_and_choose(&args.input, &base)?;
-            (Box::new(replay), choice.config, choice.reasons)
-        }
-    };
+    if given.is_some() {
+        let source = boresight::io::open(&args.input, &base.input.open_options())?;
+        let config = changed(base, args, tracker)?;
+        let info = source.info().clone();
+        let detector = vision::build(&config.detector, &info)?;
+        let reasons = vec!["Configuration as given.".to_string()];
+        return Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None });
+    }
+    let (mut source, mut choice) = auto::open_and_choose(&args.input, &base)?;
     let info = source.info().clone();
-    config = changed(config, args, tracker)?;
-    let detector = vision::build(&config.detector, &info)?;
-    Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None })
+    // What the user sets holds for the first pass as well, and is not overruled by what it learns.
+    choice.config = changed(choice.config, args, tracker)?;
+    let detector = auto::learn(&mut source, &mut choice)?;
+    let config = changed(choice.config, args, tracker)?;
+    let input = Input::Frames(Box::new(source), detector);
+    Ok(Plan { input, config, reasons: choice.reasons, info: Some(info), n_scans: None })
 }
 
 /// The configuration with what the command line changes.

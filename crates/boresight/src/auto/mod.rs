@@ -9,6 +9,7 @@ mod choose;
 mod colour;
 mod detections;
 mod digits;
+mod first_pass;
 mod interval;
 mod moving;
 mod noise;
@@ -21,6 +22,6 @@ mod spots;
 
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
-pub use open::{Opened, PROBE_FRAMES, open, open_and_choose};
+pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose};
 pub use replay::Replay;
 pub use second_look::SECOND_LOOK_FRAMES;

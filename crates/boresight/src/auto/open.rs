@@ -3,22 +3,26 @@
 //! 1. open the input and read its first frames ahead ([`Replay`] hands them out again: a stream is read once, and no frame is lost);
 //! 2. look at them as a whole; a file whose camera stands still is read a second time, further on and in colour ([`super::second_look`]);
 //! 3. choose detector and tracker;
-//! 4. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
+//! 4. run the detector over the frames read ahead and learn noise and motion from its detections ([`learn`]);
+//! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
 use super::choose::{Choice, choose_seen};
+use super::first_pass::{FirstPass, frames_ahead};
 use super::noise;
 use super::replay::Replay;
 use super::scene::{self, Camera};
 use super::second_look;
 use crate::track::Tracking;
 use crate::vision::Detector;
-use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
+use crate::{Config, Frame, FrameSource, Result};
 
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
 
-/// Frames of the first pass that tells noise and motion.
-const LEARN_FRAMES: usize = 300;
+/// Frames of a file in the first pass, which tells noise and motion: half a minute of most videos.
+const LEARN_FRAMES: usize = 1000;
+/// Most memory that they take, bytes.
+const LEARN_BYTES: usize = 256 << 20;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
@@ -41,51 +45,40 @@ opaque_debug!(Opened);
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
 pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
     let read = |config: &Config| -> Result<Replay> {
-        Ok(Replay::new(crate::io::open(input, &config.input.open_options())?, PROBE_FRAMES))
+        let source = crate::io::open(input, &config.input.open_options())?;
+        // A stream waits for nothing longer than the choice needs.
+        let most = if second_look::can_be_opened_twice(input) { LEARN_FRAMES } else { PROBE_FRAMES };
+        let n = frames_ahead(source.info(), most, LEARN_BYTES);
+        Ok(Replay::new(source, n))
     };
     let mut frames = read(base)?;
     let info = frames.info().clone();
-    let scene = scene::look(frames.ahead(), &info)?;
+    let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed && second_look::can_be_opened_twice(input);
     let second = if look_again { second_look::frames(input, base, PROBE_FRAMES) } else { Vec::new() };
-    let mut choice = choose_seen(frames.ahead(), scene, &second, &info, base)?;
+    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base)?;
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
     }
-    let scans = if second_look::can_be_opened_twice(input) {
-        let again = crate::io::open(input, &choice.config.input.open_options())?;
-        first_pass(again, &choice.config)?
-    } else {
-        detections(frames.ahead(), &choice.config, &info)?
-    };
-    let area_px2 = (info.width * info.height).max(1) as f64;
-    noise::learn(&scans, area_px2, &mut choice.config, &mut choice.reasons)?;
     Ok((frames, choice))
 }
 
-/// The detections of the first frames of a file; what cannot be read ends them.
-fn first_pass(mut source: Box<dyn FrameSource>, config: &Config) -> Result<Vec<Scan>> {
-    let mut detector = crate::vision::build(&config.detector, source.info())?;
-    let mut scans = Vec::new();
-    while scans.len() < LEARN_FRAMES
-        && let Ok(Some(frame)) = source.next_frame()
-    {
-        let mut scan = Scan::default();
-        detector.detect(&frame, &mut scan)?;
-        scans.push(scan);
-        source.recycle(frame);
-    }
-    Ok(scans)
+/// The frames that are looked at for the choice.
+fn probed(ahead: &[Frame]) -> &[Frame] {
+    &ahead[..ahead.len().min(PROBE_FRAMES)]
 }
 
-/// The detections in frames at hand.
-fn detections(frames: &[Frame], config: &Config, info: &SourceInfo) -> Result<Vec<Scan>> {
-    let mut detector = crate::vision::build(&config.detector, info)?;
-    let detect = |frame: &Frame| {
-        let mut scan = Scan::default();
-        detector.detect(frame, &mut scan).map(|()| scan)
-    };
-    frames.iter().map(detect).collect()
+/// Runs the detector chosen over the frames read ahead, learns noise and motion of the targets from its detections, and returns it: it goes on
+/// where they end, so no frame is detected twice.
+/// # Errors
+/// A parameter out of its range.
+pub fn learn(frames: &mut Replay, choice: &mut Choice) -> Result<Box<dyn Detector>> {
+    let info = frames.info().clone();
+    let detector = crate::vision::build(&choice.config.detector, &info)?;
+    let mut pass = FirstPass::over(frames.ahead(), detector);
+    let area_px2 = (info.width * info.height).max(1) as f64;
+    noise::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons)?;
+    Ok(Box::new(pass))
 }
 
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.
@@ -111,11 +104,11 @@ fn detections(frames: &[Frame], config: &Config, info: &SourceInfo) -> Result<Ve
 /// # Errors
 /// An input that cannot be read; a parameter out of its range.
 pub fn open(input: &str, base: &Config) -> Result<Opened> {
-    let (frames, choice) = open_and_choose(input, base)?;
-    let info = frames.info().clone();
+    let (mut frames, mut choice) = open_and_choose(input, base)?;
+    let detector = learn(&mut frames, &mut choice)?;
     Ok(Opened {
         frames: Box::new(frames),
-        detector: crate::vision::build(&choice.config.detector, &info)?,
+        detector,
         tracker: crate::track::build(&choice.config.tracker)?,
         config: choice.config,
         reasons: choice.reasons,

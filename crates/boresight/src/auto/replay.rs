@@ -3,9 +3,6 @@
 use crate::{Frame, FrameSource, Result, SourceInfo};
 use std::collections::VecDeque;
 
-/// Most memory taken by frames read ahead, bytes.
-const MAX_BYTES: usize = 256 << 20;
-
 /// A source whose first frames were read ahead.
 pub struct Replay {
     ahead: VecDeque<Frame>,
@@ -18,11 +15,8 @@ pub struct Replay {
 opaque_debug!(Replay);
 
 impl Replay {
-    /// Reads up to `n` frames ahead (fewer when they are large).
+    /// Reads up to `n` frames ahead.
     pub fn new(mut source: Box<dyn FrameSource>, n: usize) -> Self {
-        let info = source.info();
-        let bytes = info.width.saturating_mul(info.height).saturating_mul(4).max(1);
-        let n = n.min((MAX_BYTES / bytes).max(2));
         let mut ahead = VecDeque::with_capacity(n);
         let (mut failed, mut ended) = (None, false);
         while ahead.len() < n {

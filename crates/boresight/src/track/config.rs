@@ -39,6 +39,9 @@ pub struct TrackerConfig {
     pub acceleration_std_px_per_s2: Option<f64>,
     /// Acceleration added to the discrete one in proportion to the target's box, 1/s²: `box height × this`, 0 or more.
     pub acceleration_per_height_per_s2: f64,
+    /// Factor on every detection's own covariance, above 0: what the detector states may be too much or too little. The two numbers of extra noise
+    /// below are not multiplied.
+    pub detection_covariance_scale: f64,
     /// Measurement noise in proportion to the detection's box: `box height × this` per axis, standard deviation, 0 or more.
     pub extra_noise_per_height: f64,
     /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
@@ -102,6 +105,7 @@ impl Default for TrackerConfig {
             acceleration_density_per_height2_per_s3: 0.0,
             acceleration_std_px_per_s2: None,
             acceleration_per_height_per_s2: 0.0,
+            detection_covariance_scale: 1.0,
             extra_noise_per_height: 0.0,
             extra_noise_px: 0.3,
             gate_probability: 0.99,
@@ -190,6 +194,7 @@ impl TrackerConfig {
             let key = "acceleration-per-height-per-s2";
             check(none, at, key, self.acceleration_per_height_per_s2, "0 without acceleration-std-px-per-s2", mend)?;
         }
+        positive(at, "detection-covariance-scale", self.detection_covariance_scale, "1 takes covariances as stated")?;
         not_negative(at, "extra-noise-px", self.extra_noise_px, "0.3 covers the heavy tails of thresholded centroids")?;
         let mend = "0.99 keeps 99 % of true detections inside the gate";
         probability(at, "gate-probability", self.gate_probability, mend)?;

@@ -63,16 +63,16 @@ impl ScanTable {
     /// Checks a scan and takes its noise; nothing else changes before the check is over.
     /// # Errors
     /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
-    pub fn read(&mut self, scan: &Scan, extra_noise_px: f64, extra_per_height: f64) -> Result<()> {
+    pub fn read(&mut self, scan: &Scan, scale: f64, extra_noise_px: f64, extra_per_height: f64) -> Result<()> {
         self.noise.clear();
         (self.max_xx, self.max_yy) = (0.0, 0.0);
         self.largest_half_px = [0.0; 2];
         for (i, d) in scan.detections.iter().enumerate() {
             let extra = extra_noise_px * extra_noise_px + (extra_per_height * d.extent.height_px).powi(2);
             let n = Cov2 {
-                xx: d.cov[(0, 0)] + extra,
-                xy: 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
-                yy: d.cov[(1, 1)] + extra,
+                xx: scale * d.cov[(0, 0)] + extra,
+                xy: scale * 0.5 * (d.cov[(0, 1)] + d.cov[(1, 0)]),
+                yy: scale * d.cov[(1, 1)] + extra,
             };
             let e = &d.extent;
             let sides = e.left_px + e.top_px + e.width_px + e.height_px;

@@ -153,7 +153,8 @@ impl Tracking for Tracker {
         if scan.detections.len() >= u32::MAX as usize {
             return Err(Error::new(ErrorKind::Unsupported, "more than 2³² − 2 detections in one scan"));
         }
-        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_per_height)?;
+        let c = &self.config;
+        self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
 
         match step_s {
             None => from_initial_tracks(&self.config, scan.time, &mut self.tracks, &mut self.next_id)?,

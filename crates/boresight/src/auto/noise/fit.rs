@@ -2,12 +2,12 @@
 //!
 //! Source: R. K. Mehra, *IEEE Trans. AC* 15, 1970 (noise from innovations); the likelihood of a linear model is that of its innovations
 //! (Bar-Shalom, Li, Kirubarajan 2001, 5.2). Each series of positions is filtered by a constant-velocity model, axis by axis.
-//! R = stated variance + e² + (f h)², q = a + b h² (a continuous density), h the height of the box: four numbers for all series together, found
+//! R = c × stated variance + e² + (f h)², q = a + b h² (a continuous density), h the height of the box: five numbers for all series together, found
 //! by a compass search on their logarithms, which needs no derivative and ends at a step of 5 %.
 //! Departures: an innovation is, with the probability [`STRANGE`], anywhere in the field (another thing's detection), so that a wrong
 //! association costs a bounded amount and is not filtered in. A weak prior (a factor of [`PRIOR_FACTOR`] is one deviation) holds what the data do not
 //! tell: the height's part where all boxes are alike.
-//! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of e, f, a, b.
+//! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of c, e, f, a, b.
 //! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest.
 
 /// One detection of a series.
@@ -25,6 +25,8 @@ pub struct Step {
 /// The noise of all series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
+    /// Factor on the stated variance.
+    pub scale: f64,
     /// Deviation of a position beyond what is stated, px, and in box heights.
     pub extra_px: f64,
     pub extra_per_height: f64,
@@ -39,17 +41,20 @@ const STRANGE: f64 = 0.01;
 const PRIOR_FACTOR: f64 = 10.0;
 /// First and last step of the search, in logarithms.
 const STEPS: [f64; 2] = [2.0, 0.05];
-/// Least value of any of the four numbers: nothing beside a pixel and a second.
+/// The same for the factor on stated variances: they are known better than that.
+const SCALE_PRIOR_FACTOR: f64 = 2.0;
+/// Least value of any of the five numbers: nothing beside a pixel and a second.
 const LEAST: f64 = 1e-6;
 /// Innovations that every series gives before they count: its velocity is not known at first.
 const SETTLING: usize = 2;
 
 /// Finds the noise, from what was assumed before and the deviation of the targets' speeds (px/s) in a field of `area_px2`.
 pub fn fit(series: &[Vec<Step>], before: Noise, speed_std: f64, area_px2: f64) -> Noise {
-    let start = [before.extra_px, before.extra_per_height, before.density, before.density_per_height2];
+    let start = [before.scale, before.extra_px, before.extra_per_height, before.density, before.density_per_height2];
     let start = start.map(|v| v.max(LEAST).ln());
-    let cost = |x: &[f64; 4]| {
-        let prior: f64 = x.iter().zip(start).map(|(x, s)| ((x - s) / PRIOR_FACTOR.ln()).powi(2)).sum();
+    let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
+    let cost = |x: &[f64; 5]| {
+        let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
         0.5 * prior - log_likelihood(series, &noise_of(x), speed_std, area_px2)
     };
     let (mut at, mut step) = (start, STEPS[0]);
@@ -74,9 +79,9 @@ pub fn fit(series: &[Vec<Step>], before: Noise, speed_std: f64, area_px2: f64) -
     noise_of(&at)
 }
 
-fn noise_of(x: &[f64; 4]) -> Noise {
-    let [extra_px, extra_per_height, density, density_per_height2] = x.map(f64::exp);
-    Noise { extra_px, extra_per_height, density, density_per_height2 }
+fn noise_of(x: &[f64; 5]) -> Noise {
+    let [scale, extra_px, extra_per_height, density, density_per_height2] = x.map(f64::exp);
+    Noise { scale, extra_px, extra_per_height, density, density_per_height2 }
 }
 
 /// Position and velocity along one axis.
@@ -100,7 +105,9 @@ fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2:
         let height = *heights.select_nth_unstable_by(middle, f64::total_cmp).1;
         let q = noise.density + noise.density_per_height2 * height * height;
         let r = |s: &Step, a: usize| {
-            s.variance[a] + noise.extra_px * noise.extra_px + (noise.extra_per_height * s.height_px).powi(2)
+            noise.scale * s.variance[a]
+                + noise.extra_px * noise.extra_px
+                + (noise.extra_per_height * s.height_px).powi(2)
         };
         let mut axes =
             [0, 1].map(|a| Axis { x: first.position[a], v: 0.0, xx: r(first, a), xv: 0.0, vv: speed_std * speed_std });
@@ -171,12 +178,13 @@ mod tests {
 
     #[test]
     fn the_noise_of_simulated_tracks_is_found_at_any_frame_rate() {
-        let before = Noise { extra_px: 0.3, extra_per_height: 0.0, density: 100.0, density_per_height2: 0.0 };
+        let before =
+            Noise { scale: 1.0, extra_px: 0.3, extra_per_height: 0.0, density: 100.0, density_per_height2: 0.0 };
         for (density, std, dt_s) in
             [(400.0, 0.5, 1.0 / 30.0), (400.0, 0.5, 1.0 / 120.0), (4.0, 2.0, 0.1), (9e4, 0.3, 0.04)]
         {
             let found = fit(&series(density, std, dt_s), before, 50.0, 1e5);
-            let r = 0.01 + found.extra_px.powi(2) + (5.0 * found.extra_per_height).powi(2);
+            let r = 0.01 * found.scale + found.extra_px.powi(2) + (5.0 * found.extra_per_height).powi(2);
             let q = found.density + 25.0 * found.density_per_height2;
             assert!((r.sqrt() / std - 1.0).abs() < 0.06, "{density} {std} {dt_s}: {found:?}");
             assert!((q / density).ln().abs() < 0.3, "{density} {std} {dt_s}: {found:?}");

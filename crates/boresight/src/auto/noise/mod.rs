@@ -1,7 +1,7 @@
 //! What a first pass over the detections tells of the noise and the motion of the targets, written into the tracker's configuration.
 //!
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
-//! series whose innovations are made as probable as possible. Detection probability and clutter density are counted on the same run.
+//! series whose innovations are made as probable as possible.
 //! Limits: detections that several tracks share tell nothing; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 mod fit;
@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise.
 const LEAST_STEPS: usize = 60;
+/// Probability that a target's detection lies in the gate, once the innovations are as wide as their covariances say: one true detection in
+/// ten thousand outside, a track's loss in some minutes of video. With 0.99 of covariances that were far too large the gate was as wide.
+const GATE_PROBABILITY: f64 = 0.9999;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
 
@@ -23,9 +26,6 @@ struct Followed {
     steps: Vec<Step>,
     last_ns: i64,
     confirmed: bool,
-    /// Scans from the first to the last detection.
-    scans: u64,
-    scans_to_last: u64,
 }
 
 /// Runs the tracker over `scans` as configured and replaces the assumed noise by what its tracks show; `area_px2` is the field's.
@@ -36,7 +36,6 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
     let mut taken = Vec::new();
-    let (mut n_detections, mut n_taken) = (0u64, 0u64);
     for scan in scans {
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
@@ -44,13 +43,10 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         taken.clear();
         taken.resize(scan.detections.len(), 0u8);
         states.iter().filter_map(|s| s.detection).for_each(|j| taken[j as usize] = taken[j as usize].saturating_add(1));
-        n_detections += scan.detections.len() as u64;
         for s in states {
             let of = tracks.entry(s.id.0).or_default();
             of.confirmed |= s.status != TrackStatus::Tentative;
-            of.scans += 1;
             let Some(j) = s.detection else { continue };
-            of.scans_to_last = of.scans;
             if taken[j as usize] != 1 {
                 continue;
             }
@@ -69,28 +65,29 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         ));
         return Ok(());
     }
-    n_taken += n_steps as u64;
-    let n_scans: u64 = tracks.values().map(|t| t.scans_to_last).sum();
     let every = n_steps.div_ceil(MOST_STEPS);
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
     let before = Noise {
+        scale: t.detection_covariance_scale,
         extra_px: t.extra_noise_px,
         extra_per_height: t.extra_noise_per_height,
         density: t.acceleration_density_px2_per_s3,
         density_per_height2: t.acceleration_density_per_height2_per_s3,
     };
     let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
+    t.gate_probability = GATE_PROBABILITY;
+    t.detection_covariance_scale = round(found.scale);
     t.extra_noise_px = round(found.extra_px);
     t.extra_noise_per_height = round(found.extra_per_height);
     t.acceleration_density_px2_per_s3 = round(found.density);
     t.acceleration_density_per_height2_per_s3 = round(found.density_per_height2);
-    let _ = (n_scans, n_taken, n_detections);
     reasons.push(format!(
-        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} px and {:.3} of a box height beyond what is stated, acceleration density \
+        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} px and {:.4} of a box height beyond them, acceleration density \
          {:.3} px²/s³ and {:.4} heights²/s³.",
         series.len(),
         scans.len(),
+        t.detection_covariance_scale,
         t.extra_noise_px,
         t.extra_noise_per_height,
         t.acceleration_density_px2_per_s3,

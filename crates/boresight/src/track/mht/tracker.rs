@@ -113,7 +113,8 @@ impl Mht {
 impl Tracking for Mht {
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
         let step_s = self.clock.step_s(scan)?;
-        self.table.read(scan, self.config.extra_noise_px, self.config.extra_noise_per_height)?;
+        let c = &self.config;
+        self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
         }

@@ -1,0 +1,112 @@
+//! The first pass over the frames read ahead: their detections, from which noise and motion are learnt, kept for the run itself.
+//!
+//! The detector that made them goes on where they end, so a frame is detected once however often it is looked at.
+
+use crate::vision::Detector;
+use crate::{Frame, Result, Scan, SourceInfo};
+use std::collections::VecDeque;
+
+/// A detector whose first scans were made ahead.
+pub struct FirstPass {
+    scans: VecDeque<Scan>,
+    detector: Box<dyn Detector>,
+}
+
+impl FirstPass {
+    /// Runs `detector` over `frames`, the first of a source; a frame that it refuses ends the pass, and is refused again in the run.
+    pub fn over(frames: &[Frame], mut detector: Box<dyn Detector>) -> Self {
+        let mut scans = VecDeque::with_capacity(frames.len());
+        for frame in frames {
+            let mut scan = Scan::default();
+            if detector.detect(frame, &mut scan).is_err() {
+                break;
+            }
+            scans.push_back(scan);
+        }
+        Self { scans, detector }
+    }
+
+    /// The scans made ahead.
+    pub fn scans(&mut self) -> &[Scan] {
+        self.scans.make_contiguous()
+    }
+}
+
+impl Detector for FirstPass {
+    fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+        match self.scans.pop_front() {
+            Some(ahead) if ahead.index == frame.index => {
+                *scan = ahead;
+                Ok(())
+            }
+            _ => {
+                self.scans.clear();
+                self.detector.detect(frame, scan)
+            }
+        }
+    }
+}
+
+/// How many of at most `most` frames are read ahead within that memory.
+pub fn frames_ahead(info: &SourceInfo, most: usize, most_bytes: usize) -> usize {
+    let bytes = info.width.saturating_mul(info.height).saturating_mul(info.kind.bytes()).max(1);
+    most.min((most_bytes / bytes).max(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameIndex, Image, PixelKind, Pixels};
+
+    /// Counts how often each frame was seen; refuses frame 3.
+    struct Counting(std::sync::Arc<std::sync::Mutex<Vec<u64>>>);
+    impl Detector for Counting {
+        fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+            self.0.lock().unwrap().push(frame.index.0);
+            if frame.index.0 == 3 {
+                return Err(crate::Error::new(crate::ErrorKind::Damaged, "another size"));
+            }
+            *scan = Scan::at(frame.index, frame.time);
+            Ok(())
+        }
+    }
+
+    fn frame(k: u64) -> Frame {
+        Frame {
+            index: FrameIndex(k),
+            time: crate::Timestamp::from_ns(k as i64),
+            pixels: Pixels::Gray8(Image::filled(2, 2, 0)),
+        }
+    }
+
+    #[test]
+    fn a_frame_is_detected_once_and_an_error_comes_in_its_place() {
+        let seen = std::sync::Arc::default();
+        let frames: Vec<Frame> = (0..5).map(frame).collect();
+        let mut pass = FirstPass::over(&frames[..2], Box::new(Counting(std::sync::Arc::clone(&seen))));
+        assert_eq!(pass.scans().len(), 2);
+        let mut scan = Scan::default();
+        for f in &frames {
+            assert_eq!(pass.detect(f, &mut scan).is_ok(), f.index.0 != 3);
+            assert!(f.index.0 == 3 || scan.index == f.index);
+        }
+        assert_eq!(*seen.lock().unwrap(), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn memory_bounds_what_is_read_ahead() {
+        let info = |width, height, kind| SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width,
+            height,
+            kind,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        assert_eq!(frames_ahead(&info(100, 100, PixelKind::Gray8), 50, 1 << 20), 50);
+        assert_eq!(frames_ahead(&info(100, 100, PixelKind::GrayF32), 50, 1 << 20), 26);
+        assert_eq!(frames_ahead(&info(60_000, 60_000, PixelKind::Rgb8), 50, 1 << 20), 2);
+    }
+}
