@@ -47,6 +47,9 @@ pub struct TrackerArgs {
     /// How detections are shared out among tracks, or `mht`; `boresight config --list associators` explains each.
     #[arg(long, value_name = "NAME")]
     pub associator: Option<String>,
+    /// Give every track an id of its own, even if it continues a target that was lost for a moment.
+    #[arg(long)]
+    pub no_stitch: bool,
 }
 
 /// What is to be run.
@@ -114,6 +117,9 @@ fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyho
             config.tracker.mht = None;
         }
         None => {}
+    }
+    if tracker.no_stitch {
+        config.tracker.reidentification.max_gap_s = 0.0;
     }
     for set in &args.sets {
         config = config.with(set)?;

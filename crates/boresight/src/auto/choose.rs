@@ -9,6 +9,9 @@ use super::{cells, colour, moving, particles, spots};
 use crate::io::Colour;
 use crate::{Config, Frame, Result, SourceInfo};
 
+/// How long a target may be hidden and keep its id, s: someone behind a lamp post, an aircraft behind a tree.
+pub(super) const REIDENTIFY_S: f64 = 2.0;
+
 /// A proposed configuration and why.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
@@ -68,5 +71,9 @@ pub(super) fn choose_seen(
         let evidence = spots::look(frames, info)?;
         spots::configure(&evidence, info, &mut config, &mut reasons);
     }
+    config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
+    reasons.push(format!(
+        "A target that is lost and found again within {REIDENTIFY_S} s keeps its id (--no-stitch gives every track its own)."
+    ));
     Ok(Choice { config, reasons })
 }

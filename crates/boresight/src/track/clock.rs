@@ -25,6 +25,11 @@ impl Clock {
         Ok(Some(scan.time.seconds_since(last)))
     }
 
+    /// Time of the newest scan; the epoch before the first.
+    pub fn now(&self) -> Timestamp {
+        self.last.unwrap_or_default()
+    }
+
     /// Takes a scan in, `step_s` after the one before.
     pub fn advance(&mut self, now: Timestamp, step_s: Option<f64>) {
         if let Some(step_s) = step_s {

@@ -12,6 +12,7 @@ use super::initial_tracks::InitialTrackConfig;
 use super::initiation::InitiationConfig;
 use super::merged_measurements::MergedMeasurementsConfig;
 use super::mht::config::MhtConfig;
+use super::reidentify::ReidentificationConfig;
 use crate::associate::AssociatorConfig;
 use crate::validate::{at_least_one, check, not_negative, positive, probability};
 use crate::{Error, ErrorKind, Result};
@@ -80,6 +81,8 @@ pub struct TrackerConfig {
     pub two_stage: Option<TwoStageConfig>,
     /// Detections of several targets at once are split among their tracks; left out: they are (`enabled = false` switches it off).
     pub merged_measurements: MergedMeasurementsConfig,
+    /// Whether a target that was lost gets its old id when it is found again.
+    pub reidentification: ReidentificationConfig,
     /// Two confirmed tracks that follow the same detections this long become one, s, above 0; the younger ends.
     pub duplicate_s: f64,
     /// How fast a track's box and intensity follow its detections, in (0, 1]; 1 takes the newest box as it is.
@@ -124,6 +127,7 @@ impl Default for TrackerConfig {
             association_cost: AssociationCostConfig::default(),
             two_stage: None,
             merged_measurements: MergedMeasurementsConfig::default(),
+            reidentification: ReidentificationConfig::default(),
             duplicate_s: 0.5,
             appearance_gain: 0.3,
             coast_s: 0.5,
@@ -242,6 +246,7 @@ impl TrackerConfig {
             )?;
         }
         self.merged_measurements.validate(&format!("{at}.merged-measurements"))?;
+        self.reidentification.validate(&format!("{at}.reidentification"))?;
         positive(at, "duplicate-s", self.duplicate_s, "half a second is usual")?;
         check(
             self.appearance_gain > 0.0 && self.appearance_gain <= 1.0,

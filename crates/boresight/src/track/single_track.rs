@@ -22,6 +22,8 @@ pub(super) struct Track {
     pub duplicate_since_ns: Option<i64>,
     /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
     pub last_place: [f64; 3],
+    /// Whether it was ever reported as confirmed.
+    pub reported: bool,
     /// How far it has come through the confirmation gate.
     pub gate_progress: GateProgress,
 }

@@ -2,9 +2,9 @@
 //!
 //! Source: docs/theory/track-management.md. Confirmed tracks choose first, tentative ones among what is left, what is left then
 //! initiates tracks. The parts are in [`step`](super::step), the confirmation rules in [`confirm`](super::confirm).
-//! Method: tracks lie in one vector in the order of their ids; every pass runs through it from front to back. All scratch
+//! Method: tracks lie in one vector in the order of their initiation; every pass runs through it from front to back. All scratch
 //! memory is kept, so a step allocates nothing once the largest scan was seen. A step is refused as a whole before
-//! anything changes. Ids are never used twice.
+//! anything changes. Two targets never share an id.
 //! Time: every dt comes from the time stamps. A track whose coasting budget ended during a gap is gone before the scan
 //! behind the gap is looked at.
 //! Limits: detections of a scan share its time; `max_tracks` tracks.
@@ -15,6 +15,7 @@ use super::clutter::Clutter;
 use super::config::TrackerConfig;
 use super::confirm::history::{Decision, Evidence};
 use super::merged_measurements::MergedMeasurements;
+use super::reidentify::{Field, Reidentification};
 use super::scan_table::{Predicted, ScanTable};
 use super::single_track::{BATCH, Track};
 use super::step::associate::{Association, associate, gate_confirmed};
@@ -25,7 +26,7 @@ use super::step::predict::predict;
 use super::step::report::report;
 use super::step::update::update;
 use super::tracking::Tracking;
-use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackState};
+use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
 use boresight_filters::Weighted;
 
 /// The tracker.
@@ -44,6 +45,7 @@ pub struct Tracker {
     predicted: Vec<Predicted>,
     association: Association,
     merged: MergedMeasurements,
+    lost: Reidentification,
     weighted: Vec<Weighted>,
     /// Whether the associator is soft (then tracks may be duplicates), and which detections already have a track.
     is_soft: bool,
@@ -71,6 +73,7 @@ impl Tracker {
             predicted: Vec::new(),
             association: Association::new(config),
             merged: MergedMeasurements::default(),
+            lost: Reidentification::default(),
             weighted: Vec::new(),
             is_soft: config.associator.is_soft(),
             owned: Vec::new(),
@@ -90,7 +93,14 @@ impl Tracker {
         let interval_s = self.clock.interval.interval_s();
         // After one scan nobody can say what a gap is.
         if interval_s > 0.0 {
-            self.tracks.retain(|t| !expired_in_gap(&t.history, now, budget_s, interval_s));
+            let Self { tracks, lost, config, clock, .. } = self;
+            tracks.retain(|t| {
+                let expired = expired_in_gap(&t.history, now, budget_s, interval_s);
+                if expired {
+                    lost.remember(&config.reidentification, t, clock.now());
+                }
+                !expired
+            });
         }
     }
 
@@ -112,7 +122,8 @@ impl Tracker {
 
     /// Updates every track, confirms or deletes it, and reports it; the order stays.
     fn update_confirm_delete(&mut self, scan: &Scan) {
-        let Self { config, tracks, table, predicted, association, merged, weighted, cost, owned, states, .. } = self;
+        let Self { config, tracks, table, predicted, association, merged, weighted, cost, owned, states, lost, .. } =
+            self;
         let context = Context { scan, table, config, gate: self.gate };
         let now = scan.time;
         let coast_s = coast_budget_s(config, &self.clock.interval);
@@ -139,11 +150,35 @@ impl Tracker {
             let deleted = config.confirmation.decide(&mut t.history, evidence, now.ns) == Decision::Delete
                 || budget_is_over(&t.history, outcome.secondary, now, coast_s, secondary_s)
                 || (self.is_soft && is_lasting_duplicate(t, owned, &outcome, now, config.duplicate_s));
-            if !deleted {
+            if deleted {
+                lost.remember(&config.reidentification, t, now);
+            } else {
                 states.push(report(t, &outcome, config, table.camera));
             }
             !deleted
         });
+    }
+
+    /// Gives tracks that were confirmed in this scan the id of a lost one that they continue; states and tracks lie in one order.
+    fn reidentify(&mut self, now: Timestamp) {
+        let Self { config, tracks, states, lost, .. } = self;
+        let n_reported = tracks.iter().filter(|t| t.reported).count();
+        let field = Field::new(config.field_px, config.max_speed_px_per_s, n_reported);
+        lost.forget(&config.reidentification, now);
+        let mut i = 0;
+        while i < tracks.len() {
+            if states[i].status != TrackStatus::Tentative && !tracks[i].reported {
+                tracks[i].reported = true;
+                let replaced = lost.identify(&config.reidentification, tracks, i, now, &field);
+                states[i].id = TrackId(tracks[i].id);
+                if let Some(r) = replaced {
+                    tracks.remove(r);
+                    states.remove(r);
+                    i -= usize::from(r < i);
+                }
+            }
+            i += 1;
+        }
     }
 }
 
@@ -173,6 +208,7 @@ impl Tracking for Tracker {
         let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate };
         let mut new = NewTracks { tracks: &mut self.tracks, states: &mut self.states, next_id: &mut self.next_id };
         initiate(&context, &self.clutter, &mut self.association.used, &mut self.pending, &mut new);
+        self.reidentify(scan.time);
         Ok(&self.states)
     }
 }

@@ -25,6 +25,7 @@ const MOST_STEPS: usize = 20_000;
 struct Followed {
     steps: Vec<Step>,
     last_ns: i64,
+    size: [f64; 2],
     confirmed: bool,
 }
 
@@ -35,7 +36,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
-    let mut taken = Vec::new();
+    let (mut taken, mut size_steps) = (Vec::new(), Vec::new());
     for scan in scans {
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
@@ -53,6 +54,11 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
             let d = &on_ground.detections[j as usize];
             let dt_s = if of.steps.is_empty() { 0.0 } else { (scan.time.ns - of.last_ns) as f64 * 1e-9 };
             of.last_ns = scan.time.ns;
+            let size = [d.extent.width_px, d.extent.height_px];
+            if !of.steps.is_empty() {
+                size_steps.extend([(size[0] - of.size[0]).abs(), (size[1] - of.size[1]).abs()]);
+            }
+            of.size = size;
             let [position, variance] = [[d.position.x, d.position.y], [d.cov[(0, 0)], d.cov[(1, 1)]]];
             of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px });
         }
@@ -76,6 +82,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         density_per_height2: t.acceleration_density_per_height2_per_s3,
     };
     let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
+    t.merged_measurements.edge_std_px = round(0.5 * deviation(&mut size_steps));
     t.gate_probability = GATE_PROBABILITY;
     t.detection_covariance_scale = round(found.scale);
     t.extra_noise_px = round(found.extra_px);
@@ -94,4 +101,14 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         t.acceleration_density_per_height2_per_s3,
     ));
     Ok(())
+}
+
+/// Standard deviation by the 68.3 % point of magnitudes: the tails, where a target came apart, do not count. A box's side changes from scan to scan
+/// by the noise of two edges, twice.
+fn deviation(magnitudes: &mut [f64]) -> f64 {
+    if magnitudes.is_empty() {
+        return 0.0;
+    }
+    let at = (0.683 * magnitudes.len() as f64) as usize;
+    *magnitudes.select_nth_unstable_by(at, f64::total_cmp).1
 }

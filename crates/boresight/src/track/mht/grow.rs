@@ -153,6 +153,7 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
                 appearance: Appearance::of(d),
                 duplicate_since_ns: None,
                 last_place: place_of(d, &noise),
+                reported: false,
                 gate_progress: GateProgress::begin([d.position.x, d.position.y], table.camera, d.score),
             },
             score: (growth.mht.new_target_density_per_px2 / density).ln(),

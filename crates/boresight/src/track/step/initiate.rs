@@ -112,6 +112,7 @@ pub(in crate::track) fn from_initial_tracks(
             appearance: Appearance { size: initial.size_px, sum: 0.0, class: None },
             duplicate_since_ns: None,
             last_place: [k.mean[0], k.mean[2], spread],
+            reported: true,
             gate_progress: GateProgress::passed(),
         });
         *next_id += 1;
@@ -142,6 +143,7 @@ fn begin(
         appearance: Appearance::of(d),
         duplicate_since_ns: None,
         last_place: place_of(d, &noise),
+        reported: false,
         gate_progress: GateProgress::begin([d.position.x, d.position.y], table.camera, d.score),
     };
     let outcome = Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() };
