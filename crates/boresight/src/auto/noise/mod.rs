@@ -17,6 +17,8 @@ const LEAST_STEPS: usize = 60;
 /// Probability that a target's detection lies in the gate, once the innovations are as wide as their covariances say: one true detection in
 /// ten thousand outside, a track's loss in some minutes of video. With 0.99 of covariances that were far too large the gate was as wide.
 const GATE_PROBABILITY: f64 = 0.9999;
+/// How long targets are one detection when they pass each other, s.
+const MERGED_S: f64 = 1.0;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
 
@@ -25,7 +27,8 @@ const MOST_STEPS: usize = 20_000;
 struct Followed {
     steps: Vec<Step>,
     last_ns: i64,
-    size: [f64; 2],
+    /// Width and height of each detection, px.
+    sizes: [Vec<f64>; 2],
     confirmed: bool,
 }
 
@@ -36,7 +39,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
-    let (mut taken, mut size_steps) = (Vec::new(), Vec::new());
+    let mut taken = Vec::new();
     for scan in scans {
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
@@ -54,11 +57,8 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
             let d = &on_ground.detections[j as usize];
             let dt_s = if of.steps.is_empty() { 0.0 } else { (scan.time.ns - of.last_ns) as f64 * 1e-9 };
             of.last_ns = scan.time.ns;
-            let size = [d.extent.width_px, d.extent.height_px];
-            if !of.steps.is_empty() {
-                size_steps.extend([(size[0] - of.size[0]).abs(), (size[1] - of.size[1]).abs()]);
-            }
-            of.size = size;
+            of.sizes[0].push(d.extent.width_px);
+            of.sizes[1].push(d.extent.height_px);
             let [position, variance] = [[d.position.x, d.position.y], [d.cov[(0, 0)], d.cov[(1, 1)]]];
             of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px });
         }
@@ -72,6 +72,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         return Ok(());
     }
     let every = n_steps.div_ceil(MOST_STEPS);
+    let size_std = deviation(&mut size_wander(&tracks));
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
     let before = Noise {
@@ -82,7 +83,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         density_per_height2: t.acceleration_density_per_height2_per_s3,
     };
     let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
-    t.merged_measurements.edge_std_px = round(0.5 * deviation(&mut size_steps));
+    t.merged_measurements.edge_std_px = round(size_std);
     t.gate_probability = GATE_PROBABILITY;
     t.detection_covariance_scale = round(found.scale);
     t.extra_noise_px = round(found.extra_px);
@@ -103,8 +104,28 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     Ok(())
 }
 
-/// Standard deviation by the 68.3 % point of magnitudes: the tails, where a target came apart, do not count. A box's side changes from scan to scan
-/// by the noise of two edges, twice.
+/// How far widths and heights change within [`MERGED_S`], over √2: px. The place of a member of a merged measurement is an edge and half of its own
+/// size from before, and both are only known as well as that.
+fn size_wander(tracks: &BTreeMap<u64, Followed>) -> Vec<f64> {
+    let mut out = Vec::new();
+    for t in tracks.values() {
+        let mut now_s = 0.0;
+        let times: Vec<f64> = t.steps.iter().map(|s| (now_s += s.dt_s, now_s).1).collect();
+        let mut from = 0;
+        for (to, time) in times.iter().enumerate() {
+            while from < to && time - times[from + 1] >= MERGED_S {
+                from += 1;
+            }
+            if time - times[from] >= MERGED_S {
+                let change = t.sizes.iter().map(|s| (s[to] - s[from]).abs() / std::f64::consts::SQRT_2);
+                out.extend(change);
+            }
+        }
+    }
+    out
+}
+
+/// Standard deviation by the 68.3 % point of magnitudes: the tails, where a target came apart, do not count.
 fn deviation(magnitudes: &mut [f64]) -> f64 {
     if magnitudes.is_empty() {
         return 0.0;
