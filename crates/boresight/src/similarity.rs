@@ -40,8 +40,8 @@ impl Similarity {
         Self::with_linear(zoom * angle_rad.cos(), zoom * angle_rad.sin(), centre_px, centre_px + shift_px)
     }
 
-    /// With the linear part `[c -s; s c]`, taking the point `from` to the point `to`.
-    pub(crate) fn with_linear(cos: f64, sin: f64, from: Vector2<f64>, to: Vector2<f64>) -> Self {
+    /// With `c` and `s` of the linear part `[c -s; s c]`, taking the point `from` to the point `to` (px).
+    pub fn with_linear(cos: f64, sin: f64, from: Vector2<f64>, to: Vector2<f64>) -> Self {
         let turned = Vector2::new(cos * from.x - sin * from.y, sin * from.x + cos * from.y);
         Self { cos, sin, shift_px: to - turned }
     }
