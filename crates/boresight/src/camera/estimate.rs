@@ -12,7 +12,7 @@
 
 use super::course::Course;
 use super::find_patch::{SEARCH, find};
-use super::fit::{Expected, Fit, Match, fit};
+use super::fit::{AGREE, AGREE_EVEN, Expected, Fit, Match, fit};
 use super::key_frame::KeyFrame;
 use super::reduce::{factor, reduce};
 use crate::{CameraMotion, Image, MotionBasis, Pixels, Similarity};
@@ -121,7 +121,9 @@ impl CameraMotionEstimator {
             self.matches.extend(to.map(|to| Match { from: p.middle(), to, weight: p.weight }));
         }
         let least_turn_px = if self.turning { 0.0 } else { STILL };
-        let found = fit(&self.matches, &Expected { predicted, last, middle, least_turn_px }, &mut self.weights)?;
+        let agree_px = if key.even { AGREE_EVEN } else { AGREE };
+        let expected = Expected { predicted, last, middle, least_turn_px, agree_px };
+        let found = fit(&self.matches, &expected, &mut self.weights)?;
         let moved = corners_apart(&found.now_from_key, &Similarity::identity(), middle) > BELIEVED;
         if key.even && !self.seen_to_move && !moved {
             return None;

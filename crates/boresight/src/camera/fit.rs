@@ -2,7 +2,7 @@
 //!
 //! Source: consensus over single matches and pairs of matches, all of them in order, as in M. Fischler, R. Bolles (RANSAC, *CACM* 24, 1981) without
 //! chance; fit in closed form (S. Umeyama, *IEEE PAMI* 13, 1991, in the plane) with Tukey's biweight; the choice of the model by an F test.
-//! How: the hypothesis with the most weight within [`AGREE`] is the background's; targets and trees in the wind are outvoted. A shift is taken
+//! How: the hypothesis with the most weight near it is the background's; targets and trees in the wind are outvoted. A shift is taken
 //! unless turn and zoom explain the matches significantly better: so a camera that only pans only shifts.
 //! Symbols: p, q matches before and now (reduced px); w weight; A = `[a -b; b a]`; s² residual variance per axis. Covariances: q_mean has
 //! s² sum w² / (sum w)², a and b have s² sum w² |dp|² / (sum w |dp|²)².
@@ -12,8 +12,10 @@ use super::key_frame::MIN_PATCHES;
 use crate::Similarity;
 use nalgebra::{Matrix4, Vector2, Vector4};
 
-/// Matches within this distance of a hypothesis agree with it, reduced px.
-const AGREE: f64 = 0.7;
+/// Matches within this distance of a hypothesis agree with it, reduced px; of patches that stand out, and of an even texture, which may be
+/// little above the noise: its patches are found to about half a pixel, and all cells of the image vote.
+pub(super) const AGREE: f64 = 0.7;
+pub(super) const AGREE_EVEN: f64 = 1.5;
 /// Share of all weight that the winner needs.
 const MAJORITY: f64 = 0.4;
 /// A shift with this share of the weight needs no hypotheses of turn and zoom beside it: the fit finds them.
@@ -48,6 +50,8 @@ pub(super) struct Expected {
     pub middle: Vector2<f64>,
     /// Least movement of the image's corners by turn and zoom that counts, reduced px; 0 if the camera turns already.
     pub least_turn_px: f64,
+    /// Distance within which matches agree: [`AGREE`] or [`AGREE_EVEN`].
+    pub agree_px: f64,
 }
 
 /// The background's motion from the key frame.
@@ -76,7 +80,7 @@ pub(super) fn fit(matches: &[Match], expected: &Expected, weights: &mut Vec<f64>
     let (mut start, mut won) = (expected.predicted, 0.0);
     for m in matches {
         let hypothesis = through(&expected.predicted, m);
-        let weight = agreeing(matches, &hypothesis).map(|m| m.weight).sum::<f64>();
+        let weight = agreeing(matches, &hypothesis, expected.agree_px).map(|m| m.weight).sum::<f64>();
         if weight > won {
             (start, won) = (hypothesis, weight);
         }
@@ -87,13 +91,13 @@ pub(super) fn fit(matches: &[Match], expected: &Expected, weights: &mut Vec<f64>
     {
         (start, won) = (turned, weight);
     }
-    if agreeing(matches, &start).count() < MIN_PATCHES || won <= MAJORITY * all {
+    if agreeing(matches, &start, expected.agree_px).count() < MIN_PATCHES || won <= MAJORITY * all {
         return None;
     }
     // The shift alone keeps the last turn and zoom.
-    let shift = settle(matches, weights, start, |w| shifted(matches, w, &expected.last))
+    let shift = settle(matches, weights, (start, expected.agree_px), |w| shifted(matches, w, &expected.last))
         .filter(|s| s.n >= MIN_PATCHES && s.sums[0] > MAJORITY * all);
-    let turned = settle(matches, weights, start, |w| similar(matches, w))
+    let turned = settle(matches, weights, (start, expected.agree_px), |w| similar(matches, w))
         .filter(|s| s.n >= MIN_TURNED && s.sums[0] > MAJORITY * all && is_near(&s.transform, &expected.predicted));
     let solution = match (shift, turned) {
         (Some(s), Some(t)) if !is_better(matches, weights, &t, expected) => (s, false),
@@ -114,9 +118,9 @@ fn through(linear: &Similarity, m: &Match) -> Similarity {
     Similarity::with_linear(a[(0, 0)], a[(1, 0)], m.from, m.to)
 }
 
-fn agreeing<'m>(matches: &'m [Match], hypothesis: &Similarity) -> impl Iterator<Item = &'m Match> {
+fn agreeing<'m>(matches: &'m [Match], hypothesis: &Similarity, agree_px: f64) -> impl Iterator<Item = &'m Match> {
     let hypothesis = *hypothesis;
-    matches.iter().filter(move |m| (hypothesis.apply(m.from) - m.to).norm_squared() <= AGREE * AGREE)
+    matches.iter().filter(move |m| (hypothesis.apply(m.from) - m.to).norm_squared() <= agree_px * agree_px)
 }
 
 /// The best hypothesis through two matches, with its weight.
@@ -136,7 +140,7 @@ fn best_pair(matches: &[Match], expected: &Expected) -> Option<(Similarity, f64)
             if !is_near(&hypothesis, &expected.predicted) {
                 continue;
             }
-            let weight = agreeing(matches, &hypothesis).map(|m| m.weight).sum::<f64>();
+            let weight = agreeing(matches, &hypothesis, expected.agree_px).map(|m| m.weight).sum::<f64>();
             if weight > most {
                 (best, most) = (Some((hypothesis, weight)), weight);
             }
@@ -151,15 +155,15 @@ fn is_near(a: &Similarity, predicted: &Similarity) -> bool {
     change.angle_rad().abs() <= MOST_TURN && change.zoom().ln().abs() <= MOST_TURN
 }
 
-/// Fits again and again with weights by the distance from the last fit, which count whole near it and nothing beyond [`AGREE`].
+/// Fits again and again with weights by the distance from the last fit, which count whole near it and nothing beyond `agree_px`.
 fn settle(
     matches: &[Match],
     weights: &mut Vec<f64>,
-    start: Similarity,
+    (start, agree_px): (Similarity, f64),
     solve: impl Fn(&[f64]) -> Option<Solution>,
 ) -> Option<Solution> {
     let mut at = start;
-    let mut reach = AGREE;
+    let mut reach = agree_px;
     let mut solution = None;
     // The reach settles within three rounds: from all that agree to those within some deviations.
     for _ in 0..4 {
@@ -171,7 +175,7 @@ fn settle(
         let s = solve(weights)?;
         let spread = (s.sums[4] / (2.0 * s.sums[0])).sqrt();
         // Tukey's 4.7 deviations.
-        reach = (4.7 * spread.max(SHARP)).min(AGREE).max(0.3 * AGREE);
+        reach = (4.7 * spread.max(SHARP)).clamp(0.6 * AGREE, agree_px);
         at = s.transform;
         solution = Some(s);
     }
@@ -232,7 +236,7 @@ fn sums(matches: &[Match], weights: &[f64], transform: Similarity) -> Solution {
 fn is_better(matches: &[Match], weights: &mut Vec<f64>, turned: &Solution, expected: &Expected) -> bool {
     weights.clear();
     weights.extend(matches.iter().map(|m| {
-        let u = (turned.transform.apply(m.from) - m.to).norm() / AGREE;
+        let u = (turned.transform.apply(m.from) - m.to).norm() / expected.agree_px;
         if u < 1.0 { m.weight * (1.0 - u * u).powi(2) } else { 0.0 }
     }));
     let (Some(t), Some(s)) = (similar(matches, weights), shifted(matches, weights, &expected.last)) else {
@@ -295,7 +299,13 @@ mod tests {
     }
 
     fn expected() -> Expected {
-        Expected { predicted: Similarity::identity(), last: Similarity::identity(), middle: MIDDLE, least_turn_px: 0.2 }
+        Expected {
+            predicted: Similarity::identity(),
+            last: Similarity::identity(),
+            middle: MIDDLE,
+            least_turn_px: 0.2,
+            agree_px: AGREE,
+        }
     }
 
     #[test]
