@@ -6,14 +6,14 @@
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest until its corners have moved by [`STILL`]; it comes to rest
 //! again after [`REST_FRAMES`] within that.
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
-//! again or replaced by a frame since. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
+//! again or, where the last frame is found, replaced by that one. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane; [`SEARCH`] reduced px a frame beyond what the course expects. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
 use super::find_patch::{SEARCH, find};
 use super::fit::{AGREE, AGREE_EVEN, Expected, Fit, Match, fit};
-use super::key_frame::KeyFrame;
+use super::key_frame::{KeyFrame, MIN_PATCHES};
 use super::reduce::{factor, reduce};
 use crate::{CameraMotion, Image, MotionBasis, Pixels, Similarity};
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -48,14 +48,13 @@ const MOST_HELD: u32 = 12;
 pub struct CameraMotionEstimator {
     now: Image<f32>,
     key: KeyFrame,
-    /// The last frame, if nothing was found in it: it may be the view from now on.
-    candidate: KeyFrame,
+    /// The last frame: where the key frame is not found it takes its place.
+    last: KeyFrame,
+    key_is_last: bool,
     from_key: Similarity,
     course: Course,
     /// Whether a motion was measured that the course goes on from.
     known: bool,
-    /// Whether the image was seen to move since then.
-    seen_to_move: bool,
     /// Whether turn or zoom changed in the last frame.
     turning: bool,
     rest: Rest,
@@ -85,11 +84,25 @@ impl CameraMotionEstimator {
             return None;
         }
         let middle = self.middle();
-        let found = self.look(false, middle).or_else(|| self.look(true, middle));
+        let mut found = self.look(false, middle);
+        if found.is_none() {
+            self.last.choose();
+            found = self.look(true, middle);
+        }
+        if found.is_none() && self.rest.moving && !self.last.even {
+            // The few patches that stand out do not agree: the many weak ones may.
+            self.last.choose_even();
+            found = self.look(true, middle);
+        }
+        self.last.forget();
+        self.key_is_last = false;
         let (step, cov, basis) = match found {
-            Some(found) => self.measured(found, middle)?,
+            Some(found) => self.measured(found, middle),
             None => self.held(middle)?,
         };
+        if !self.key_is_last {
+            self.last.keep(&mut self.now);
+        }
         Some(full_size(&step, &cov, basis, middle, factor))
     }
 
@@ -100,18 +113,18 @@ impl CameraMotionEstimator {
     /// Forgets all that was; the frame is the key frame.
     fn start_anew(&mut self) {
         self.key.take(&mut self.now);
-        self.candidate.clear();
+        self.last.forget();
         self.from_key = Similarity::identity();
         self.course = Course::default();
-        (self.known, self.seen_to_move, self.turning, self.n_held) = (false, false, false, 0);
+        (self.known, self.turning, self.n_held) = (false, false, 0);
         self.rest = Rest::default();
         self.carried = Matrix4::zeros();
     }
 
     /// Looks for the patches of the key frame, or of the last frame.
-    fn look(&mut self, at_candidate: bool, middle: Vector2<f64>) -> Option<Fit> {
-        let (key, last) = match at_candidate {
-            true => (&self.candidate, Similarity::identity()),
+    fn look(&mut self, at_last: bool, middle: Vector2<f64>) -> Option<Fit> {
+        let (key, last) = match at_last {
+            true => (&self.last, Similarity::identity()),
             false => (&self.key, self.from_key),
         };
         let predicted = last.then(&self.course.next(middle));
@@ -125,22 +138,21 @@ impl CameraMotionEstimator {
         let expected = Expected { predicted, last, middle, least_turn_px, agree_px };
         let found = fit(&self.matches, &expected, &mut self.weights)?;
         let moved = corners_apart(&found.now_from_key, &Similarity::identity(), middle) > BELIEVED;
-        if key.even && !self.seen_to_move && !moved {
+        if key.even && !key.proven && !moved {
             return None;
         }
-        self.seen_to_move |= moved;
-        if at_candidate {
+        if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
-            std::mem::swap(&mut self.key, &mut self.candidate);
+            std::mem::swap(&mut self.key, &mut self.last);
             self.from_key = Similarity::identity();
             self.rest.began_at = Similarity::identity();
         }
-        self.candidate.clear();
+        self.key.proven |= moved;
         Some(found)
     }
 
     /// The motion by a fit.
-    fn measured(&mut self, found: Fit, middle: Vector2<f64>) -> Option<(Similarity, Matrix4<f64>, MotionBasis)> {
+    fn measured(&mut self, found: Fit, middle: Vector2<f64>) -> (Similarity, Matrix4<f64>, MotionBasis) {
         let before = self.from_key;
         self.from_key = self.rest.settle(&before, &found.now_from_key, middle);
         let step = if self.from_key == before { Similarity::identity() } else { before.inverse().then(&self.from_key) };
@@ -157,14 +169,17 @@ impl CameraMotionEstimator {
         let shift = self.from_key.shift_at(middle).abs();
         let far = shift.x > 2.0 * KEY_SHARE * middle.x || shift.y > 2.0 * KEY_SHARE * middle.y;
         let turned = self.from_key.angle_rad().abs() > KEY_TURN || self.from_key.zoom().ln().abs() > KEY_TURN;
-        if far || turned {
+        // Soon too few patches would be left to agree; a camera at rest keeps its key frame, and with it its place.
+        let few = self.rest.moving && self.matches.len() < MIN_PATCHES + 2;
+        if far || turned || few {
             self.new_key();
         }
-        Some((step, cov, MotionBasis::Measured))
+        (step, cov, MotionBasis::Measured)
     }
 
     fn new_key(&mut self) {
         self.key.take(&mut self.now);
+        self.key_is_last = true;
         self.rest.began_at = self.from_key.inverse().then(&self.rest.began_at);
         self.from_key = Similarity::identity();
     }
@@ -187,7 +202,6 @@ impl CameraMotionEstimator {
             return None;
         }
         self.from_key = self.from_key.then(&step);
-        self.candidate.take(&mut self.now);
         self.carried = grown;
         Some((step, grown, MotionBasis::Held))
     }

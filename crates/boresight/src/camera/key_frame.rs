@@ -54,6 +54,9 @@ pub(super) struct KeyFrame {
     pub patches: Vec<Patch>,
     /// No patch stands out from the others.
     pub even: bool,
+    /// It has seen the image move.
+    pub proven: bool,
+    chosen: bool,
     textures: Vec<f32>,
     best: Vec<Textured>,
 }
@@ -61,9 +64,38 @@ pub(super) struct KeyFrame {
 impl KeyFrame {
     /// Takes a frame over (the old one is given in exchange) and chooses its patches.
     pub fn take(&mut self, frame: &mut Image<f32>) {
+        self.keep(frame);
+        self.choose();
+    }
+
+    /// Takes a frame over whose patches may be chosen later.
+    pub fn keep(&mut self, frame: &mut Image<f32>) {
         std::mem::swap(&mut self.image, frame);
+        self.chosen = false;
         self.patches.clear();
-        self.even = false;
+    }
+
+    /// Is to be looked for no more.
+    pub fn forget(&mut self) {
+        self.patches.clear();
+        self.best.clear();
+        self.chosen = true;
+    }
+
+    /// Lets all cells vote, though some patches stand out.
+    pub fn choose_even(&mut self) {
+        (self.chosen, self.even, self.proven) = (true, true, false);
+        self.patches.clear();
+        let textured = self.best.iter().filter(|b| b.texture > 0.0);
+        self.patches.extend(textured.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
+    }
+
+    /// Chooses the patches, if that was not done.
+    pub fn choose(&mut self) {
+        if self.chosen {
+            return;
+        }
+        (self.chosen, self.even, self.proven) = (true, false, false);
         self.find_best();
         if self.textures.is_empty() {
             return;
@@ -73,9 +105,7 @@ impl KeyFrame {
         self.best.sort_unstable_by(|a, b| b.texture.total_cmp(&a.texture).then(a.cell.cmp(&b.cell)));
         let n_clear = self.best.iter().take_while(|b| b.texture > quiet).count();
         if n_clear < MIN_PATCHES {
-            self.even = true;
-            let textured = self.best.iter().filter(|b| b.texture > 0.0);
-            self.patches.extend(textured.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
+            self.choose_even();
             return;
         }
         // A few outstanding things may be targets: they count no more than the next. The square holds down the many weak ones, which
@@ -86,11 +116,6 @@ impl KeyFrame {
             y: b.y,
             weight: f64::from((b.texture - quiet).min(cap) / cap).powi(2),
         }));
-    }
-
-    /// Forgets the patches: nothing is found any more.
-    pub fn clear(&mut self) {
-        self.patches.clear();
     }
 
     fn find_best(&mut self) {
