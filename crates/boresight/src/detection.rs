@@ -1,6 +1,6 @@
 //! A detection is a position with its covariance and what was seen there; a scan is all detections of one time.
 
-use crate::{FrameIndex, Timestamp};
+use crate::{CameraMotion, FrameIndex, Timestamp};
 use nalgebra::{Matrix2, Vector2};
 
 /// Class of a detection, a number given by the detector.
@@ -106,14 +106,14 @@ pub struct Scan {
     pub time: Timestamp,
     /// The detections, in the detector's order.
     pub detections: Vec<Detection>,
-    /// How far the background moved in the image since the scan before (camera motion), px; `None` if it was not looked at.
-    pub camera_shift_px: Option<Vector2<f64>>,
+    /// How the background moved in the image since the scan before; `None` if it is unknown or was not looked at.
+    pub camera_motion: Option<CameraMotion>,
 }
 
 impl Scan {
     /// A scan without detections.
     pub fn at(index: FrameIndex, time: Timestamp) -> Self {
-        Self { index, time, detections: Vec::new(), camera_shift_px: None }
+        Self { index, time, detections: Vec::new(), camera_motion: None }
     }
 
     /// With these detections.
@@ -121,8 +121,8 @@ impl Scan {
         Self { detections, ..self }
     }
 
-    /// With how far the background moved since the scan before, px.
-    pub fn with_camera_shift_px(self, camera_shift_px: Option<Vector2<f64>>) -> Self {
-        Self { camera_shift_px, ..self }
+    /// With how the background moved since the scan before.
+    pub fn with_camera_motion(self, camera_motion: Option<CameraMotion>) -> Self {
+        Self { camera_motion, ..self }
     }
 }

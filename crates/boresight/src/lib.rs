@@ -68,6 +68,7 @@ mod macros;
 pub mod associate;
 pub mod auto;
 pub mod camera;
+mod camera_motion;
 pub mod config;
 mod detection;
 #[cfg(feature = "draw")]
@@ -83,6 +84,7 @@ mod record;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;
+mod similarity;
 mod time;
 pub mod track;
 mod tracks;
@@ -91,12 +93,14 @@ mod validate;
 mod view;
 pub mod vision;
 
+pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;
 pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
+pub use similarity::Similarity;
 pub use time::{FrameIndex, Timestamp};
 pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};

@@ -23,6 +23,11 @@ const MOUSE: Columns = Columns { at: [1, ONE, 2, 3], size: None, first_frame: 1,
 const DRONE: Columns = Columns { at: [0, ONE, 1, 2], size: Some([3, 4]), ..BOXES };
 const CAR: Columns = Columns { first_pixel: 0.0, ..BOXES };
 
+impl Columns {
+    /// Points: frame, id, x, y, from 0, below a header.
+    pub const POINTS: Self = POINTS;
+}
+
 /// How near a result must be to a target.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Near {

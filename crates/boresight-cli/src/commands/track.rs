@@ -47,6 +47,9 @@ pub struct Args {
     /// Also write every frame's tracks as JSON lines to DIR/tracks.jsonl.
     #[arg(long)]
     json: bool,
+    /// Also write how the camera moved, frame by frame with its covariance, to DIR/camera.csv.
+    #[arg(long)]
+    camera: bool,
 }
 
 /// Runs the command.
@@ -87,7 +90,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Vec<Box<dyn Sink>>> {
-    use boresight::io::{DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+    use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(dir.join("tracks.csv"))?),
         Box::new(DetectionsCsv::create(dir.join("detections.csv"))?),
@@ -95,6 +98,9 @@ fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<V
     ];
     if args.json {
         sinks.push(Box::new(JsonLines::create(dir.join("tracks.jsonl"))?));
+    }
+    if args.camera {
+        sinks.push(Box::new(CameraCsv::create(dir.join("camera.csv"))?));
     }
     let pictures = matches!(plan.input, Input::Frames(..));
     if pictures && !args.no_video {

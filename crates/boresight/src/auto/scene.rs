@@ -17,7 +17,7 @@ use crate::vision::config::{ClusterConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Frame, Image, PixelKind, Pixels, Result, Scan, SourceInfo};
+use crate::{Frame, Image, MotionBasis, PixelKind, Pixels, Result, Scan, Similarity, SourceInfo};
 use nalgebra::Vector2;
 
 /// Width of the grid, px.
@@ -169,13 +169,19 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
 fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
-    let mut moved = Vector2::<f64>::zeros();
+    let mut moved = Similarity::identity();
     let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     for frame in frames {
-        if let Some(shift) = motion.step(&frame.pixels) {
-            said += 1;
-            moved += shift;
-            still += u32::from(moved.norm() <= STILL_SHARE * frame.pixels.width() as f64);
+        if let Some(step) = motion.step(&frame.pixels) {
+            moved = moved.then(&step.now_from_before);
+            if step.basis == MotionBasis::Measured {
+                said += 1;
+                // A turn and a zoom about the middle show at the corners.
+                let (w, h) = (frame.pixels.width() as f64, frame.pixels.height() as f64);
+                let corners =
+                    [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].map(|(x, y)| moved.shift_at(Vector2::new(x, y)).norm());
+                still += u32::from(corners.iter().all(|&far| far <= STILL_SHARE * w));
+            }
         }
     }
     // Strong edges would show the smallest shift.

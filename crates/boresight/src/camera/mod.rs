@@ -1,11 +1,16 @@
 //! Camera motion: measured from pixels, added up over scans, and taken out of positions so that tracks live on steady ground.
 //!
-//! [`CameraMotionEstimator`] says in every frame how far the background moved ([`crate::Scan::camera_shift_px`]), [`CameraPath`] keeps what
-//! the camera did since the first scan, and [`SteadyGround`] turns detections into the coordinates of the first scan's background
-//! and tracks back into the image's. A translation is all that is known of the motion.
+//! [`CameraMotionEstimator`] says in every frame how the background moved ([`crate::CameraMotion`]: shift, turn and zoom with their covariance,
+//! measured or held), [`CameraPath`] keeps what the camera did since the first scan, and [`SteadyGround`] turns detections into the
+//! coordinates of the first scan's background and tracks back into the image's.
 
+mod course;
 mod estimate;
+mod find_patch;
+mod fit;
+mod key_frame;
 mod motion;
+mod reduce;
 mod steady;
 
 pub use estimate::{CameraConfig, CameraMotionEstimator};

@@ -18,7 +18,7 @@ impl CameraPath {
     /// Scans that a background must have been followed before its loss is a cut.
     const FOLLOWED: u32 = 10;
 
-    /// Takes the next scan's shift in, px; `None` where it is unknown.
+    /// Takes the next scan's shift at the image's middle in, px; `None` where it was not measured.
     pub fn step(&mut self, shift_px: Option<Vector2<f64>>) {
         match shift_px.map(|s| s.norm()).filter(|length| length.is_finite()) {
             Some(length) => {

@@ -1,25 +1,39 @@
 //! Steady ground: positions turned into the coordinates of the first scan's background, and back into the image's.
 //!
-//! The offset is the sum of the background's shifts since the first scan (px); it is taken from every detection before tracking and given
-//! back to every track after.
-//! Departures: velocities stay relative to the background (px/s); the shift's own error is not added to any covariance.
-//! Limits: translation only; an unknown shift (`None`, or one that is not finite) counts as none.
+//! Source: composition of the scans' similarities; covariances to first order.
+//! Detections go to the ground before tracking: position, box, and R = A⁻¹ (R + C) A⁻ᵀ, where C is the covariance of where the background lies
+//! at that place ([`CameraMotion::cov_at`]). Tracks come back into the image after it, wholly: position, velocity, covariance, box, innovation.
+//! Symbols: x = A g + t (image from ground); S, the motion since the scan before; u = (x - S⁻¹ x) / dt, the ground's own velocity in the image there (px/s);
+//! v_image = A v_ground + u; B = du/dx.
+//! Limits: boxes keep their sides along the image's axes; numbers of the tracker's configuration in px are px of the first scan (at a zoom of 2 they are 2 px
+//! of the image); where the motion is unknown the ground is taken to stand still in the image.
 
-use crate::{Scan, TrackState};
-use nalgebra::Vector2;
+use crate::{CameraMotion, Extent, Scan, Similarity, Timestamp, TrackState};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
 /// Where the first scan's background lies in the image now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SteadyGround {
-    offset_px: Vector2<f64>,
+    image_from_ground: Similarity,
+    /// The last scan's motion, and the time it took, s.
+    motion: Option<CameraMotion>,
+    dt_s: f64,
+    time: Option<Timestamp>,
     moved: bool,
 }
 
 impl SteadyGround {
     /// Returns the ground as it lies in `scan`, the next one.
     pub fn after(self, scan: &Scan) -> Self {
-        let shift = scan.camera_shift_px.filter(|s| s.iter().all(|v| v.is_finite())).unwrap_or_default();
-        Self { offset_px: self.offset_px + shift, moved: self.moved || shift != Vector2::zeros() }
+        let motion = scan.camera_motion.filter(CameraMotion::is_finite);
+        let step = motion.map_or(Similarity::identity(), |m| m.now_from_before);
+        Self {
+            image_from_ground: self.image_from_ground.then(&step),
+            motion,
+            dt_s: self.time.map_or(0.0, |before| scan.time.seconds_since(before)),
+            time: Some(scan.time),
+            moved: self.moved || !step.is_identity(),
+        }
     }
 
     /// Whether the camera was ever seen to move; until then the ground's coordinates are the image's, bit by bit.
@@ -27,26 +41,202 @@ impl SteadyGround {
         self.moved
     }
 
-    /// Replaces `on_ground` by `scan` with the ground's positions and boxes, keeping its memory.
+    /// Replaces `on_ground` by `scan` with the ground's positions, covariances and boxes, keeping its memory.
     pub fn scan_on_ground(self, scan: &Scan, on_ground: &mut Scan) {
         on_ground.index = scan.index;
         on_ground.time = scan.time;
-        on_ground.camera_shift_px = scan.camera_shift_px;
+        on_ground.camera_motion = scan.camera_motion;
         on_ground.detections.clone_from(&scan.detections);
+        let ground = self.image_from_ground.inverse();
+        // Exactly known motions change no covariance, not even in the last bit.
+        let motion = self.motion.filter(|m| m.cov != Matrix4::zeros());
         for d in &mut on_ground.detections {
-            d.position -= self.offset_px;
-            d.extent.left_px -= self.offset_px.x;
-            d.extent.top_px -= self.offset_px.y;
+            if let Some(m) = motion {
+                d.cov += m.cov_at(d.position);
+            }
+            d.cov = ground.turn_cov(&d.cov);
+            d.position = ground.apply(d.position);
+            d.extent = moved(d.extent, &ground);
         }
     }
 
-    /// Turns the positions and boxes of tracks on the ground into the image's.
+    /// Turns tracks on the ground into the image's.
     pub fn tracks_in_image(self, tracks: &mut [TrackState]) {
         for t in tracks {
-            t.kinematics.mean[0] += self.offset_px.x;
-            t.kinematics.mean[2] += self.offset_px.y;
-            t.extent.left_px += self.offset_px.x;
-            t.extent.top_px += self.offset_px.y;
+            self.track_in_image(t);
         }
+    }
+
+    fn track_in_image(&self, t: &mut TrackState) {
+        let (mean, cov) = (&mut t.kinematics.mean, &mut t.kinematics.cov);
+        let image = &self.image_from_ground;
+        let at = image.apply(Vector2::new(mean[0], mean[2]));
+        let mut velocity = image.turn(Vector2::new(mean[1], mean[3]));
+        let step = self.motion.filter(|_| self.dt_s > 0.0);
+        let mut of_place = Matrix2::zeros();
+        if let Some(m) = step.filter(|m| !m.now_from_before.is_identity()) {
+            let back = m.now_from_before.inverse();
+            velocity -= back.shift_at(at) / self.dt_s;
+            of_place = (Matrix2::identity() - back.linear()) / self.dt_s;
+        }
+        if !(image.is_shift() && of_place == Matrix2::zeros()) {
+            let a = image.linear();
+            let mut transform = by_axis(&a, &a);
+            let coupled = of_place * a;
+            for i in 0..2 {
+                for j in 0..2 {
+                    transform[(2 * i + 1, 2 * j)] += coupled[(i, j)];
+                }
+            }
+            let turned = transform * *cov * transform.transpose();
+            *cov = 0.5 * (turned + turned.transpose());
+        }
+        if let Some(m) = step.filter(|m| m.cov != Matrix4::zeros()) {
+            let c = m.cov_at(at);
+            *cov += by_axis(&Matrix2::zeros(), &(c / (self.dt_s * self.dt_s)));
+            if t.detection.is_none() {
+                // A detection was seen in the image itself; a prediction is only as good as the ground.
+                *cov += by_axis(&c, &Matrix2::zeros());
+            }
+        }
+        (mean[0], mean[1], mean[2], mean[3]) = (at.x, velocity.x, at.y, velocity.y);
+        t.extent = moved(t.extent, image);
+        if let Some(i) = t.innovation.as_mut().filter(|_| !image.is_shift()) {
+            i.innovation = image.turn(i.innovation);
+            i.cov = image.turn_cov(&i.cov);
+        }
+    }
+}
+
+/// The matrix over `[x, vx, y, vy]` of a block for positions and one for velocities.
+fn by_axis(position: &Matrix2<f64>, velocity: &Matrix2<f64>) -> Matrix4<f64> {
+    let mut out = Matrix4::zeros();
+    for i in 0..2 {
+        for j in 0..2 {
+            out[(2 * i, 2 * j)] = position[(i, j)];
+            out[(2 * i + 1, 2 * j + 1)] = velocity[(i, j)];
+        }
+    }
+    out
+}
+
+/// A box around the place where its middle comes to lie, zoomed, its sides along the axes.
+fn moved(e: Extent, by: &Similarity) -> Extent {
+    if by.is_shift() {
+        let corner = by.apply(Vector2::new(e.left_px, e.top_px));
+        return Extent { left_px: corner.x, top_px: corner.y, ..e };
+    }
+    let middle = Vector2::new(e.left_px + 0.5 * e.width_px, e.top_px + 0.5 * e.height_px);
+    let zoom = by.zoom();
+    Extent::around(by.apply(middle), zoom * e.width_px, zoom * e.height_px)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detection, FrameIndex, MotionBasis, TrackId, TrackStatus};
+    use boresight_filters::Gaussian;
+    use nalgebra::Vector4;
+
+    fn scan(k: u64, position: Vector2<f64>, motion: Option<CameraMotion>) -> Scan {
+        let seen =
+            Detection::at(position, Matrix2::new(0.2, 0.05, 0.05, 0.1)).with_extent(Extent::around(position, 6.0, 4.0));
+        Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * k as f64))
+            .with_detections(vec![seen])
+            .with_camera_motion(motion)
+    }
+
+    fn track(mean: Vector4<f64>, cov: Matrix4<f64>, extent: Extent, detection: Option<u32>) -> TrackState {
+        TrackState {
+            id: TrackId(1),
+            status: TrackStatus::Confirmed,
+            kinematics: Gaussian { mean, cov },
+            extent,
+            detection,
+            innovation: None,
+            score: 1.0,
+        }
+    }
+
+    fn turning() -> CameraMotion {
+        CameraMotion {
+            now_from_before: Similarity::about(Vector2::new(160.0, 120.0), Vector2::new(3.0, -1.0), 0.02, 1.01),
+            centre_px: Vector2::new(160.0, 120.0),
+            cov: Matrix4::zeros(),
+            basis: MotionBasis::Measured,
+        }
+    }
+
+    #[test]
+    fn what_lies_on_the_ground_moves_in_the_image_as_the_ground_does() {
+        let motion = turning();
+        let mut ground = SteadyGround::default().after(&scan(0, Vector2::zeros(), None));
+        let mut at = Vector2::new(40.0, 200.0);
+        let first = at;
+        for k in 1..30 {
+            let before = at;
+            at = motion.now_from_before.apply(at);
+            let now = scan(k, at, Some(motion));
+            ground = ground.after(&now);
+            let mut on_ground = Scan::default();
+            ground.scan_on_ground(&now, &mut on_ground);
+            let d = &on_ground.detections[0];
+            assert!((d.position - first).norm() < 1e-9 && ground.has_moved());
+            // A track that stands still on the ground has the ground's velocity in the image, and its box the image's size.
+            let cov = by_axis(&d.cov, &Matrix2::identity());
+            let mut states = [track(Vector4::new(d.position.x, 0.0, d.position.y, 0.0), cov, d.extent, Some(0))];
+            ground.tracks_in_image(&mut states);
+            let (mean, cov) = (states[0].kinematics.mean, states[0].kinematics.cov);
+            assert!((Vector2::new(mean[0], mean[2]) - at).norm() < 1e-9);
+            assert!((Vector2::new(mean[1], mean[3]) - (at - before) / 0.04).norm() < 1e-6, "scan {k}");
+            assert!((states[0].extent.width_px - 6.0).abs() < 1e-9);
+            let position = Matrix2::new(cov[(0, 0)], cov[(0, 2)], cov[(2, 0)], cov[(2, 2)]);
+            assert!((position - Matrix2::new(0.2, 0.05, 0.05, 0.1)).norm() < 1e-9, "there and back: {position}");
+        }
+    }
+
+    #[test]
+    fn an_uncertain_motion_widens_detections_and_what_is_only_predicted() {
+        let motion = CameraMotion {
+            cov: Matrix4::from_diagonal(&Vector4::new(0.5, 0.5, 1e-4, 0.0)),
+            basis: MotionBasis::Held,
+            ..turning()
+        };
+        let at = Vector2::new(260.0, 120.0);
+        let now = scan(1, at, Some(motion));
+        let ground = SteadyGround::default().after(&scan(0, at, None)).after(&now);
+        let mut on_ground = Scan::default();
+        ground.scan_on_ground(&now, &mut on_ground);
+        // 100 px to the right a turn moves along y: 0.1 + 0.5 + 1e-4 x 100².
+        let back = motion.now_from_before.turn_cov(&on_ground.detections[0].cov);
+        assert!((back - Matrix2::new(0.7, 0.05, 0.05, 1.6)).norm() < 1e-9, "{back}");
+        let still = track(Vector4::new(260.0, 0.0, 120.0, 0.0), Matrix4::zeros(), Extent::default(), None);
+        let mut states = [still.clone(), TrackState { detection: Some(0), ..still }];
+        ground.tracks_in_image(&mut states);
+        assert!(states[0].kinematics.cov[(0, 0)] > 0.4 && states[1].kinematics.cov[(0, 0)] == 0.0);
+        assert!(states[1].kinematics.cov[(1, 1)] > 0.4 / (0.04 * 0.04));
+    }
+
+    #[test]
+    fn until_the_camera_moves_nothing_changes_not_a_bit() {
+        let at = Vector2::new(0.1 + 0.2, 1.0 / 3.0);
+        let still = Some(CameraMotion::exact_shift(Vector2::zeros()));
+        let ground = SteadyGround::default().after(&scan(0, at, None)).after(&scan(1, at, still));
+        let mut on_ground = Scan::default();
+        ground.scan_on_ground(&scan(1, at, still), &mut on_ground);
+        assert!(!ground.has_moved());
+        assert_eq!(on_ground, scan(1, at, still));
+        let cov = Matrix4::identity() * 0.1;
+        let before = [track(Vector4::new(at.x, 0.7, at.y, 0.1), cov, on_ground.detections[0].extent, None)];
+        let mut after = before.clone();
+        ground.tracks_in_image(&mut after);
+        assert_eq!(after, before);
+    }
+
+    #[test]
+    fn a_motion_that_is_no_number_is_unknown() {
+        let motion = CameraMotion::exact_shift(Vector2::new(f64::NAN, 0.0));
+        let ground = SteadyGround::default().after(&scan(0, Vector2::zeros(), Some(motion)));
+        assert!(!ground.has_moved());
     }
 }

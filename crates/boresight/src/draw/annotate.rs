@@ -7,7 +7,8 @@ use super::canvas::{Canvas, Pen, Rgb};
 use super::palette::track_colour;
 use super::text::Lettering;
 use super::tone::{Tone, legible_scale};
-use crate::{Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
+use crate::{CameraMotion, Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
+use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
@@ -156,10 +157,10 @@ impl Annotator {
     fn remember(&mut self, view: &View<'_>) {
         let now = view.scan.time;
         // Where the camera moves, trails stay on the ground.
-        if let Some(shift) = view.scan.camera_shift_px.filter(|s| s.x.is_finite() && s.y.is_finite()) {
+        if let Some(motion) = view.scan.camera_motion.filter(CameraMotion::is_finite) {
             for (_, (x, y)) in self.trails.values_mut().flatten() {
-                *x += shift.x;
-                *y += shift.y;
+                let moved = motion.now_from_before.apply(Vector2::new(*x, *y));
+                (*x, *y) = (moved.x, moved.y);
             }
         }
         if self.options.trail_s > 0.0 {

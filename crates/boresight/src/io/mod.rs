@@ -41,6 +41,6 @@ pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
-    Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, StateTable, TableOptions, TracksCsv, read_detections,
-    read_tracks,
+    CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, StateTable, TableOptions, TracksCsv,
+    read_detections, read_tracks,
 };

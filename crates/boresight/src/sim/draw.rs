@@ -6,10 +6,11 @@
 //! spread; from frame to frame it is an AR(1) sequence. Spots are integrated over each pixel (difference of error functions).
 //! Units: counts, px. Limits: one frame, one clutter image, two fixed-pattern images are held.
 
+use super::ground::Texture;
 use super::random::{Purpose, Seed};
 use super::render::{clip, first_pixel};
 use super::scene::{Background, SceneConfig, Shape, Target, Textured};
-use crate::{Frame, FrameSource, Image, Pixels, Result};
+use crate::{Frame, FrameSource, Image, Pixels, Result, Similarity};
 use nalgebra::{Vector2, Vector4};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -26,6 +27,7 @@ pub(super) struct Painter {
     scratch: Vec<f32>,
     clutter: Vec<f32>,
     clutter_frame: Option<u64>,
+    ground: Texture,
     textures: Vec<Option<Image<f32>>>,
     offset: Vec<f32>,
     gain: Vec<f32>,
@@ -55,6 +57,7 @@ impl Painter {
             scratch: Vec::new(),
             clutter: Vec::new(),
             clutter_frame: None,
+            ground: Texture::new(seed.stream(Purpose::Clutter, KIND).random()),
             textures,
             offset: fixed(0, c.sensor.offset_std, 0.0),
             gain: fixed(1, c.sensor.gain_std, 1.0),
@@ -70,7 +73,7 @@ impl Painter {
         &mut self,
         c: &SceneConfig,
         k: u64,
-        camera: Vector2<f64>,
+        camera: &Similarity,
         present: &[(usize, Vector4<f64>, f64)],
         spare: Option<Pixels>,
     ) -> Result<Pixels> {
@@ -96,7 +99,7 @@ impl Painter {
         Ok(self.digitise(c, spare))
     }
 
-    fn background(&mut self, c: &SceneConfig, k: u64, camera: Vector2<f64>, rng: &mut ChaCha8Rng) -> Result<()> {
+    fn background(&mut self, c: &SceneConfig, k: u64, camera: &Similarity, rng: &mut ChaCha8Rng) -> Result<()> {
         let (w, h) = (c.width_px, c.height_px);
         if let Some(video) = &mut self.video {
             while self.video_next <= k {
@@ -117,13 +120,14 @@ impl Painter {
             }
             return Ok(());
         }
+        let ground = camera.inverse();
         match &c.background {
             Background::White(b) => self.canvas.iter_mut().for_each(|v| *v = b.mean as f32 + normal(rng, b.std)),
             Background::Gradient(g) => {
                 for (y, row) in self.canvas.chunks_exact_mut(w).enumerate() {
-                    let left = g.level + g.slope_per_px[1] * (y as f64 - camera[1]);
                     for (x, v) in row.iter_mut().enumerate() {
-                        *v = (left + g.slope_per_px[0] * (x as f64 - camera[0])) as f32
+                        let at = ground.apply(Vector2::new(x as f64, y as f64));
+                        *v = (g.level + g.slope_per_px[1] * at.y + g.slope_per_px[0] * at.x) as f32
                             + if g.std > 0.0 { normal(rng, g.std) } else { 0.0 };
                     }
                 }
@@ -147,6 +151,15 @@ impl Painter {
                 }
                 self.clutter_frame = Some(k);
                 self.canvas.iter_mut().zip(&self.clutter).for_each(|(v, z)| *v = b.mean as f32 + b.std as f32 * z);
+            }
+            Background::Ground(g) => {
+                for (y, row) in self.canvas.chunks_exact_mut(w).enumerate() {
+                    for (x, v) in row.iter_mut().enumerate() {
+                        let at = ground.apply(Vector2::new(x as f64, y as f64));
+                        *v = self.ground.at(g, at) as f32
+                            + if g.noise_std > 0.0 { normal(rng, g.noise_std) } else { 0.0 };
+                    }
+                }
             }
             Background::File(_) => self.canvas.fill(0.0),
         }
@@ -309,8 +322,8 @@ fn bilinear(t: &Image<f32>, x: f64, y: f64) -> f32 {
     (a[x0] * (1.0 - fx) + a[x1] * fx) * (1.0 - fy) + (b[x0] * (1.0 - fx) + b[x1] * fx) * fy
 }
 
-/// Copies a picture moved by the camera's offset (border pixels are repeated); colour becomes BT.601 grey.
-fn copy_moved(pixels: &Pixels, camera: Vector2<f64>, w: usize, h: usize, out: &mut [f32]) {
+/// Copies a picture moved with the ground (border pixels are repeated); colour becomes BT.601 grey.
+fn copy_moved(pixels: &Pixels, camera: &Similarity, w: usize, h: usize, out: &mut [f32]) {
     let (pw, ph) = (pixels.width(), pixels.height());
     if pw == 0 || ph == 0 {
         return;
@@ -327,14 +340,14 @@ fn copy_moved(pixels: &Pixels, camera: Vector2<f64>, w: usize, h: usize, out: &m
             }
         }
     };
-    let still = camera == Vector2::zeros();
+    let (still, ground) = (camera.is_identity(), camera.inverse());
     for y in 0..h {
         for x in 0..w {
             out[y * w + x] = if still {
                 at(x.min(pw - 1), y.min(ph - 1))
             } else {
-                let sx = (x as f64 - camera[0]).clamp(0.0, pw as f64 - 1.0);
-                let sy = (y as f64 - camera[1]).clamp(0.0, ph as f64 - 1.0);
+                let from = ground.apply(Vector2::new(x as f64, y as f64));
+                let (sx, sy) = (from.x.clamp(0.0, pw as f64 - 1.0), from.y.clamp(0.0, ph as f64 - 1.0));
                 let (x0, y0) = (sx as usize, sy as usize);
                 let (x1, y1) = ((x0 + 1).min(pw - 1), (y0 + 1).min(ph - 1));
                 let (fx, fy) = ((sx - x0 as f64) as f32, (sy - y0 as f64) as f32);

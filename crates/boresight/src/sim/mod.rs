@@ -5,6 +5,7 @@
 //! same bits on every machine of the architecture and for any number of threads.
 
 mod draw;
+pub mod ground;
 pub mod motion;
 pub(crate) mod named;
 pub(crate) mod radar;

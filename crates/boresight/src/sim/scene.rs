@@ -6,6 +6,7 @@
 //! clamp and round.
 //! Units: px, s, counts. Coordinates: (x, y) = (column, row), centre of the top-left pixel = (0, 0).
 
+use super::ground::{CameraPathConfig, Ground};
 use super::motion::MotionConfig;
 use super::radar_config::RadarConfig;
 use crate::{Error, ErrorKind, Result};
@@ -32,6 +33,8 @@ pub struct SceneConfig {
     pub targets: Vec<Target>,
     /// Things that stand still in front of the targets.
     pub occluders: Vec<Occluder>,
+    /// How the camera moves; starts and velocities of the targets, and `ground` and `gradient` behind them, stay where they are, on the ground.
+    pub camera: CameraPathConfig,
     /// What the sensor does to the scene.
     pub sensor: Sensor,
     /// What the clock does: dropped frames, jitter.
@@ -51,6 +54,7 @@ impl Default for SceneConfig {
             background: Background::default(),
             targets: vec![Target::default()],
             occluders: Vec::new(),
+            camera: CameraPathConfig::default(),
             sensor: Sensor::default(),
             clock: Clock::default(),
             radars: Vec::new(),
@@ -68,6 +72,8 @@ pub enum Background {
     Correlated(Correlated),
     /// A plane of brightness.
     Gradient(Gradient),
+    /// A textured ground without end, over which the camera moves.
+    Ground(Ground),
     /// Frames of a picture or a video file, in its own size; the last frame stays when it ends.
     File(String),
 }

@@ -42,10 +42,24 @@ impl SceneConfig {
                     "finite numbers",
                 )?;
             }
+            Background::Ground(g) => {
+                let spreads = [g.std, g.noise_std];
+                check(
+                    spreads.iter().all(|&v| spread(v)) && g.mean.is_finite(),
+                    "background.ground.std",
+                    &spreads,
+                    "numbers, 0 or more",
+                )?;
+                let sound = (1.0..=1024.0).contains(&g.length_px);
+                check(sound, "background.ground.length-px", &g.length_px, "1..=1024 px")?;
+            }
             Background::File(path) => {
                 check(!path.is_empty(), "background.file", path, "the path of a picture or a video")?
             }
         }
+        let c = &self.camera;
+        let speeds = [c.pan_px_per_s[0], c.pan_px_per_s[1], c.rotation_deg_per_s, c.zoom_per_s];
+        check(speeds.iter().all(|v| v.is_finite() && v.abs() < 1e6), "camera", &speeds, "finite numbers")?;
         for (i, r) in self.radars.iter().enumerate() {
             r.validate(&format!("{at}.radars[{i}]"))?;
             let again = self.radars.iter().take(i).any(|other| other.name == r.name);

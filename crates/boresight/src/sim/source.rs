@@ -12,8 +12,8 @@ use super::random::{LevelNoise, LevelTable, Purpose, Seed};
 use super::render::{clip, first_pixel};
 use super::scene::{Background, SceneConfig, Sensor, Shape, Target};
 use crate::{
-    Error, ErrorKind, Extent, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
-    TrackId, TrackState, TrackStatus,
+    Error, ErrorKind, Extent, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, Similarity, SourceInfo,
+    Timestamp, TrackId, TrackState, TrackStatus,
 };
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -117,7 +117,18 @@ impl SceneSource {
         &self.config
     }
 
-    /// Time of frame `k` and whether it is dropped, and the camera's offset in it.
+    /// The image's middle, px.
+    fn middle_px(&self) -> Vector2<f64> {
+        Vector2::new(0.5 * (self.config.width_px as f64 - 1.0), 0.5 * (self.config.height_px as f64 - 1.0))
+    }
+
+    /// Where the ground lies in the image in frame `k`: what the camera does, as the truth has it.
+    pub fn image_from_ground(&self, k: u64) -> Similarity {
+        let (time, _, jitter) = self.clock(k);
+        self.config.camera.image_from_ground(time.as_secs_f64(), self.middle_px(), jitter)
+    }
+
+    /// Time of frame `k` and whether it is dropped, and the camera's jitter in it.
     fn clock(&self, k: u64) -> (Timestamp, bool, Vector2<f64>) {
         let c = &self.config;
         let nominal_s = k as f64 / c.rate_hz;
@@ -134,7 +145,7 @@ impl SceneSource {
     }
 
     /// Moves all targets to `time` and writes the truth; returns each target's state in the picture and its growth.
-    fn advance(&mut self, time: Timestamp, camera: Vector2<f64>, present: &mut Vec<(usize, Vector4<f64>, f64)>) {
+    fn advance(&mut self, time: Timestamp, camera: &Similarity, present: &mut Vec<(usize, Vector4<f64>, f64)>) {
         let t = time.as_secs_f64();
         present.clear();
         self.truth.clear();
@@ -147,8 +158,12 @@ impl SceneSource {
                 Mover::new(&target.motion, Vector4::new(x, vx, y, vy), target.appears_s, self.seed, i as u64)
             };
             let mut s = self.movers[i].get_or_insert_with(start).at(t);
-            s[0] += camera[0];
-            s[2] += camera[1];
+            if self.config.camera.is_still() {
+                let moved = camera.apply(Vector2::new(s[0], s[2]));
+                (s[0], s[2]) = (moved.x, moved.y);
+            } else {
+                s = self.config.camera.state_in_image(camera, self.middle_px(), &s);
+            }
             let growth = (1.0 + target.growth_per_s * (t - target.appears_s)).max(0.0);
             let extent = extent(target, s, growth);
             let seen = seen_share(&self.config, extent);
@@ -250,9 +265,10 @@ impl FrameSource for SceneSource {
                 return Ok(None);
             }
             self.next += 1;
-            let (time, dropped, camera) = self.clock(k);
+            let (time, dropped, jitter) = self.clock(k);
+            let camera = self.config.camera.image_from_ground(time.as_secs_f64(), self.middle_px(), jitter);
             // Targets move in dropped frames too: their noise is drawn frame by frame.
-            self.advance(time, camera, &mut present);
+            self.advance(time, &camera, &mut present);
             let t = time.as_secs_f64();
             if dropped || self.config.clock.silent_s.iter().any(|[from, to]| (*from..=*to).contains(&t)) {
                 continue;
@@ -274,7 +290,7 @@ impl FrameSource for SceneSource {
                     }
                     Pixels::Gray8(image)
                 }
-                Way::Floats(painter) => painter.paint(&self.config, k, camera, &present, spare)?,
+                Way::Floats(painter) => painter.paint(&self.config, k, &camera, &present, spare)?,
             };
             return Ok(Some(Frame { index: FrameIndex(k), time, pixels }));
         }

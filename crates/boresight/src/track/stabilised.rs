@@ -3,7 +3,7 @@
 //! Source: our own. [`SteadyGround`] turns every scan into those coordinates before the tracker inside sees it, and its tracks back into the image's.
 //! Filters, gates, initiation and confirmation then see targets against the ground, whatever the camera does.
 //! Where the image's size is known, tracks that have left it are no longer reported (they may come back while they coast).
-//! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a shift.
+//! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a motion.
 
 use super::tracking::Tracking;
 use crate::camera::SteadyGround;
@@ -53,7 +53,7 @@ impl Tracking for Stabilised {
 mod tests {
     use super::*;
     use crate::track::{Tracker, TrackerConfig};
-    use crate::{Detection, Extent, FrameIndex, Timestamp};
+    use crate::{CameraMotion, Detection, Extent, FrameIndex, Timestamp};
     use nalgebra::{Matrix2, Vector2};
 
     fn scan(k: u64, points: &[(f64, f64)], shift: Option<(f64, f64)>) -> Scan {
@@ -69,7 +69,7 @@ mod tests {
             .collect();
         Scan::at(FrameIndex(k), Timestamp::from_secs_f64(k as f64 * 0.04))
             .with_detections(detections)
-            .with_camera_shift_px(shift.map(|(x, y)| Vector2::new(x, y)))
+            .with_camera_motion(shift.map(|(x, y)| CameraMotion::exact_shift(Vector2::new(x, y))))
     }
 
     #[test]

@@ -51,7 +51,7 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
     })
 }
 
-/// A detector that also says how far the background moved.
+/// A detector that also says how the background moved.
 struct WithCamera {
     detector: Box<dyn Detector>,
     camera: CameraMotionEstimator,
@@ -60,7 +60,7 @@ struct WithCamera {
 impl Detector for WithCamera {
     fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
         self.detector.detect(frame, scan)?;
-        scan.camera_shift_px = self.camera.step(&frame.pixels);
+        scan.camera_motion = self.camera.step(&frame.pixels);
         Ok(())
     }
 }
@@ -150,7 +150,7 @@ impl Detector for FrameDetector {
         scan.index = frame.index;
         scan.time = frame.time;
         scan.detections.clear();
-        scan.camera_shift_px = None;
+        scan.camera_motion = None;
         if (frame.pixels.width(), frame.pixels.height()) != self.size {
             return Err(self.refused(frame));
         }

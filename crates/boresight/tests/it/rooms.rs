@@ -9,8 +9,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Leaf types, open to all.
-const LEAVES: &[&str] =
-    &["image", "frame", "detection", "record", "tracks", "view", "error", "time", "union_find", "validate"];
+const LEAVES: &[&str] = &[
+    "image",
+    "frame",
+    "similarity",
+    "camera_motion",
+    "detection",
+    "record",
+    "tracks",
+    "view",
+    "error",
+    "time",
+    "union_find",
+    "validate",
+];
 
 /// room -> rooms it may use besides the leaves and itself.
 const ARROWS: &[(&str, &[&str])] = &[

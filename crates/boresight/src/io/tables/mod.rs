@@ -4,6 +4,7 @@
 //! [`dialect`] knows what is special of each, [`row`] gives cells as numbers. What is made of the rows: detections
 //! ([`read_detections`]), states ([`read_tracks`]), or a table of tracks (`io::tracks`).
 
+mod camera_csv;
 pub(crate) mod columns;
 mod detection_row;
 mod detections_csv;
@@ -23,6 +24,7 @@ mod seqinfo;
 pub(crate) mod table;
 mod tracks_csv;
 
+pub use camera_csv::CameraCsv;
 pub use columns::Columns;
 pub use detections_csv::DetectionsCsv;
 pub use dialect::mot::mot_box_of_extent;

@@ -1,0 +1,169 @@
+//! Tests of the camera's motion on simulated grounds.
+
+use super::*;
+use crate::sim::ground::{CameraPathConfig, Ground};
+use crate::sim::scene::Background;
+use crate::sim::{SceneConfig, SceneSource, Seed};
+use crate::{Frame, FrameSource};
+
+/// A ground of knots every `length_px` under a camera; per-frame rates.
+fn scene(size: (usize, usize), length_px: f64, pan: [f64; 2], turn_deg: f64, zoom: f64, n_frames: u64) -> SceneSource {
+    let mut scene =
+        SceneConfig { width_px: size.0, height_px: size.1, rate_hz: 25.0, n_frames, ..SceneConfig::default() };
+    scene.targets.clear();
+    scene.background = Background::Ground(Ground { length_px, noise_std: 1.0, ..Ground::default() });
+    scene.camera = CameraPathConfig {
+        pan_px_per_s: pan.map(|v| 25.0 * v),
+        rotation_deg_per_s: 25.0 * turn_deg,
+        zoom_per_s: 25.0 * zoom,
+    };
+    scene.build(Seed::new(7)).unwrap()
+}
+
+fn frames(source: &mut SceneSource) -> Vec<Frame> {
+    std::iter::from_fn(|| source.next_frame().unwrap()).collect()
+}
+
+/// Motion of frame `k` as it is.
+fn truth(source: &SceneSource, k: u64) -> Similarity {
+    source.image_from_ground(k - 1).inverse().then(&source.image_from_ground(k))
+}
+
+#[test]
+fn a_pan_of_2_to_5_px_a_frame_over_any_texture_is_never_unknown() {
+    // At 28 px the patches are hardly above the noise.
+    for (length, pan) in [(6.0, 2.0), (16.0, 3.5), (16.0, 5.0), (28.0, 3.0)] {
+        let mut source = scene((320, 240), length, [pan, 0.3 * pan], 0.0, 0.0, 60);
+        let frames = frames(&mut source);
+        let mut camera = CameraMotionEstimator::default();
+        let mut ground = Similarity::identity();
+        for (k, frame) in frames.iter().enumerate() {
+            let motion = camera.step(&frame.pixels);
+            let Some(motion) = motion else {
+                assert_eq!(k, 0, "length {length}, pan {pan}: unknown in frame {k}");
+                continue;
+            };
+            assert_eq!(motion.basis, MotionBasis::Measured, "length {length}, pan {pan}, frame {k}");
+            assert!(motion.now_from_before.is_shift(), "a pan only shifts: frame {k}");
+            ground = ground.then(&motion.now_from_before);
+            let error = ground.shift_at(motion.centre_px) - Vector2::new(pan, 0.3 * pan) * k as f64;
+            assert!(error.norm() < 0.4, "length {length}, pan {pan}, frame {k}: off by {error}");
+        }
+    }
+}
+
+#[test]
+fn turn_and_zoom_are_measured_to_a_twentieth_of_a_degree_and_of_a_percent() {
+    for (turn, zoom) in [(1.0, 0.0), (-0.5, 0.01)] {
+        let mut source = scene((320, 240), 16.0, [1.0, 0.0], turn, zoom, 60);
+        let frames = frames(&mut source);
+        let mut camera = CameraMotionEstimator::default();
+        let mut squares = [0.0f64; 2];
+        for (k, frame) in frames.iter().enumerate() {
+            let motion = camera.step(&frame.pixels);
+            if k < 3 {
+                continue; // the first frames learn the course
+            }
+            let motion = motion.unwrap_or_else(|| panic!("turn {turn}, zoom {zoom}: unknown in frame {k}"));
+            assert_eq!(motion.basis, MotionBasis::Measured, "turn {turn}, zoom {zoom}, frame {k}");
+            let (now, truth) = (motion.now_from_before, truth(&source, k as u64));
+            squares[0] += (now.angle_rad() - truth.angle_rad()).to_degrees().powi(2);
+            squares[1] += (100.0 * (now.zoom() / truth.zoom() - 1.0)).powi(2);
+            let error = now.shift_at(motion.centre_px) - truth.shift_at(motion.centre_px);
+            assert!(error.norm() < 0.3, "turn {turn}, zoom {zoom}, frame {k}: off by {error}");
+        }
+        let rms = squares.map(|s| (s / 57.0).sqrt());
+        assert!(rms[0] < 0.05 && rms[1] < 0.05, "turn {turn}, zoom {zoom}: {rms:?}");
+    }
+}
+
+#[test]
+fn a_fixed_camera_under_noise_has_exactly_no_motion() {
+    for even in [false, true] {
+        let mut source = scene((320, 240), 16.0, [0.0, 0.0], 0.0, 0.0, 60);
+        let mut camera = CameraMotionEstimator::default();
+        let mut n = 0;
+        while let Some(frame) = source.next_frame().unwrap() {
+            let Pixels::Gray8(mut image) = frame.pixels else { unreachable!() };
+            if !even {
+                // A quiet sky: the ground below it stands out.
+                (0..100).for_each(|y| image.row_mut(y).fill(150));
+            }
+            if let Some(motion) = camera.step(&Pixels::Gray8(image)) {
+                assert!(motion.now_from_before.is_identity() && motion.cov == Matrix4::zeros());
+                n += 1;
+            }
+        }
+        assert!(even || n == 59, "{n}: an even texture that never moved may be the sensor's own, another not");
+    }
+}
+
+#[test]
+fn what_is_not_seen_is_held_and_less_and_less_sure() {
+    let mut source = scene((320, 240), 16.0, [4.0, 1.0], 0.0, 0.0, 60);
+    let frames = frames(&mut source);
+    let blind = Pixels::Gray8(Image::filled(320, 240, 90u8));
+    let mut camera = CameraMotionEstimator::default();
+    frames[..30].iter().for_each(|f| drop(camera.step(&f.pixels)));
+    let mut spread = 0.0;
+    for k in 0..4 {
+        let motion = camera.step(&blind).expect("held");
+        assert_eq!(motion.basis, MotionBasis::Held);
+        assert!((motion.shift_px() - Vector2::new(4.0, 1.0)).norm() < 0.3, "{k}: {}", motion.shift_px());
+        let now = motion.cov_at(motion.centre_px)[(0, 0)];
+        assert!(now > 1.2 * spread && now > 1e-6, "{k}: {now} after {spread}");
+        spread = now;
+    }
+    // The key frame is found again: the way over the blind frames is right, too.
+    let motion = camera.step(&frames[34].pixels).expect("seen again");
+    assert_eq!(motion.basis, MotionBasis::Measured);
+    assert!((motion.shift_px() - Vector2::new(4.0, 1.0)).norm() < 1.0);
+    assert!(motion.cov_at(motion.centre_px)[(0, 0)] >= spread, "what was uncertain stays so for some frames");
+    let unknown = (0..40).map(|_| camera.step(&blind)).filter(Option::is_none).count();
+    assert!(unknown >= 40 - MOST_HELD as usize, "in the end it is unknown: {unknown}");
+}
+
+#[test]
+fn another_view_is_followed_from_its_second_frame() {
+    let (mut one, mut other) =
+        (scene((320, 240), 16.0, [3.0, 0.0], 0.0, 0.0, 30), scene((320, 240), 12.0, [3.0, 1.0], 0.0, 0.0, 60));
+    let (one, other) = (frames(&mut one), frames(&mut other));
+    let mut camera = CameraMotionEstimator::default();
+    one.iter().for_each(|f| drop(camera.step(&f.pixels)));
+    assert_eq!(camera.step(&other[40].pixels).map(|m| m.basis), Some(MotionBasis::Held));
+    for frame in &other[41..] {
+        let motion = camera.step(&frame.pixels).expect("the other view moves on");
+        assert_eq!(motion.basis, MotionBasis::Measured);
+        assert!((motion.shift_px() - Vector2::new(3.0, 1.0)).norm() < 0.3);
+    }
+}
+
+#[test]
+fn an_even_sky_and_tiny_frames_say_nothing() {
+    for (w, h) in [(320, 256), (1, 1), (5, 300), (0, 0)] {
+        let mut camera = CameraMotionEstimator::default();
+        for _ in 0..3 {
+            assert_eq!(camera.step(&Pixels::Gray8(Image::filled(w, h, 7))), None);
+            assert_eq!(camera.clone().step(&Pixels::GrayF32(Image::filled(w, h, f32::NAN))), None);
+        }
+    }
+}
+
+#[test]
+fn a_frame_reduced_by_three_moves_by_its_own_pixels() {
+    let mut source = scene((800, 600), 40.0, [6.0, -3.0], 0.4, 0.0, 12);
+    let frames = frames(&mut source);
+    let mut camera = CameraMotionEstimator::default();
+    for (k, frame) in frames.iter().enumerate() {
+        let motion = camera.step(&frame.pixels);
+        if k < 3 {
+            continue;
+        }
+        let (motion, truth) = (motion.expect("textured"), truth(&source, k as u64));
+        assert!((motion.centre_px - Vector2::new(399.5, 299.5)).norm() < 2.0, "{}", motion.centre_px);
+        for corner in [Vector2::new(0.0, 0.0), Vector2::new(799.0, 599.0)] {
+            let error = motion.now_from_before.apply(corner) - truth.apply(corner);
+            assert!(error.norm() < 0.6, "frame {k}: off by {error}");
+        }
+    }
+}

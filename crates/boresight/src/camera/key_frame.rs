@@ -1,0 +1,204 @@
+//! The key frame and its patches: what the frames after it are compared with.
+//!
+//! Source: our own. The best-textured 12 x 12 patch of every cell of an 8 x 6 grid is kept; texture is the smaller of the mean absolute
+//! gradients along x and y, for an edge alone does not hold a patch. A patch votes with its texture above twice that of the image's quiet
+//! quarter: before a sky the quiet quarter is noise, whose fixed pattern stands still whatever the camera does.
+//! Where fewer than [`MIN_PATCHES`] stand out so, the texture is even (fields, a forest from the air) or there is none: then every cell's
+//! best has the same vote, and the key frame is marked `even`: its word is to be believed only once it has seen the image move.
+//! Units: reduced px. Limits: frames below 48 reduced px a side have no patches.
+
+use crate::Image;
+use nalgebra::Vector2;
+
+/// Side of a patch, reduced px.
+pub(super) const PATCH: usize = 12;
+/// Patches that must agree.
+pub(super) const MIN_PATCHES: usize = 6;
+/// Cells of the key frame in x and y, each with one patch.
+const CELLS: (usize, usize) = (8, 6);
+/// Texture below this many times that of the image's quiet quarter does not stand out.
+const QUIET_TIMES: f32 = 2.0;
+
+/// A patch of a key frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patch {
+    /// First column and row.
+    pub x: usize,
+    pub y: usize,
+    /// Weight of its vote: the texture above the noise, capped; in (0, 1].
+    pub weight: f64,
+}
+
+impl Patch {
+    /// Its middle, reduced px.
+    pub fn middle(&self) -> Vector2<f64> {
+        let half = 0.5 * (PATCH - 1) as f64;
+        Vector2::new(self.x as f64 + half, self.y as f64 + half)
+    }
+}
+
+/// The most textured patch of a cell.
+#[derive(Clone, Copy, Debug)]
+struct Textured {
+    texture: f32,
+    /// Number of the cell, row by row.
+    cell: usize,
+    x: usize,
+    y: usize,
+}
+
+/// A frame with its patches.
+#[derive(Clone, Debug, Default)]
+pub(super) struct KeyFrame {
+    pub image: Image<f32>,
+    pub patches: Vec<Patch>,
+    /// No patch stands out from the others.
+    pub even: bool,
+    /// It has seen the image move.
+    pub proven: bool,
+    chosen: bool,
+    textures: Vec<f32>,
+    best: Vec<Textured>,
+}
+
+impl KeyFrame {
+    /// Takes a frame over (the old one is given in exchange) and chooses its patches.
+    pub fn take(&mut self, frame: &mut Image<f32>) {
+        self.keep(frame);
+        self.choose();
+    }
+
+    /// Takes a frame over whose patches may be chosen later.
+    pub fn keep(&mut self, frame: &mut Image<f32>) {
+        std::mem::swap(&mut self.image, frame);
+        self.chosen = false;
+        self.patches.clear();
+    }
+
+    /// Is to be looked for no more.
+    pub fn forget(&mut self) {
+        self.patches.clear();
+        self.best.clear();
+        self.chosen = true;
+    }
+
+    /// Lets all cells vote, though some patches stand out.
+    pub fn choose_even(&mut self) {
+        (self.chosen, self.even, self.proven) = (true, true, false);
+        self.patches.clear();
+        let textured = self.best.iter().filter(|b| b.texture > 0.0);
+        self.patches.extend(textured.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
+    }
+
+    /// Chooses the patches, if that was not done.
+    pub fn choose(&mut self) {
+        if self.chosen {
+            return;
+        }
+        (self.chosen, self.even, self.proven) = (true, false, false);
+        self.find_best();
+        if self.textures.is_empty() {
+            return;
+        }
+        self.textures.sort_unstable_by(f32::total_cmp);
+        let quiet = QUIET_TIMES * self.textures[(self.textures.len() - 1) / 4];
+        self.best.sort_unstable_by(|a, b| b.texture.total_cmp(&a.texture).then(a.cell.cmp(&b.cell)));
+        let n_clear = self.best.iter().take_while(|b| b.texture > quiet).count();
+        if n_clear < MIN_PATCHES {
+            self.choose_even();
+            return;
+        }
+        // A few outstanding things may be targets: they count no more than the next. The square holds down the many weak ones, which
+        // in a compressed video are often mere copies of the frame before.
+        let cap = self.best[MIN_PATCHES - 1].texture - quiet;
+        self.patches.extend(self.best[..n_clear].iter().map(|b| Patch {
+            x: b.x,
+            y: b.y,
+            weight: f64::from((b.texture - quiet).min(cap) / cap).powi(2),
+        }));
+    }
+
+    fn find_best(&mut self) {
+        let image = &self.image;
+        let (w, h) = (image.width(), image.height());
+        self.textures.clear();
+        self.best.clear();
+        if w < 4 * PATCH || h < 4 * PATCH {
+            return;
+        }
+        for cy in 0..CELLS.1 {
+            for cx in 0..CELLS.0 {
+                let (x0, x1) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
+                let (y0, y1) = (h * cy / CELLS.1, h * (cy + 1) / CELLS.1);
+                let mut top: Option<Textured> = None;
+                for y in (y0..y1).step_by(4) {
+                    for x in (x0..x1).step_by(4) {
+                        if x + PATCH + 1 >= w || y + PATCH + 1 >= h {
+                            continue;
+                        }
+                        let texture = texture(image, x, y);
+                        if texture.is_finite() {
+                            self.textures.push(texture);
+                            if top.as_ref().is_none_or(|t| texture > t.texture) {
+                                top = Some(Textured { texture, cell: cy * CELLS.0 + cx, x, y });
+                            }
+                        }
+                    }
+                }
+                self.best.extend(top);
+            }
+        }
+    }
+}
+
+/// The smaller of the mean absolute gradients along x and y.
+fn texture(image: &Image<f32>, x: usize, y: usize) -> f32 {
+    let (mut gx, mut gy) = (0.0, 0.0);
+    for r in y..y + PATCH {
+        let (row, below) = (image.row(r), image.row(r + 1));
+        for c in x..x + PATCH {
+            gx += (row[c + 1] - row[c]).abs();
+            gy += (below[c] - row[c]).abs();
+        }
+    }
+    gx.min(gy) / (PATCH * PATCH) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(f: impl Fn(usize, usize) -> f32) -> KeyFrame {
+        let mut image = Image::filled(160, 120, 0f32);
+        for y in 0..120 {
+            image.row_mut(y).iter_mut().enumerate().for_each(|(x, v)| *v = f(x, y));
+        }
+        let mut key = KeyFrame::default();
+        key.take(&mut image);
+        key
+    }
+
+    /// Waves both ways, `height` counts.
+    fn waves(x: usize, y: usize, height: f32) -> f32 {
+        height * ((x as f32 * 0.7).sin() + (y as f32 * 0.9).sin())
+    }
+
+    #[test]
+    fn trees_before_a_sky_vote_alone() {
+        let key = key(|x, y| waves(x, y, if y > 80 { 50.0 } else { 0.5 }));
+        assert!(!key.even && key.patches.len() >= MIN_PATCHES);
+        assert!(key.patches.iter().all(|p| p.y + PATCH > 80), "{:?}", key.patches);
+    }
+
+    #[test]
+    fn an_even_texture_votes_all_over_and_says_so() {
+        let key = key(|x, y| waves(x, y, 20.0));
+        assert!(key.even && key.patches.len() > 40);
+    }
+
+    #[test]
+    fn stripes_and_plain_walls_have_no_patches() {
+        assert!(key(|x, _| (x as f32).sin()).patches.is_empty());
+        assert!(key(|_, _| 7.0).patches.is_empty());
+    }
+}

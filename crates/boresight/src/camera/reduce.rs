@@ -1,0 +1,54 @@
+//! A frame made small for the search: mean over square blocks.
+
+use crate::{Image, Pixels};
+
+/// Wider frames are reduced to at most this width, px.
+const REDUCED_PX: usize = 320;
+
+/// Side of a block for frames of this width, px.
+pub(super) fn factor(width: usize) -> usize {
+    width.div_ceil(REDUCED_PX).max(1)
+}
+
+/// Reduces a frame of any pixel type by [`factor`].
+pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>) {
+    let factor = factor(pixels.width());
+    match pixels {
+        Pixels::Gray8(i) => blocks(i, factor, out, f32::from),
+        Pixels::Gray16(i) => blocks(i, factor, out, f32::from),
+        Pixels::GrayF32(i) => blocks(i, factor, out, |p| p),
+        // The green channel stands for the light.
+        Pixels::Rgb8(i) => blocks(i, factor, out, |p| f32::from(p[1])),
+    }
+}
+
+/// Mean over blocks of `factor` x `factor` pixels.
+fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
+    let (w, h) = (image.width() / factor, image.height() / factor);
+    out.reset(w, h, 0.0);
+    let scale = 1.0 / (factor * factor) as f32;
+    for y in 0..h {
+        for dy in 0..factor {
+            let row = image.row(y * factor + dy);
+            for (o, block) in out.row_mut(y).iter_mut().zip(row.chunks_exact(factor)) {
+                *o += scale * block.iter().map(|&p| value(p)).sum::<f32>();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wide_frame_becomes_the_means_of_its_blocks() {
+        let mut wide = Image::filled(640, 4, 0u8);
+        for y in 0..4 {
+            wide.row_mut(y).iter_mut().enumerate().for_each(|(x, p)| *p = (x % 2 * 4) as u8 + y as u8);
+        }
+        let mut small = Image::default();
+        reduce(&Pixels::Gray8(wide), &mut small);
+        assert_eq!((small.width(), small.height(), small.row(0)[7], small.row(1)[319]), (320, 2, 2.5, 4.5));
+    }
+}

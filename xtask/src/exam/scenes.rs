@@ -1,0 +1,144 @@
+//! Simulated scenes of the exam: a moving camera over a textured ground, and spots near the noise; their truth is exact.
+//!
+//! Each scene is written as YUV4MPEG2 with its truth as a table and then goes the way of every clip. The seeds are fixed; half A and half B are
+//! two seeds of the same scene.
+
+use super::clips::{Clip, Columns, Near};
+use anyhow::Result;
+use boresight::sim::ground::{CameraPathConfig, Ground};
+use boresight::sim::scene::{Background, Shape, Spot, Target, White};
+use boresight::sim::{Purpose, SceneConfig, Seed};
+use boresight::{FrameSource, Pixels};
+use rand::RngExt;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+/// Frames a second; the cameras' motions below are per frame.
+const RATE_HZ: f64 = 25.0;
+const N_FRAMES: u64 = 120;
+const SIZE_PX: [usize; 2] = [320, 240];
+/// Two standard deviations of a spot: what counts as near.
+const NEAR_PX: f64 = 3.0;
+const SEEDS: [u64; 2] = [1, 2];
+
+/// Kind, pan (px a frame), shake (px), turn (degrees a frame), growth (share a frame).
+const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 6] = [
+    ("simulated: still", [0.0, 0.0], 0.0, 0.0, 0.0),
+    ("simulated: pan 2", [2.0, 0.5], 0.0, 0.0, 0.0),
+    ("simulated: pan 5", [5.0, -1.0], 0.0, 0.0, 0.0),
+    ("simulated: shake 2.5", [0.0, 0.0], 2.5, 0.0, 0.0),
+    ("simulated: turn 1 deg", [0.0, 0.0], 0.0, 1.0, 0.0),
+    ("simulated: zoom 1 %", [0.0, 0.0], 0.0, 0.0, 0.01),
+];
+
+/// Writes the scenes to a folder and returns them as clips.
+pub fn clips(folder: &Path, only: &str) -> Result<Vec<Clip>> {
+    let mut out = Vec::new();
+    let mut add = |kind: &'static str, seed: u64, scene: SceneConfig| -> Result<()> {
+        let name = format!("{kind}, seed {seed}");
+        if !name.contains(only) {
+            return Ok(());
+        }
+        let stem = format!("scene{}", out.len());
+        let (input, truth) = (folder.join(format!("{stem}.y4m")), folder.join(format!("{stem}.csv")));
+        write(&scene, seed, &input, &truth)?;
+        let near = Near::Px(NEAR_PX);
+        out.push(Clip { kind, name, input, truth, columns: Columns::POINTS, near, whole: true, contrast: None });
+        Ok(())
+    };
+    for (kind, pan, shake_px, turn_deg, growth) in CAMERAS {
+        for seed in SEEDS {
+            add(kind, seed, over_ground(pan, shake_px, turn_deg, growth))?;
+        }
+    }
+    for seed in SEEDS {
+        add("simulated: spots of SNR 5", seed, spots(seed))?;
+    }
+    Ok(out)
+}
+
+/// Three targets that cross a textured ground at 1 to 3 px a frame, kept in view by where they start and by when.
+fn over_ground(pan: [f64; 2], shake_px: f64, turn_deg: f64, growth: f64) -> SceneConfig {
+    let camera = CameraPathConfig {
+        pan_px_per_s: pan.map(|v| RATE_HZ * v),
+        rotation_deg_per_s: RATE_HZ * turn_deg,
+        zoom_per_s: RATE_HZ * growth,
+    };
+    let middle = [0.5 * SIZE_PX[0] as f64, 0.5 * SIZE_PX[1] as f64];
+    // In the image at the sequence's middle, from where they came at their speed on the ground (px a frame).
+    let half = 0.5 * N_FRAMES as f64;
+    let target = |from_middle: [f64; 2], speed: [f64; 2]| {
+        let shape =
+            Shape::Spot(Spot { sigma_px: 0.0, psf_sigma_px: 1.5, total: 100.0 * std::f64::consts::TAU * 1.5 * 1.5 });
+        // A panning camera goes with the targets: they move against the ground all the same.
+        let own = [speed[0] - 0.8 * pan[0], speed[1] - 0.8 * pan[1]];
+        let at = |i: usize| middle[i] + from_middle[i] - half * (own[i] + pan[i]);
+        Target { start_px: [at(0), at(1)], velocity_px_per_s: own.map(|v| RATE_HZ * v), shape, ..Target::default() }
+    };
+    let zoomed = if growth > 0.0 { 0.25 } else { 1.0 };
+    let slow = |v: [f64; 2]| v.map(|s| s * zoomed);
+    SceneConfig {
+        width_px: SIZE_PX[0],
+        height_px: SIZE_PX[1],
+        n_frames: N_FRAMES,
+        rate_hz: RATE_HZ,
+        background: Background::Ground(Ground { mean: 70.0, std: 12.0, length_px: 20.0, noise_std: 1.5 }),
+        targets: vec![
+            target([-30.0, -20.0], slow([1.0, 0.3])),
+            target([10.0, 15.0], slow([-1.2, 0.2])),
+            target([20.0, -15.0], slow([0.6, -0.9])),
+        ],
+        camera,
+        sensor: boresight::sim::scene::Sensor { jitter_px: shake_px, ..Default::default() },
+        ..SceneConfig::default()
+    }
+}
+
+/// Twenty spots of a peak of five deviations of the noise before a fixed camera, slow and straight.
+fn spots(seed: u64) -> SceneConfig {
+    let mut rng = Seed::new(seed).stream(Purpose::Scenario, 1);
+    let (sigma, noise) = (1.3, 8.0);
+    let targets = (0..20).map(|_| Target {
+        start_px: [rng.random_range(40.0..280.0), rng.random_range(40.0..200.0)],
+        velocity_px_per_s: [rng.random_range(-12.0..12.0), rng.random_range(-12.0..12.0)],
+        shape: Shape::Spot(Spot {
+            sigma_px: 0.0,
+            psf_sigma_px: sigma,
+            total: 5.0 * noise * std::f64::consts::TAU * sigma * sigma,
+        }),
+        ..Target::default()
+    });
+    SceneConfig {
+        width_px: SIZE_PX[0],
+        height_px: SIZE_PX[1],
+        n_frames: N_FRAMES,
+        rate_hz: RATE_HZ,
+        background: Background::White(White { mean: 60.0, std: noise }),
+        targets: targets.collect(),
+        ..SceneConfig::default()
+    }
+}
+
+/// Writes a scene's frames and truth (frame, id, x, y).
+fn write(scene: &SceneConfig, seed: u64, video: &Path, truth: &Path) -> Result<()> {
+    let mut source = scene.build(Seed::new(seed))?;
+    let mut out = std::io::BufWriter::new(std::fs::File::create(video)?);
+    writeln!(out, "YUV4MPEG2 W{} H{} F{RATE_HZ}:1 Ip A1:1 Cmono", scene.width_px, scene.height_px)?;
+    let mut table = String::from("frame,id,x,y\n");
+    while let Some(frame) = source.next_frame()? {
+        let Pixels::Gray8(image) = &frame.pixels else { anyhow::bail!("a scene of 8 bits") };
+        out.write_all(b"FRAME\n")?;
+        out.write_all(image.as_slice())?;
+        for t in source.truth() {
+            let (x, y) = (t.kinematics.mean[0], t.kinematics.mean[2]);
+            let inside = |v: f64, size: usize| (0.0..=size as f64 - 1.0).contains(&v);
+            if inside(x, scene.width_px) && inside(y, scene.height_px) {
+                writeln!(table, "{},{},{x},{y}", frame.index.0, t.id.0)?;
+            }
+        }
+        source.recycle(frame);
+    }
+    out.flush()?;
+    Ok(std::fs::write(truth, table)?)
+}
