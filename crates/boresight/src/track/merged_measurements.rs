@@ -189,7 +189,7 @@ mod tests {
     fn parts(x: &[f64], width: &[f64], taker: Option<u32>, missed: &[u32]) -> Vec<Part> {
         let scan = Scan { detections: vec![blob()], ..Scan::default() };
         let mut table = ScanTable::default();
-        table.read(&scan, 0.0, 0.0).unwrap();
+        table.read(&scan, 1.0, 0.0, 0.0).unwrap();
         table.sort(&scan);
         let cov = Cov2 { xx: 1.0, xy: 0.0, yy: 1.0 };
         let predicted: Vec<Predicted> = x.iter().map(|x| Predicted { x: *x, y: 2.0, cov, reach: 99.0 }).collect();

@@ -7,7 +7,9 @@
 mod links;
 mod scores;
 
+use super::choose::REIDENTIFY_S;
 use super::digits::round;
+use super::noise;
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
     OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
@@ -27,6 +29,24 @@ const SPEED_RESERVE: f64 = 1.5;
 
 /// Writes the tracker's configuration for a table of detections.
 pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
+    assumed(scans, rate_hz, config, reasons);
+    config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
+    // What the scans hold that a tracker refuses is said by the run itself.
+    let _ = noise::learn(scans, area_px2(scans), config, reasons);
+}
+
+/// The area over which the detections are spread, px².
+fn area_px2(scans: &[Scan]) -> f64 {
+    let side = |axis: usize| {
+        let at = scans.iter().flat_map(|s| &s.detections).map(|d| d.position[axis]).filter(|v| v.is_finite());
+        let (least, most) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(v), m.max(v)));
+        (most - least).max(1.0)
+    };
+    side(0) * side(1)
+}
+
+/// What is assumed before a tracker has run.
+fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
     let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { 25.0 };
     let mut sides: Vec<f64> = scans
         .iter()

@@ -110,7 +110,7 @@ mod tests {
                 reach: f64::INFINITY,
             };
             let mut table = ScanTable::default();
-            table.read(&scan, 0.0, 0.0).unwrap();
+            table.read(&scan, 1.0, 0.0, 0.0).unwrap();
             table.sort(&scan);
             let gamma = number(&i["gamma"]);
             let gates_to = |threshold: f64| {
@@ -138,7 +138,7 @@ mod tests {
             places.iter().map(|p| Detection::at(Vector2::new(p.0, p.1), Matrix2::identity())).collect::<Vec<_>>();
         let scan = Scan { detections, ..Scan::default() };
         let mut table = ScanTable::default();
-        table.read(&scan, 0.0, 0.0).unwrap();
+        table.read(&scan, 1.0, 0.0, 0.0).unwrap();
         table.sort(&scan);
         let track = Predicted { x: 0.0, y: 0.0, cov: Cov2 { xx: 1.0, xy: 0.0, yy: 1.0 }, reach };
         let mut gates = Gates::new();
