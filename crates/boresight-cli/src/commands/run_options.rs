@@ -238,7 +238,7 @@ mod tests {
             skip_bad_rows: false,
             quiet: true,
         };
-        let associator = |name: &str| TrackerArgs { filter: None, associator: Some(name.into()) };
+        let associator = |name: &str| TrackerArgs { associator: Some(name.into()), ..TrackerArgs::default() };
         let mht = changed(Config::default(), &args, &associator("mht")).unwrap();
         assert!(mht.tracker.mht.is_some());
         let jpda = changed(mht, &args, &associator("jpda")).unwrap();

@@ -107,6 +107,7 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     } else if own && beside.is_file() {
         let tracker = Config::from_file(&beside)?.tracker;
         config.acceleration = tracker.acceleration_noise(0.0);
+        config.density_per_height2_per_s3 = tracker.acceleration_density_per_height2_per_s3;
         eprintln!("{}, from {}", config.acceleration, beside.display());
         if !tracker.filter.is_constant_velocity() {
             eprintln!(

@@ -5,7 +5,7 @@
 
 use super::interval::interval_s;
 use super::scene::{self, Scene};
-use super::{cells, colour, moving, particles, spots};
+use super::{cells, colour, faint, moving, particles, spots};
 use crate::io::Colour;
 use crate::{Config, Frame, Result, SourceInfo};
 
@@ -70,6 +70,11 @@ pub(super) fn choose_seen(
     } else {
         let evidence = spots::look(frames, info)?;
         spots::configure(&evidence, info, &mut config, &mut reasons);
+        if evidence.is_poor()
+            && let Some(seen) = faint::look(frames, info)?
+        {
+            faint::configure(&seen, &mut config, &mut reasons);
+        }
     }
     config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
     reasons.push(format!(

@@ -9,6 +9,7 @@ mod choose;
 mod colour;
 mod detections;
 mod digits;
+mod faint;
 mod first_pass;
 mod interval;
 mod moving;

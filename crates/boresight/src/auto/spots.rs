@@ -42,6 +42,13 @@ pub struct Evidence {
     pub dark: Side,
 }
 
+impl Evidence {
+    /// Whether in hardly one frame of ten anything stands clear.
+    pub fn is_poor(&self) -> bool {
+        self.bright.per_frame + self.dark.per_frame < 0.1
+    }
+}
+
 /// Looks for isolated blobs in the frames.
 pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
     let side = |polarity: Polarity| -> Result<Side> {

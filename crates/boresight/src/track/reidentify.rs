@@ -2,10 +2,10 @@
 //!
 //! Source: our own; the hypothesis test is Bayes' with even odds. When a track is confirmed, the tracks lost within the last seconds, and those that
 //! coast without a detection since the new one began, are predicted to that time by their own filters. The difference of the two beliefs in
-//! position and velocity is either that of one target, N(0, P + P'), or a new target's, anywhere in the field at any speed up to the
-//! largest; the likelier hypothesis holds, and among several lost tracks the likeliest one.
+//! position and velocity is either that of one target, N(0, P + P'), or a new target's, anywhere in the field with a velocity
+//! N(0, v²/9) per axis; the likelier hypothesis holds, and among several lost tracks the likeliest one.
 //! It decides once and looks back only: a stream's ids, the annotated video's and the table's are the same.
-//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / (A π v²); s the logarithm of the ratio of the heights.
+//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A; s the logarithm of the ratio of the heights.
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
 
 use super::confirm::history::History;
@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 const MOST_LOST: usize = 256;
 /// Deviation of the logarithm of a target's height between its loss and its return: a third larger or smaller.
 const SIZE_LOG_STD: f64 = 0.3;
+/// The largest speed is so many deviations of a target's velocity.
+const SPEED_STDS: f64 = 3.0;
 /// Area of a field whose size is not known, px²: a megapixel.
 const UNKNOWN_AREA_PX2: f64 = 1e6;
 
@@ -168,8 +170,9 @@ fn log_ratio(before: &Gaussian<4>, height_before: f64, now: &Gaussian<4>, height
     let log_det = 2.0 * c.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let s = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
     let same = -0.5 * (difference.dot(&c.solve(&difference)) + log_det + s * s) - 2.0 * std::f64::consts::TAU.ln();
-    let phase_space = field.area_px2 * std::f64::consts::PI * field.max_speed_px_per_s.powi(2);
-    let new = (field.n_targets / phase_space).ln();
+    let speed_var = (field.max_speed_px_per_s / SPEED_STDS).powi(2);
+    let speed2 = now.mean[1].powi(2) + now.mean[3].powi(2);
+    let new = (field.n_targets / (field.area_px2 * std::f64::consts::TAU * speed_var)).ln() - 0.5 * speed2 / speed_var;
     (same - new).is_finite().then_some(same - new)
 }
 
@@ -214,7 +217,8 @@ mod tests {
     #[test]
     fn a_track_that_jumps_is_one_target_as_far_as_its_covariance_reaches_and_replaces_the_one_that_coasts() {
         // The jump is out of the gate: a new track begins while the old one coasts.
-        assert_eq!(ids([2.0, 2.04], 12.0, 2.0), [1]);
+        assert_eq!(ids([2.0, 2.04], 3.5, 2.0), [1]);
+        assert_eq!(ids([2.0, 2.04], 3.5, 0.0), [2], "switched off: it was out of the gate");
         assert_eq!(ids([2.0, 2.04], 250.0, 2.0), [2]);
     }
 }

@@ -8,7 +8,7 @@
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
 
 use super::filter::AccelerationNoise;
-use crate::validate::check;
+use crate::validate::{check, not_negative};
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::model::ConstantVelocity;
 use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};
@@ -20,6 +20,8 @@ use nalgebra::{Matrix2, Vector2};
 pub struct SmoothConfig {
     /// The white acceleration, above 0: that of the tracker which made the tracks.
     pub acceleration: AccelerationNoise,
+    /// Density added to a continuous one in proportion to the square of a track's box, 1/s³, 0 or more.
+    pub density_per_height2_per_s3: f64,
     /// Which rows tell of which.
     pub method: SmoothMethod,
 }
@@ -38,7 +40,7 @@ pub enum SmoothMethod {
 
 impl Default for SmoothConfig {
     fn default() -> Self {
-        Self { acceleration: AccelerationNoise::default(), method: SmoothMethod::Rts }
+        Self { acceleration: AccelerationNoise::default(), density_per_height2_per_s3: 0.0, method: SmoothMethod::Rts }
     }
 }
 
@@ -48,10 +50,23 @@ impl SmoothConfig {
     /// The first value outside its range.
     pub fn validate(&self, at: &str) -> Result<()> {
         self.acceleration.validate(at)?;
+        let per_height2 = self.density_per_height2_per_s3;
+        not_negative(at, "acceleration-density-per-height2-per-s3", per_height2, "as in the tracker")?;
         match self.method {
             SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
             _ => Ok(()),
         }
+    }
+
+    /// The same for a track whose boxes have that height, px.
+    pub(in crate::track) fn of_height(&self, height_px: f64) -> Self {
+        let acceleration = match self.acceleration {
+            AccelerationNoise::Continuous(q) => {
+                AccelerationNoise::Continuous(q + self.density_per_height2_per_s3 * height_px * height_px)
+            }
+            discrete => discrete,
+        };
+        Self { acceleration, density_per_height2_per_s3: 0.0, ..self.clone() }
     }
 
     fn model(&self) -> Result<ConstantVelocity> {
@@ -170,7 +185,7 @@ mod tests {
     }
 
     fn config(method: SmoothMethod) -> SmoothConfig {
-        SmoothConfig { acceleration: AccelerationNoise::Discrete(STD), method }
+        SmoothConfig { acceleration: AccelerationNoise::Discrete(STD), method, ..SmoothConfig::default() }
     }
 
     #[test]

@@ -48,6 +48,8 @@ pub fn smooth_table(
     let mut stds = [Vec::new(), Vec::new()];
     let mut smoothed: BTreeMap<FrameIndex, TrackFrame> = BTreeMap::new();
     for (id, rows) in &mut tracks {
+        // The filter's noise follows from the box with which the track began.
+        let config = &config.of_height(rows.first().map_or(0.0, |r| r.2.extent.height_px));
         let mut one = || -> Result<usize> {
             if let Some(std) = speed_std_px_per_s {
                 each_belief(rows, |times, beliefs| filter_track(times, beliefs, std, config))?;

@@ -84,6 +84,8 @@ fn every_room_uses_only_the_rooms_it_may() {
     for &(room, allowed) in ARROWS {
         let mut files = Vec::new();
         rust_files(&src.join(room), &mut files);
+        // A file of tests, declared beside its subject, may use anything as well.
+        files.retain(|f| f.file_name().is_none_or(|n| n != "tests.rs" && n != "edge_tests.rs"));
         for file in files {
             let text = std::fs::read_to_string(&file).unwrap();
             for used in rooms_used(&text, &rooms) {

@@ -139,8 +139,8 @@ impl<'a> Links<'a> {
         Some(Motion {
             extra_noise: (noise2 - stated2 / speeds.len() as f64).max(0.0).sqrt(),
             density_per_s3: density,
-            // The median of a length of two normal coordinates is 1.177 deviations.
-            speed_std_px_per_s: quantile(&mut speeds, 0.5) / 1.177,
+            // The 95 % point of a length of two normal coordinates is 2.448 deviations; the median would only tell of what stands.
+            speed_std_px_per_s: quantile(&mut speeds, 0.95) / 2.448,
             fastest_px_per_s: quantile(&mut speeds, 0.999),
             p_detection: n_through as f64 / n_before.max(1) as f64,
             n_steps: speeds.len(),

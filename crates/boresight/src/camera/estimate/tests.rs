@@ -104,7 +104,9 @@ fn what_is_not_seen_is_held_and_less_and_less_sure() {
     let frames = frames(&mut source);
     let blind = Pixels::Gray8(Image::filled(320, 240, 90u8));
     let mut camera = CameraMotionEstimator::default();
-    frames[..30].iter().for_each(|f| drop(camera.step(&f.pixels)));
+    frames[..30].iter().for_each(|f| {
+        camera.step(&f.pixels);
+    });
     let mut spread = 0.0;
     for k in 0..4 {
         let motion = camera.step(&blind).expect("held");
@@ -129,7 +131,9 @@ fn another_view_is_followed_from_its_second_frame() {
         (scene((320, 240), 16.0, [3.0, 0.0], 0.0, 0.0, 30), scene((320, 240), 12.0, [3.0, 1.0], 0.0, 0.0, 60));
     let (one, other) = (frames(&mut one), frames(&mut other));
     let mut camera = CameraMotionEstimator::default();
-    one.iter().for_each(|f| drop(camera.step(&f.pixels)));
+    one.iter().for_each(|f| {
+        camera.step(&f.pixels);
+    });
     assert_eq!(camera.step(&other[40].pixels).map(|m| m.basis), Some(MotionBasis::Held));
     for frame in &other[41..] {
         let motion = camera.step(&frame.pixels).expect("the other view moves on");
