@@ -217,8 +217,8 @@ mod tests {
     #[test]
     fn a_track_that_jumps_is_one_target_as_far_as_its_covariance_reaches_and_replaces_the_one_that_coasts() {
         // The jump is out of the gate: a new track begins while the old one coasts.
-        assert_eq!(ids([2.0, 2.04], 3.5, 2.0), [1]);
-        assert_eq!(ids([2.0, 2.04], 3.5, 0.0), [2], "switched off: it was out of the gate");
+        assert_eq!(ids([2.0, 2.04], 2.5, 2.0), [1]);
+        assert_eq!(ids([2.0, 2.04], 2.5, 0.0), [2], "switched off: it was out of the gate");
         assert_eq!(ids([2.0, 2.04], 250.0, 2.0), [2]);
     }
 }
