@@ -147,7 +147,11 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     let mut config = base;
     match given {
         Some(_) => reasons.push("Configuration as given.".to_string()),
-        None => auto::for_detections(&table.scans, table.rate_hz, &mut config, &mut reasons),
+        None => {
+            // The first pass runs with the filter that is asked for.
+            config = changed(config, args, tracker)?;
+            auto::for_detections(&table.scans, table.rate_hz, &mut config, &mut reasons);
+        }
     }
     config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);

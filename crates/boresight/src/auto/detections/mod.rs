@@ -57,7 +57,8 @@ fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<
     sides.sort_by(f64::total_cmp);
     let tracker = &mut config.tracker;
     // One size for all is the reader's own, for points.
-    let boxes = sides.first() < sides.last();
+    // What the links measure is noise and motion of constant velocity; other models keep what sizes allow.
+    let boxes = sides.first() < sides.last() && tracker.filter.is_constant_velocity();
     let links = boxes.then(|| Links::of(scans, 1.0 / rate));
     let calibration = links.as_ref().and_then(|l| Calibration::of(l.supported()));
     let high_score = calibration.as_ref().map_or(f32::NEG_INFINITY, |c| c.score_at(INITIATES));

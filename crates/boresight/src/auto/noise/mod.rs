@@ -2,7 +2,7 @@
 //!
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
 //! series whose innovations are made as probable as possible.
-//! Limits: detections that several tracks share tell nothing; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
+//! Limits: constant velocity only, since what one model calls noise another calls motion; detections that several tracks share tell nothing; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 mod fit;
 
@@ -36,6 +36,10 @@ struct Followed {
 /// # Errors
 /// Scans that the tracker refuses.
 pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut Vec<String>) -> Result<()> {
+    if !config.tracker.filter.is_constant_velocity() {
+        reasons.push("The filter is not of constant velocity: noise and motion stay as assumed.".to_string());
+        return Ok(());
+    }
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
