@@ -37,8 +37,8 @@ pub struct Args {
     list_false: bool,
 }
 
-const HEAD: &str = "| clip | half | contrast | held | precision | IDF1 | ids a target | false tracks | error px | NIS | ms a frame |\n\
-                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+const HEAD: &str = "| clip | half | contrast | held | targets | precision | IDF1 | ids a target | false tracks | error px | NIS | ms a frame |\n\
+                    | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 fn percent(v: Option<f64>) -> String {
     v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{:.1} %", 100.0 * v))
@@ -46,10 +46,12 @@ fn percent(v: Option<f64>) -> String {
 
 fn row(clip: &Clip, half: char, s: &Score) -> String {
     format!(
-        "| {} | {half} | {} | {} | {} | {} | {:.1} | {} | {:.2} | {:.2} | {:.1} |\n",
+        "| {} | {half} | {} | {} | {} of {} | {} | {} | {:.1} | {} | {:.2} | {:.2} | {:.1} |\n",
         clip.name,
         clip.contrast.map_or("-".into(), |c| format!("{c:.1}")),
         percent(Some(s.held)),
+        s.found[0],
+        s.found[1],
         percent(s.precision),
         percent(s.idf1),
         s.ids_a_target,
@@ -149,7 +151,7 @@ const INTRODUCTION: &str = "# The exam\n\n\
     `boresight track` on all public data without any option, as `cargo xtask exam` runs it; the command writes this page, the bad rows too. \
     Clips of a kind belong in turns to half A and half B: a figure that differs between the halves is a warning that it was fitted.\n\n\
     *Held*: share of the truth's rows with a reported track near (in the box grown by 3 px, 5 px in visible light; within 30 px for people and cells, 15 for the mouse, 10 for \
-    the car, 3 for particles). *False*: reported tracks that are near a target in fewer than half of their rows. *Contrast*: height of the target over the deviation of \
+    the car, 3 for particles). *Targets*: those held in at least half of their rows. *False*: reported tracks that are near a target in fewer than half of their rows. *Contrast*: height of the target over the deviation of \
     its surroundings, median over the clip. *Error*: median distance of the nearest reported track from a held target, box centre or point. *NIS*: mean normalised innovation squared of reported tracks; 2 if the filter's covariances are true. \
     The car's truth holds one car of many, so nothing can be called false there. *Simulated*: three spots (sigma 1.5 px, 100 counts) that move over a textured ground under a camera that stands, pans, \
     shakes, turns or zooms (numbers per frame; shake: standard deviation), and twenty spots of five deviations of white noise; 120 frames, the truth is exact, near is 3 px, A and B are two seeds.\n\n";

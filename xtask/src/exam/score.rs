@@ -47,6 +47,8 @@ pub struct Score {
     pub precision: Option<f64>,
     pub idf1: Option<f64>,
     /// Reported tracks that are a target's in half of their rows or more, per target.
+    /// Targets held in at least half of their rows, and all.
+    pub found: [usize; 2],
     pub ids_a_target: f64,
     /// The other reported tracks, in words.
     pub false_tracks: Option<Vec<String>>,
@@ -89,6 +91,7 @@ pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
         held: near.errors.len() as f64 / truth.len().max(1) as f64,
         precision: clip.whole.then(|| near.n_near as f64 / seen.rows.len().max(1) as f64),
         idf1: if clip.whole { Some(idf1(&truth, seen.rows, clip.near)?) } else { None },
+        found: [near.n_found, n_targets],
         ids_a_target: near.n_true_tracks as f64 / n_targets as f64,
         false_tracks: clip.whole.then_some(near.false_tracks),
         error_px: median(near.errors),
@@ -107,6 +110,7 @@ fn median(mut v: Vec<f64>) -> f64 {
 struct Nearness {
     /// Of each held target in each frame, px.
     errors: Vec<f64>,
+    n_found: usize,
     n_near: usize,
     n_true_tracks: usize,
     false_tracks: Vec<String>,
@@ -140,7 +144,14 @@ fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
         let here = at(&results, t.frame).iter().filter(|r| is_near(r, t, near));
         here.map(|r| distance(r, t)).min_by(f64::total_cmp)
     };
-    let errors = truth.iter().filter_map(nearest).collect();
+    let (mut errors, mut of_target) = (Vec::new(), BTreeMap::<i64, [usize; 2]>::new());
+    for t in truth {
+        let found = nearest(t);
+        let of = of_target.entry(t.id).or_default();
+        *of = [of[0] + 1, of[1] + usize::from(found.is_some())];
+        errors.extend(found);
+    }
+    let n_found = of_target.values().filter(|[rows, held]| 2 * held >= *rows).count();
     let mut tracks: BTreeMap<i64, (usize, Vec<&TrackRow>)> = BTreeMap::new();
     for r in result {
         let hit = at(&truths, r.frame).iter().any(|t| is_near(r, t, near));
@@ -158,6 +169,7 @@ fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
     };
     Nearness {
         errors,
+        n_found,
         n_near,
         n_true_tracks: true_tracks.len(),
         false_tracks: false_tracks.into_iter().map(in_words).collect(),

@@ -5,6 +5,7 @@
 //! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
 
 use super::digits::round;
+use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
@@ -65,7 +66,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Cells>> {
     let mut detector = crate::vision::build(&detector(info, specks), info)?;
     let mut scan = Scan::default();
     let (mut areas, mut compact, mut all, mut looks) = (Vec::new(), 0.0, 0.0, 0usize);
-    for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+    for frame in spread(frames, LOOKS) {
         detector.detect(frame, &mut scan)?;
         looks += 1;
         for d in &scan.detections {

@@ -4,6 +4,7 @@
 //! Source: our own; the test is Poisson's. Over the frames looked at, the number of false alarms has at most the mean and the variance 3 × rate × frames.
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
+use super::spread::spread;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
@@ -41,7 +42,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Faint>> {
     for polarity in [Polarity::Bright, Polarity::Dark] {
         let mut detector = crate::vision::build(&detector(polarity), info)?;
         let (mut scan, mut n, mut looks) = (Scan::default(), 0.0, 0.0);
-        for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+        for frame in spread(frames, LOOKS) {
             detector.detect(frame, &mut scan)?;
             n += scan.detections.len() as f64;
             looks += 1.0;

@@ -20,6 +20,7 @@ mod replay;
 mod scene;
 mod second_look;
 mod spots;
+mod spread;
 
 pub use choose::{Choice, choose};
 pub use detections::for_detections;

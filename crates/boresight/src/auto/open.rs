@@ -19,9 +19,7 @@ use crate::{Config, Frame, FrameSource, Result};
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
 
-/// Frames of a file in the first pass, which tells noise and motion: half a minute of most videos.
-const LEARN_FRAMES: usize = 1000;
-/// Most memory that they take, bytes.
+/// Most memory that the frames of the first pass take, bytes.
 const LEARN_BYTES: usize = 256 << 20;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
@@ -47,7 +45,7 @@ pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
     let read = |config: &Config| -> Result<Replay> {
         let source = crate::io::open(input, &config.input.open_options())?;
         // A stream waits for nothing longer than the choice needs.
-        let most = if second_look::can_be_opened_twice(input) { LEARN_FRAMES } else { PROBE_FRAMES };
+        let most = if second_look::can_be_opened_twice(input) { noise::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, LEARN_BYTES);
         Ok(Replay::new(source, n))
     };

@@ -5,6 +5,7 @@
 
 use super::digits::round;
 use super::scene::{Camera, Scene};
+use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
@@ -55,7 +56,7 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option
         let mut detector = crate::vision::build(&config, info)?;
         let mut scan = Scan::default();
         let (mut n, mut looks, mut widths, mut quarters) = (0usize, 0usize, Vec::new(), [0usize; 4]);
-        for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+        for frame in spread(frames, LOOKS) {
             detector.detect(frame, &mut scan)?;
             looks += 1;
             n += scan.detections.len();

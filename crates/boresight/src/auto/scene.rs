@@ -9,6 +9,7 @@
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
+use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage};
 use crate::vision::cluster::Clusterer;
@@ -231,7 +232,7 @@ fn explained(frames: &[Frame], moved: &[Vec<Moved>], info: &SourceInfo) -> Resul
     let mut detector = crate::vision::build(&config, &seen)?;
     let mut scan = Scan::default();
     let (mut n, mut hits) = (0usize, 0usize);
-    for &i in moving.iter().step_by(moving.len().div_ceil(LOOKS).max(1)) {
+    for &i in spread(&moving, LOOKS) {
         detector.detect(&frames[i], &mut scan)?;
         for m in &moved[i] {
             let area = (m.right - m.left) * (m.bottom - m.top);

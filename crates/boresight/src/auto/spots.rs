@@ -1,6 +1,7 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
 use super::digits::round;
+use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::{MergedMeasurementsConfig, TrackerConfig};
 use crate::vision::config::DetectorConfig;
@@ -58,7 +59,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
         let mut detector = vision::build(&config, info)?;
         let mut scan = Scan::default();
         let (mut n, mut sum, mut sides, mut looks) = (0usize, 0.0, Vec::new(), 0usize);
-        for frame in frames.iter().step_by(frames.len().div_ceil(LOOKS).max(1)) {
+        for frame in spread(frames, LOOKS) {
             detector.detect(frame, &mut scan)?;
             looks += 1;
             n += scan.detections.len();

@@ -29,7 +29,7 @@ pub struct TrackerConfig {
     #[schemars(schema_with = "presets::schema")]
     pub filter: FilterConfig,
     /// Power density of the target's white acceleration, px²/s³, above 0; larger follows manoeuvres, smaller smooths more. Within t seconds
-    /// the velocity changes by the root of this times t: 25 is 5 px/s in one second, at any frame rate.
+    /// the velocity changes by √(this × t): 25 is 5 px/s in one second, at any frame rate.
     pub acceleration_density_px2_per_s3: f64,
     /// Density added to it in proportion to the square of the target's box, 1/s³: `box height² × this`, 0 or more. For scenes with
     /// near and far targets, where a tall box moves more pixels.

@@ -8,7 +8,6 @@
 //! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A; s the logarithm of the ratio of the heights.
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
 
-use super::confirm::history::History;
 use super::filter::TrackedFilter;
 use super::single_track::Track;
 use crate::validate::not_negative;
@@ -17,6 +16,8 @@ use boresight_filters::{Filter, Gaussian};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// How long a new track may take to be confirmed, s: a lost one is remembered for so much longer than the gap.
+const CONFIRM_S: f64 = 10.0;
 /// Lost tracks remembered.
 const MOST_LOST: usize = 256;
 /// Deviation of the logarithm of a target's height between its loss and its return: a third larger or smaller.
@@ -86,7 +87,7 @@ impl Reidentification {
 
     /// Forgets what was lost too long ago.
     pub fn forget(&mut self, config: &ReidentificationConfig, now: Timestamp) {
-        self.lost.retain(|l| now.seconds_since(Timestamp::from_ns(l.last_seen_ns)) <= config.max_gap_s + COAST_S);
+        self.lost.retain(|l| now.seconds_since(Timestamp::from_ns(l.last_seen_ns)) <= config.max_gap_s + CONFIRM_S);
     }
 
     /// Gives track `new`, just confirmed, the id of the track that it continues, if there is one. Returns the number of a track that coasted
@@ -123,7 +124,7 @@ impl Reidentification {
             }
         }
         for (i, t) in tracks.iter().enumerate() {
-            if i != new && t.reported && is_missed(&t.history) && in_time(t.history.last_seen_ns()) {
+            if i != new && t.reported && t.history.misses > 0 && in_time(t.history.last_seen_ns()) {
                 let ratio = log_ratio(&t.filter.kinematics(), t.appearance.size[1], &belief, height, field);
                 consider(ratio, Earlier::Coasting(i));
             }
@@ -139,13 +140,6 @@ impl Reidentification {
             }
         }
     }
-}
-
-/// How long a lost track may have coasted before it ended, s: it is remembered for so much longer.
-const COAST_S: f64 = 10.0;
-
-fn is_missed(history: &History) -> bool {
-    history.misses > 0
 }
 
 /// Where targets can be, how fast, and how many there are: a new track is as likely another one's as there are others.

@@ -4,7 +4,7 @@
 //! initiates tracks. The parts are in [`step`](super::step), the confirmation rules in [`confirm`](super::confirm).
 //! Method: tracks lie in one vector in the order of their initiation; every pass runs through it from front to back. All scratch
 //! memory is kept, so a step allocates nothing once the largest scan was seen. A step is refused as a whole before
-//! anything changes. Two targets never share an id.
+//! anything changes. An id is given once; only reidentification hands it on.
 //! Time: every dt comes from the time stamps. A track whose coasting budget ended during a gap is gone before the scan
 //! behind the gap is looked at.
 //! Limits: detections of a scan share its time; `max_tracks` tracks.
@@ -46,6 +46,8 @@ pub struct Tracker {
     association: Association,
     merged: MergedMeasurements,
     lost: Reidentification,
+    /// Tracks that were reported for the first time in this scan, by their place in `tracks`.
+    new: Vec<u32>,
     weighted: Vec<Weighted>,
     /// Whether the associator is soft (then tracks may be duplicates), and which detections already have a track.
     is_soft: bool,
@@ -74,6 +76,7 @@ impl Tracker {
             association: Association::new(config),
             merged: MergedMeasurements::default(),
             lost: Reidentification::default(),
+            new: Vec::new(),
             weighted: Vec::new(),
             is_soft: config.associator.is_soft(),
             owned: Vec::new(),
@@ -122,13 +125,27 @@ impl Tracker {
 
     /// Updates every track, confirms or deletes it, and reports it; the order stays.
     fn update_confirm_delete(&mut self, scan: &Scan) {
-        let Self { config, tracks, table, predicted, association, merged, weighted, cost, owned, states, lost, .. } =
-            self;
+        let Self {
+            config,
+            tracks,
+            table,
+            predicted,
+            association,
+            merged,
+            weighted,
+            cost,
+            owned,
+            states,
+            lost,
+            new,
+            ..
+        } = self;
         let context = Context { scan, table, config, gate: self.gate };
         let now = scan.time;
         let coast_s = coast_budget_s(config, &self.clock.interval);
         let secondary_s = config.merged_measurements.max_secondary_s;
         states.clear();
+        new.clear();
         owned.clear();
         owned.resize(if self.is_soft { scan.detections.len() } else { 0 }, false);
         let mut parts = merged.parts.iter().peekable();
@@ -153,31 +170,43 @@ impl Tracker {
             if deleted {
                 lost.remember(&config.reidentification, t, now);
             } else {
-                states.push(report(t, &outcome, config, table.camera));
+                let state = report(t, &outcome, config, table.camera);
+                if state.status != TrackStatus::Tentative && !t.reported {
+                    new.push(states.len() as u32);
+                }
+                states.push(state);
             }
             !deleted
         });
     }
 
     /// Gives tracks that were confirmed in this scan the id of a lost one that they continue; states and tracks lie in one order.
-    fn reidentify(&mut self, now: Timestamp) {
-        let Self { config, tracks, states, lost, .. } = self;
+    /// Those from `first_begun` on were begun in it.
+    fn reidentify(&mut self, now: Timestamp, first_begun: usize) {
+        let Self { config, tracks, states, lost, new, .. } = self;
+        let begun = (first_begun..states.len()).filter(|&i| states[i].status != TrackStatus::Tentative);
+        new.extend(begun.map(|i| i as u32));
+        lost.forget(&config.reidentification, now);
+        if new.is_empty() {
+            return;
+        }
+        if config.reidentification.max_gap_s <= 0.0 {
+            new.iter().for_each(|&i| tracks[i as usize].reported = true);
+            return;
+        }
         let n_reported = tracks.iter().filter(|t| t.reported).count();
         let field = Field::new(config.field_px, config.max_speed_px_per_s, n_reported);
-        lost.forget(&config.reidentification, now);
-        let mut i = 0;
-        while i < tracks.len() {
-            if states[i].status != TrackStatus::Tentative && !tracks[i].reported {
-                tracks[i].reported = true;
-                let replaced = lost.identify(&config.reidentification, tracks, i, now, &field);
-                states[i].id = TrackId(tracks[i].id);
-                if let Some(r) = replaced {
-                    tracks.remove(r);
-                    states.remove(r);
-                    i -= usize::from(r < i);
-                }
+        for k in 0..new.len() {
+            let i = new[k] as usize;
+            tracks[i].reported = true;
+            let replaced = lost.identify(&config.reidentification, tracks, i, now, &field);
+            states[i].id = TrackId(tracks[i].id);
+            if let Some(r) = replaced {
+                tracks.remove(r);
+                states.remove(r);
+                // It was reported before, so it is none of those still to come.
+                new[k + 1..].iter_mut().filter(|i| **i as usize > r).for_each(|i| *i -= 1);
             }
-            i += 1;
         }
     }
 }
@@ -207,8 +236,9 @@ impl Tracking for Tracker {
         self.update_confirm_delete(scan);
         let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate };
         let mut new = NewTracks { tracks: &mut self.tracks, states: &mut self.states, next_id: &mut self.next_id };
+        let first_begun = new.states.len();
         initiate(&context, &self.clutter, &mut self.association.used, &mut self.pending, &mut new);
-        self.reidentify(scan.time);
+        self.reidentify(scan.time, first_begun);
         Ok(&self.states)
     }
 }

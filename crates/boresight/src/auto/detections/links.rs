@@ -31,7 +31,7 @@ pub(super) struct Links<'a> {
 pub(super) struct Motion {
     /// Deviation of a detection's centre beyond its stated covariance, h.
     pub(super) extra_noise: f64,
-    /// Deviation of a target's acceleration from scan to scan, h/s².
+    /// Power density of a target's white acceleration, h²/s³.
     pub(super) density_per_s3: f64,
     /// Deviation of a target's velocity per axis, px/s.
     pub(super) speed_std_px_per_s: f64,
@@ -200,12 +200,9 @@ mod tests {
         let lag = (WANDER_S / dt).round();
         let noise = (m.extra_noise * height).hypot(1.0);
         assert!((noise / (sigma * lag.sqrt()) - 1.0).abs() < 0.1, "{noise}");
-        let density = a * a * dt;
-        assert!(
-            (m.density_per_s3 * height * height / density - 1.0).abs() < 0.5,
-            "{} of {density}",
-            m.density_per_s3 * height * height
-        );
+        // An acceleration new in every scan lasts for one.
+        let acceleration = (m.density_per_s3 / dt).sqrt() * height;
+        assert!((acceleration / a - 1.0).abs() < 0.25, "{acceleration}");
         assert!((m.p_detection - 0.95).abs() < 0.01, "{}", m.p_detection);
         assert!(m.fastest_px_per_s > m.speed_std_px_per_s && m.n_steps > 3000);
     }

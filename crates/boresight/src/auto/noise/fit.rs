@@ -10,6 +10,9 @@
 //! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of c, e, f, a, b.
 //! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest.
 
+use crate::track::AccelerationNoise;
+use crate::track::filter::constant_velocity::{Axis, step_noise};
+
 /// One detection of a series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
@@ -44,7 +47,7 @@ const STEPS: [f64; 2] = [2.0, 0.05];
 /// The same for the factor on stated variances: they are known better than that.
 const SCALE_PRIOR_FACTOR: f64 = 2.0;
 /// Least value of any of the five numbers: nothing beside a pixel and a second.
-const LEAST: f64 = 1e-6;
+pub const LEAST: f64 = 1e-6;
 /// Innovations that every series gives before they count: its velocity is not known at first.
 const SETTLING: usize = 2;
 
@@ -84,16 +87,6 @@ fn noise_of(x: &[f64; 5]) -> Noise {
     Noise { scale, extra_px, extra_per_height, density, density_per_height2 }
 }
 
-/// Position and velocity along one axis.
-#[derive(Clone, Copy)]
-struct Axis {
-    x: f64,
-    v: f64,
-    xx: f64,
-    xv: f64,
-    vv: f64,
-}
-
 /// Logarithm of the likelihood of all series.
 fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2: f64) -> f64 {
     let strange = STRANGE / area_px2;
@@ -114,14 +107,10 @@ fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2:
         for (k, s) in steps.iter().enumerate().skip(1) {
             let t = s.dt_s;
             let (mut nis, mut det) = (0.0, 1.0);
-            let mut seen = [(0.0, 0.0); 2];
+            let step = step_noise(AccelerationNoise::Continuous(q), t);
             for (a, axis) in axes.iter_mut().enumerate() {
-                axis.x += t * axis.v;
-                axis.xx += t * (2.0 * axis.xv + t * axis.vv) + q * t * t * t / 3.0;
-                axis.xv += t * axis.vv + 0.5 * q * t * t;
-                axis.vv += q * t;
+                axis.predict(t, &step);
                 let (nu, var) = (s.position[a] - axis.x, axis.xx + r(s, a));
-                seen[a] = (nu, var);
                 nis += nu * nu / var;
                 det *= var;
             }
@@ -132,13 +121,8 @@ fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2:
             if own < strange {
                 continue;
             }
-            for (axis, (nu, var)) in axes.iter_mut().zip(seen) {
-                let (kx, kv) = (axis.xx / var, axis.xv / var);
-                axis.x += kx * nu;
-                axis.v += kv * nu;
-                axis.vv -= kv * axis.xv;
-                axis.xv *= 1.0 - kx;
-                axis.xx *= 1.0 - kx;
+            for (a, axis) in axes.iter_mut().enumerate() {
+                axis.correct(s.position[a], r(s, a));
             }
         }
     }

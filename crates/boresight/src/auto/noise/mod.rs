@@ -19,6 +19,9 @@ const LEAST_STEPS: usize = 60;
 const GATE_PROBABILITY: f64 = 0.9999;
 /// How long targets are one detection when they pass each other, s.
 const MERGED_S: f64 = 1.0;
+/// Most scans and detections of the first pass: half a minute of most videos, or of a table; a guard of time and memory.
+pub const MOST_SCANS: usize = 1000;
+const MOST_DETECTIONS: usize = 2_000_000;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
 
@@ -44,7 +47,12 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
     let mut taken = Vec::new();
-    for scan in scans {
+    let mut n_seen = 0usize;
+    for scan in scans.iter().take(MOST_SCANS) {
+        n_seen += scan.detections.len();
+        if n_seen > MOST_DETECTIONS {
+            break;
+        }
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
         ground.scan_on_ground(scan, &mut on_ground);
@@ -90,15 +98,15 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     t.merged_measurements.edge_std_px = round(size_std);
     t.gate_probability = GATE_PROBABILITY;
     t.detection_covariance_scale = round(found.scale);
-    t.extra_noise_px = round(found.extra_px);
-    t.extra_noise_per_height = round(found.extra_per_height);
+    t.extra_noise_px = or_none(found.extra_px);
+    t.extra_noise_per_height = or_none(found.extra_per_height);
     t.acceleration_density_px2_per_s3 = round(found.density);
-    t.acceleration_density_per_height2_per_s3 = round(found.density_per_height2);
+    t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2);
     reasons.push(format!(
         "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} px and {:.4} of a box height beyond them, acceleration density \
          {:.3} px²/s³ and {:.4} heights²/s³.",
         series.len(),
-        scans.len(),
+        scans.len().min(MOST_SCANS),
         t.detection_covariance_scale,
         t.extra_noise_px,
         t.extra_noise_per_height,
@@ -106,6 +114,11 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         t.acceleration_density_per_height2_per_s3,
     ));
     Ok(())
+}
+
+/// Three digits of a number, 0 where the search has left it at its floor.
+fn or_none(v: f64) -> f64 {
+    if v <= 2.0 * fit::LEAST { 0.0 } else { round(v) }
 }
 
 /// How far widths and heights change within [`MERGED_S`], over √2: px. The place of a member of a merged measurement is an edge and half of its own

@@ -5,6 +5,8 @@ use crate::sim::ground::{CameraPathConfig, Ground};
 use crate::sim::scene::Background;
 use crate::sim::{SceneConfig, SceneSource, Seed};
 use crate::{Frame, FrameSource};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// A ground of knots every `length_px` under a camera; per-frame rates.
 fn scene(size: (usize, usize), length_px: f64, pan: [f64; 2], turn_deg: f64, zoom: f64, n_frames: u64) -> SceneSource {
@@ -169,5 +171,64 @@ fn a_frame_reduced_by_three_moves_by_its_own_pixels() {
             let error = motion.now_from_before.apply(corner) - truth.apply(corner);
             assert!(error.norm() < 0.6, "frame {k}: off by {error}");
         }
+    }
+}
+
+/// A textured ground seen from (x, y), with one bright thing that moves on its own.
+fn view(ground: &Image<u8>, x: usize, y: usize, thing: usize) -> Pixels {
+    let mut frame = Image::filled(160, 120, 0u8);
+    for r in 0..120 {
+        frame.row_mut(r).copy_from_slice(&ground.row(y + r)[x..x + 160]);
+    }
+    for r in 50..60 {
+        frame.row_mut(r)[thing..thing + 10].fill(250);
+    }
+    Pixels::Gray8(frame)
+}
+
+fn ground() -> Image<u8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let coarse: Vec<f64> = (0..60 * 60).map(|_| 200.0 * rng.random::<f64>()).collect();
+    let mut image = Image::filled(400, 400, 0u8);
+    for y in 0..400 {
+        for x in 0..400 {
+            // Smooth between the knots, so that half pixels exist.
+            let (fx, fy) = (x as f64 / 7.0, y as f64 / 7.0);
+            let (i, j) = (fx as usize, fy as usize);
+            let (a, b) = (fx - i as f64, fy - j as f64);
+            let at = |i: usize, j: usize| coarse[j * 60 + i];
+            let v = at(i, j) * (1.0 - a) * (1.0 - b)
+                + at(i + 1, j) * a * (1.0 - b)
+                + at(i, j + 1) * (1.0 - a) * b
+                + at(i + 1, j + 1) * a * b;
+            image.row_mut(y)[x] = v as u8;
+        }
+    }
+    image
+}
+
+#[test]
+fn a_pan_is_followed_whatever_a_target_does() {
+    let ground = ground();
+    let mut camera = CameraMotionEstimator::default();
+    assert_eq!(camera.step(&view(&ground, 100, 100, 10)), None, "the first frame has no shift");
+    let mut sum = Vector2::zeros();
+    for k in 1..30 {
+        let shift = camera.step(&view(&ground, 100 + 4 * k, 100 + k, 10 + 2 * k)).expect("a textured ground");
+        sum += shift.shift_px();
+        assert!((sum - Vector2::new(-4.0 * k as f64, -(k as f64))).norm() < 0.5, "frame {k}: {sum}");
+    }
+}
+
+#[test]
+fn a_fixed_camera_is_exactly_fixed_under_a_sensor_s_noise() {
+    let ground = ground();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut camera = CameraMotionEstimator::default();
+    for k in 0..20 {
+        let Pixels::Gray8(mut frame) = view(&ground, 50, 50, 10 + k) else { unreachable!() };
+        frame.as_mut_slice().iter_mut().for_each(|p| *p = p.saturating_add(rng.random_range(0..6)));
+        let shift = camera.step(&Pixels::Gray8(frame));
+        assert!(k == 0 || shift.is_some_and(|m| m.now_from_before.is_identity()), "frame {k}: {shift:?}");
     }
 }

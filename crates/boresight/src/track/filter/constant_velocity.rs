@@ -6,7 +6,8 @@
 //! the axes stay independent and a step is two 2x2 filters. Several hypotheses: each is corrected by itself and the
 //! mixture is matched in mean and covariance, which is PDA's update when all share one R.
 //! Symbols: state `[x, vx, y, vy]` (px, px/s); q process covariance of a step; r measurement variance, px².
-//! The prediction is [`boresight_filters::model::ConstantVelocity`]'s, written out for the numbers kept.
+//! The prediction is [`boresight_filters::model::ConstantVelocity`]'s, written out for the numbers kept; its order of operations is
+//! that of all published tables, so it stands here once more.
 //! Limits: linear, constant velocity with white acceleration.
 
 use super::acceleration_noise::AccelerationNoise;
@@ -16,17 +17,17 @@ use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Mean and covariance of one axis: position and velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Axis {
-    x: f64,
-    v: f64,
-    xx: f64,
-    xv: f64,
-    vv: f64,
+pub(crate) struct Axis {
+    pub x: f64,
+    pub v: f64,
+    pub xx: f64,
+    pub xv: f64,
+    pub vv: f64,
 }
 
 impl Axis {
     #[inline]
-    fn predict(&mut self, dt_s: f64, q: &[f64; 3]) {
+    pub fn predict(&mut self, dt_s: f64, q: &[f64; 3]) {
         let t = dt_s;
         self.x += t * self.v;
         self.xx += t * (2.0 * self.xv + t * self.vv) + q[0];
@@ -35,7 +36,7 @@ impl Axis {
     }
 
     #[inline]
-    fn correct(&mut self, z: f64, r: f64) {
+    pub fn correct(&mut self, z: f64, r: f64) {
         let s = self.xx + r;
         let (kx, kv) = (self.xx / s, self.xv / s);
         let nu = z - self.x;
@@ -51,7 +52,7 @@ impl Axis {
 
 /// Process covariance q00, q01, q11 of one axis over a step (px², px²/s, px²/s²).
 #[inline]
-fn step_noise(noise: AccelerationNoise, t: f64) -> [f64; 3] {
+pub(crate) fn step_noise(noise: AccelerationNoise, t: f64) -> [f64; 3] {
     let t2 = t * t;
     match noise {
         AccelerationNoise::Continuous(q) => [q * (t2 * t) / 3.0, 0.5 * q * t2, q * t],
