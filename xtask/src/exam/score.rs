@@ -70,7 +70,7 @@ pub fn score(clip: &Clip, sets: &[String]) -> Result<Score> {
     let changed = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
     // As the command does: what is set holds for the first pass as well, and is not overruled by it.
     choice.config = changed(choice.config)?;
-    let detector = auto::learn(&mut source, &mut choice)?;
+    let detector = auto::learn(&mut source, &mut choice, None)?;
     let config = changed(choice.config)?;
     let tracker = track::build(&config.tracker)?;
     let seen = Arc::new(Mutex::new(Reported::default()));

@@ -50,6 +50,13 @@ pub struct TrackerArgs {
     /// Give every track an id of its own, even if it continues a target that was lost for a moment.
     #[arg(long)]
     pub no_stitch: bool,
+    /// False tracks an hour that are allowed; fewer take longer to confirm. Without it one, or one for a hundred targets that come.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub false_tracks_per_hour: Option<f64>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0".to_string())
 }
 
 /// What is to be run.
@@ -98,7 +105,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     let info = source.info().clone();
     // What the user sets holds for the first pass as well, and is not overruled by what it learns.
     choice.config = changed(choice.config, args, tracker)?;
-    let detector = auto::learn(&mut source, &mut choice)?;
+    let detector = auto::learn(&mut source, &mut choice, tracker.false_tracks_per_hour)?;
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     Ok(Plan { input, config, reasons: choice.reasons, info: Some(info), n_scans: None })
@@ -150,7 +157,8 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
         None => {
             // The first pass runs with the filter that is asked for.
             config = changed(config, args, tracker)?;
-            auto::for_detections(&table.scans, table.rate_hz, &mut config, &mut reasons);
+            let allowed = tracker.false_tracks_per_hour;
+            auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons);
         }
     }
     config = changed(config, args, tracker)?;

@@ -7,6 +7,7 @@
 mod cells;
 mod choose;
 mod colour;
+mod detection_statistics;
 mod detections;
 mod digits;
 mod faint;

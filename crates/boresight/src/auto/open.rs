@@ -8,12 +8,13 @@
 
 use super::choose::{Choice, choose_seen};
 use super::first_pass::{FirstPass, frames_ahead};
-use super::noise;
 use super::replay::Replay;
 use super::scene::{self, Camera};
 use super::second_look;
+use super::{detection_statistics, noise};
 use crate::track::Tracking;
 use crate::vision::Detector;
+use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Frame, FrameSource, Result};
 
 /// Frames looked at by the automatic choice.
@@ -70,13 +71,32 @@ fn probed(ahead: &[Frame]) -> &[Frame] {
 /// where they end, so no frame is detected twice.
 /// # Errors
 /// A parameter out of its range.
-pub fn learn(frames: &mut Replay, choice: &mut Choice) -> Result<Box<dyn Detector>> {
+pub fn learn(
+    frames: &mut Replay,
+    choice: &mut Choice,
+    false_tracks_per_hour: Option<f64>,
+) -> Result<Box<dyn Detector>> {
     let info = frames.info().clone();
     let detector = crate::vision::build(&choice.config.detector, &info)?;
     let mut pass = FirstPass::over(frames.ahead(), detector);
     let area_px2 = (info.width * info.height).max(1) as f64;
     noise::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons)?;
+    if is_of_points(&choice.config.detector.threshold) {
+        detection_statistics::learn(
+            pass.scans(),
+            area_px2,
+            false_tracks_per_hour,
+            &mut choice.config,
+            &mut choice.reasons,
+        )?;
+    }
     Ok(Box::new(pass))
+}
+
+/// Whether what is detected is a point or a blob that stands alone: one detection a target, false ones anywhere. Regions come in pieces, which lie where
+/// targets are; what comes of counting those as independent is no probability, so regions are confirmed by the number of their hits.
+fn is_of_points(threshold: &ThresholdConfig) -> bool {
+    matches!(threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Cfar(_))
 }
 
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.
@@ -103,7 +123,7 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice) -> Result<Box<dyn Detecto
 /// An input that cannot be read; a parameter out of its range.
 pub fn open(input: &str, base: &Config) -> Result<Opened> {
     let (mut frames, mut choice) = open_and_choose(input, base)?;
-    let detector = learn(&mut frames, &mut choice)?;
+    let detector = learn(&mut frames, &mut choice, None)?;
     Ok(Opened {
         frames: Box::new(frames),
         detector,

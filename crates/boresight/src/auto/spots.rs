@@ -3,7 +3,7 @@
 use super::digits::round;
 use super::spread::spread;
 use crate::camera::CameraConfig;
-use crate::track::{MergedMeasurementsConfig, TrackerConfig};
+use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
@@ -140,16 +140,10 @@ pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, re
         tracker.min_initiation_score = 4.0;
         return;
     }
-    tracker.confirmation_gate.strong_score = 11.0;
-    tracker.confirmation_gate.strong_min_travel_px = 1.2;
-    tracker.confirmation_gate.camera_travel_share = 0.05;
-    // Clouds and lamp posts: on the public infrared clips 0.12 to 0.35 ends them, 0.25 and more delays slow aircraft.
-    tracker.confirmation_gate.size_share = 0.15;
-    tracker.confirmation_gate.consecutive_hits = 2;
-    tracker.confirmation_gate.min_travel_px = 2.5;
-    reasons.push(format!(
-        "A track starts from a score of {} or more and is reported once it has moved {} px against the background ({} px if its mean score \
-         is {} or more) and 15 % of its size: what stands still is taken for scenery. Report that too with --set tracker.confirmation-gate.min-travel-px=0.",
-        tracker.min_initiation_score, tracker.confirmation_gate.min_travel_px, tracker.confirmation_gate.strong_min_travel_px, tracker.confirmation_gate.strong_score
-    ));
+    tracker.report = Report::Moving;
+    reasons.push(
+        "A track is reported once it has moved farther than its covariance, the camera's motion and the wander of its outline explain: what stands \
+         still is taken for scenery. Report that too with --set tracker.report=all."
+            .to_string(),
+    );
 }

@@ -2,13 +2,15 @@
 //!
 //! Limits: a scan whose shift is unknown adds nothing to the length of the path; if the background was followed before, it counts as a cut.
 
-use nalgebra::Vector2;
+use crate::CameraMotion;
 
 /// What the camera did so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraPath {
     /// Length of the background's path in the image, px.
     pub length_px: f64,
+    /// How well the way of the background is known: the sum of the variances of its steps, px² per axis, mean over the image.
+    pub variance_px2: f64,
     /// Times that a background which was followed for some scans was lost: another view, or a jerk.
     pub cuts: u32,
     followed: u32,
@@ -18,9 +20,14 @@ impl CameraPath {
     /// Scans that a background must have been followed before its loss is a cut.
     const FOLLOWED: u32 = 10;
 
-    /// Takes the next scan's shift at the image's middle in, px; `None` where it was not measured.
-    pub fn step(&mut self, shift_px: Option<Vector2<f64>>) {
-        match shift_px.map(|s| s.norm()).filter(|length| length.is_finite()) {
+    /// Takes the next scan's motion in.
+    pub fn step(&mut self, motion: Option<&CameraMotion>) {
+        if let Some(m) = motion.filter(|m| m.is_finite()) {
+            // Mean of |p - centre|² over the image, whose half sides are the centre's coordinates, for one axis.
+            let spread = m.centre_px.norm_squared() / 6.0;
+            self.variance_px2 += 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
+        }
+        match motion.and_then(CameraMotion::measured_shift_px).map(|s| s.norm()) {
             Some(length) => {
                 self.length_px += length;
                 self.followed = self.followed.saturating_add(1);
@@ -36,16 +43,21 @@ impl CameraPath {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
+
+    fn step(path: &mut CameraPath, shift: Option<Vector2<f64>>) {
+        path.step(shift.map(CameraMotion::exact_shift).as_ref());
+    }
 
     #[test]
     fn a_loss_is_a_cut_only_after_ten_scans_that_were_followed() {
         let mut path = CameraPath::default();
-        (0..9).for_each(|_| path.step(Some(Vector2::new(3.0, -4.0))));
-        path.step(None);
+        (0..9).for_each(|_| step(&mut path, Some(Vector2::new(3.0, -4.0))));
+        step(&mut path, None);
         assert_eq!((path.length_px, path.cuts), (45.0, 0));
-        (0..10).for_each(|_| path.step(Some(Vector2::zeros())));
-        path.step(Some(Vector2::new(f64::NAN, 0.0)));
-        path.step(None);
+        (0..10).for_each(|_| step(&mut path, Some(Vector2::zeros())));
+        step(&mut path, Some(Vector2::new(f64::NAN, 0.0)));
+        step(&mut path, None);
         assert_eq!((path.length_px, path.cuts), (45.0, 1), "what is not finite is unknown; a view is lost once");
     }
 }

@@ -5,7 +5,7 @@
 
 use super::association_cost::AssociationCostConfig;
 use super::clutter::ClutterConfig;
-use super::confirm::confirmation_gate::ConfirmationGateConfig;
+use super::confirm::motion_test::{MotionTestConfig, Report};
 use super::confirm::rule::ConfirmationConfig;
 use super::filter::{AccelerationNoise, DEFAULT_DENSITY_PX2_PER_S3, FilterConfig, TrackedFilter, presets};
 use super::initial_tracks::InitialTrackConfig;
@@ -55,6 +55,10 @@ pub struct TrackerConfig {
     pub gate_within_max_speed: bool,
     /// Probability that a target is detected in a scan, in (0, 1].
     pub detection_probability: f64,
+    /// The same after a scan in which it was not detected, in (0, 1]: a target that hides or fades stays so for a while (detections are a Markov
+    /// chain), and a second miss says less than the first. Left out: scans are independent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redetection_probability: Option<f64>,
     /// False detections per px² and scan, 0 or more (used by every method that weighs detections against clutter).
     pub clutter_density_per_px2: f64,
     /// Whether that density is taken as given, or estimated from the scans.
@@ -65,8 +69,10 @@ pub struct TrackerConfig {
     pub mht: Option<MhtConfig>,
     /// When a track is confirmed and when it is deleted.
     pub confirmation: ConfirmationConfig,
-    /// What a new track must show, beside its confirmation rule, before it is reported as confirmed.
-    pub confirmation_gate: ConfirmationGateConfig,
+    /// Which of the tracks that this rule confirms are reported: `all`, or only what is `moving` by itself.
+    pub report: Report,
+    /// With `report = "moving"`: when a track has moved by itself.
+    pub motion_test: MotionTestConfig,
     /// How tracks are initiated.
     pub initiation: InitiationConfig,
     /// Least score of a detection that initiates a track, 0 or more; weaker ones only continue tracks. 0 asks for no score: some
@@ -115,12 +121,14 @@ impl Default for TrackerConfig {
             max_speed_px_per_s: 150.0,
             gate_within_max_speed: true,
             detection_probability: 0.9,
+            redetection_probability: None,
             clutter_density_per_px2: 1e-5,
             clutter: ClutterConfig::default(),
             associator: AssociatorConfig::default(),
             mht: None,
             confirmation: ConfirmationConfig::default(),
-            confirmation_gate: ConfirmationGateConfig::default(),
+            report: Report::All,
+            motion_test: MotionTestConfig::default(),
             initiation: InitiationConfig::default(),
             min_initiation_score: 0.0,
             initial_tracks: Vec::new(),
@@ -159,6 +167,15 @@ impl TrackerConfig {
     /// Gate threshold on d²: γ = −2 ln(1 − P_G), the χ² quantile with 2 degrees of freedom (no unit).
     pub fn gate(&self) -> f64 {
         -2.0 * (1.0 - self.gate_probability).ln()
+    }
+
+    /// Probability that a target is detected that was missed in so many scans before.
+    #[inline]
+    pub(super) fn p_detection(&self, misses: u32) -> f64 {
+        match self.redetection_probability {
+            Some(p) if misses > 0 => p,
+            _ => self.detection_probability,
+        }
     }
 
     /// Whether a detection of this score may initiate a track.
@@ -211,6 +228,10 @@ impl TrackerConfig {
             "a probability in (0, 1]",
             "0.9 suits most detectors",
         )?;
+        if let Some(p) = self.redetection_probability {
+            let mend = "0.3 finds it again after three scans; left out, a miss says nothing of the next scan";
+            check(p > 0.0 && p <= 1.0, at, "redetection-probability", p, "a probability in (0, 1]", mend)?;
+        }
         not_negative(
             at,
             "clutter-density-per-px2",
@@ -223,7 +244,7 @@ impl TrackerConfig {
             c.validate(&format!("{at}.mht"))?;
         }
         self.confirmation.validate(&format!("{at}.confirmation"))?;
-        self.confirmation_gate.validate(&format!("{at}.confirmation-gate"))?;
+        self.motion_test.validate(&format!("{at}.motion-test"))?;
         self.initiation.validate(&format!("{at}.initiation"))?;
         not_negative(at, "min-initiation-score", self.min_initiation_score, "0 lets every detection initiate a track")?;
         for (i, initial) in self.initial_tracks.iter().enumerate() {

@@ -34,9 +34,9 @@ pub use association_cost::{AssociationCostConfig, OverlapConfig, OverlapKind};
 pub use build::build;
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};
-pub use confirm::confirmation_gate::ConfirmationGateConfig;
 pub use confirm::existence::ExistenceConfig;
 pub use confirm::m_of_n::MOfNConfig;
+pub use confirm::motion_test::{MotionTestConfig, Report};
 pub use confirm::rule::ConfirmationConfig;
 pub use confirm::sprt::SprtConfig;
 pub use filter::{

@@ -4,6 +4,8 @@
 //! coast without a detection since the new one began, are predicted to that time by their own filters. The difference of the two beliefs in
 //! position and velocity is either that of one target, N(0, P + P'), or a new target's, anywhere in the field with a velocity
 //! N(0, v²/9) per axis; the likelier hypothesis holds, and among several lost tracks the likeliest one.
+//! Tracks are also lost where a target turns harder than the model allows (a ball at a wall): with the probability [`TURNED`] the velocity has changed by
+//! as much as the speeds before and after, u and u', and only the place speaks: N(0, P + P' + ½ (u² + u'²) T² I), T the time since it was last seen.
 //! It decides once and looks back only: a stream's ids, the annotated video's and the table's are the same.
 //! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A; s the logarithm of the ratio of the heights.
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
@@ -13,11 +15,14 @@ use super::single_track::Track;
 use crate::validate::not_negative;
 use crate::{Result, Timestamp};
 use boresight_filters::{Filter, Gaussian};
+use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How long a new track may take to be confirmed, s: a lost one is remembered for so much longer than the gap.
 const CONFIRM_S: f64 = 10.0;
+/// Share of losses where the target had turned hard; with none, every reversal gives a new id. Chosen: such turns are rarer than hiding.
+const TURNED: f64 = 0.1;
 /// Lost tracks remembered.
 const MOST_LOST: usize = 256;
 /// Deviation of the logarithm of a target's height between its loss and its return: a third larger or smaller.
@@ -120,12 +125,15 @@ impl Reidentification {
         for (i, l) in self.lost.iter().enumerate().filter(|(_, l)| in_time(l.last_seen_ns)) {
             let mut filter = l.filter.clone();
             if filter.predict(now.seconds_since(l.at).max(0.0)).is_ok() {
-                consider(log_ratio(&filter.kinematics(), l.height_px, &belief, height, field), Earlier::Lost(i));
+                let gap_s = now.seconds_since(Timestamp::from_ns(l.last_seen_ns));
+                let ratio = log_ratio(&filter.kinematics(), l.height_px, &belief, height, gap_s, field);
+                consider(ratio, Earlier::Lost(i));
             }
         }
         for (i, t) in tracks.iter().enumerate() {
             if i != new && t.reported && t.history.misses > 0 && in_time(t.history.last_seen_ns()) {
-                let ratio = log_ratio(&t.filter.kinematics(), t.appearance.size[1], &belief, height, field);
+                let gap_s = now.seconds_since(Timestamp::from_ns(t.history.last_seen_ns()));
+                let ratio = log_ratio(&t.filter.kinematics(), t.appearance.size[1], &belief, height, gap_s, field);
                 consider(ratio, Earlier::Coasting(i));
             }
         }
@@ -157,16 +165,35 @@ impl Field {
     }
 }
 
-/// Logarithm of the likelihood that both beliefs are one target's over that of a new one's.
-fn log_ratio(before: &Gaussian<4>, height_before: f64, now: &Gaussian<4>, height: f64, field: &Field) -> Option<f64> {
+/// Logarithm of the likelihood that both beliefs are one target's over that of a new one's; the one before was last seen `gap_s` ago.
+fn log_ratio(
+    before: &Gaussian<4>,
+    height_before: f64,
+    now: &Gaussian<4>,
+    height: f64,
+    gap_s: f64,
+    field: &Field,
+) -> Option<f64> {
     let c = (before.cov + now.cov).cholesky()?;
     let difference = now.mean - before.mean;
     let log_det = 2.0 * c.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    let s = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
-    let same = -0.5 * (difference.dot(&c.solve(&difference)) + log_det + s * s) - 2.0 * std::f64::consts::TAU.ln();
+    let straight = -0.5 * (difference.dot(&c.solve(&difference)) + log_det) - 2.0 * std::f64::consts::TAU.ln();
     let speed_var = (field.max_speed_px_per_s / SPEED_STDS).powi(2);
-    let speed2 = now.mean[1].powi(2) + now.mean[3].powi(2);
-    let new = (field.n_targets / (field.area_px2 * std::f64::consts::TAU * speed_var)).ln() - 0.5 * speed2 / speed_var;
+    let speed2 = |g: &Gaussian<4>| g.mean[1].powi(2) + g.mean[3].powi(2);
+    // Of a velocity that says nothing of the one before.
+    let any_velocity = -(std::f64::consts::TAU * speed_var).ln() - 0.5 * speed2(now) / speed_var;
+    let reach2 = 0.5 * (speed2(before) + speed2(now)) * gap_s * gap_s;
+    let (dx, dy) = (difference[0], difference[2]);
+    let cov = before.cov + now.cov;
+    let s = Matrix2::new(cov[(0, 0)] + reach2, cov[(0, 2)], cov[(0, 2)], cov[(2, 2)] + reach2);
+    let turned = TURNED.ln()
+        - 0.5 * (s.try_inverse()? * Vector2::new(dx, dy)).dot(&Vector2::new(dx, dy))
+        - (std::f64::consts::TAU * s.determinant().sqrt()).ln()
+        + any_velocity;
+    let grown = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
+    let likelier = straight.max(turned);
+    let same = likelier + (-(straight - turned).abs()).exp().ln_1p() - 0.5 * grown * grown;
+    let new = (field.n_targets / field.area_px2).ln() + any_velocity;
     (same - new).is_finite().then_some(same - new)
 }
 

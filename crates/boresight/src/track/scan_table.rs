@@ -95,7 +95,7 @@ impl ScanTable {
             }
             self.noise.push(n);
         }
-        self.camera.step(scan.camera_motion.and_then(|m| m.measured_shift_px()));
+        self.camera.step(scan.camera_motion.as_ref());
         Ok(())
     }
 

@@ -1,11 +1,12 @@
 //! One track: what it carries from scan to scan, and what one scan brought it.
 
 use super::appearance::Appearance;
-use super::confirm::confirmation_gate::GateProgress;
 use super::confirm::history::History;
+use super::confirm::motion_test::{MotionProgress, Report};
 use super::filter::TrackedFilter;
 use super::scan_table::Cov2;
 use crate::Detection;
+use crate::camera::CameraPath;
 use crate::record::TrackInnovation;
 
 /// Tracks whose neighbourhoods are fetched together, so that the waits for memory overlap.
@@ -24,8 +25,8 @@ pub(super) struct Track {
     pub last_place: [f64; 3],
     /// Whether it was ever reported as confirmed.
     pub reported: bool,
-    /// How far it has come through the confirmation gate.
-    pub gate_progress: GateProgress,
+    /// What it has shown of its motion.
+    pub motion: MotionProgress,
 }
 
 /// What one scan brought a track.
@@ -49,8 +50,17 @@ impl Track {
     pub(super) fn follow(&mut self, d: &Detection, noise: &Cov2, appearance_gain: f64) {
         self.appearance.follow(d, appearance_gain);
         self.last_place = place_of(d, noise);
-        self.gate_progress.add_score(d.score);
+        self.motion.add_size([d.extent.width_px, d.extent.height_px]);
     }
+}
+
+/// The motion of a track that begins with a detection.
+pub(super) fn motion_of(d: &Detection, noise: &Cov2, camera: CameraPath, report: Report) -> MotionProgress {
+    if report == Report::All {
+        return MotionProgress::passed();
+    }
+    let size = [d.extent.width_px, d.extent.height_px];
+    MotionProgress::begin([d.position.x, d.position.y], [noise.xx, noise.yy], size, camera)
 }
 
 /// Position of a detection and its larger standard deviation, px.

@@ -86,7 +86,7 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
 pub fn tracker_of(scans: &[Scan], rate_hz: f64, given: Option<&Config>) -> Config {
     given.cloned().unwrap_or_else(|| {
         let (mut config, mut reasons) = (Config::default(), Vec::new());
-        boresight::auto::for_detections(scans, rate_hz, &mut config, &mut reasons);
+        boresight::auto::for_detections(scans, rate_hz, None, &mut config, &mut reasons);
         reasons.iter().for_each(|r| eprintln!("  {r}"));
         config
     })

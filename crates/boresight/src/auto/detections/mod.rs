@@ -9,7 +9,7 @@ mod scores;
 
 use super::choose::REIDENTIFY_S;
 use super::digits::round;
-use super::noise;
+use super::{detection_statistics, noise};
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
     OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
@@ -28,11 +28,21 @@ const NO_ACCELERATION_PX2_PER_S3: f64 = 1e-4;
 const SPEED_RESERVE: f64 = 1.5;
 
 /// Writes the tracker's configuration for a table of detections.
-pub fn for_detections(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
-    assumed(scans, rate_hz, config, reasons);
+pub fn for_detections(
+    scans: &[Scan],
+    rate_hz: f64,
+    false_tracks_per_hour: Option<f64>,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
+    let of_boxes = assumed(scans, rate_hz, config, reasons);
     config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
     // What the scans hold that a tracker refuses is said by the run itself.
-    let _ = noise::learn(scans, area_px2(scans), config, reasons);
+    let area_px2 = area_px2(scans);
+    let _ = noise::learn(scans, area_px2, config, reasons);
+    if !of_boxes {
+        let _ = detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons);
+    }
 }
 
 /// The area over which the detections are spread, px².
@@ -45,8 +55,8 @@ fn area_px2(scans: &[Scan]) -> f64 {
     side(0) * side(1)
 }
 
-/// What is assumed before a tracker has run.
-fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
+/// What is assumed before a tracker has run; whether it is what boxes of an object detector showed.
+fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) -> bool {
     let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { 25.0 };
     let mut sides: Vec<f64> = scans
         .iter()
@@ -80,7 +90,7 @@ fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<
                 100.0 * CONTINUES
             ));
         }
-        return;
+        return true;
     }
     let side = sides.get(sides.len() / 2).copied().unwrap_or(0.0);
     // Boxes of larger things jump more: a tenth of the side is what detectors leave in the centre.
@@ -91,6 +101,7 @@ fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<
         "Median shorter side {side:.1} px: noise {} px, acceleration of density {} px²/s³, at most {} px/s.",
         tracker.extra_noise_px, tracker.acceleration_density_px2_per_s3, tracker.max_speed_px_per_s
     ));
+    false
 }
 
 /// Boxes of an object detector: every number in heights and seconds, as measured; boxes must overlap to be one target's.

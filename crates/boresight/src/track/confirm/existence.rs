@@ -3,6 +3,8 @@
 //! Source: D. Mušicki, R. Evans, S. Stanković, "Integrated probabilistic data association", IEEE Trans. Automatic Control 39, 1994
 //! (Markov chain one); docs/theory/track-management.md.
 //! Method: odds = ψ / (1 − ψ) are kept. Prediction ψ ← ψ p with the survival probability p = e^(−Δt / τ); a scan multiplies the odds by Λ.
+//! A track is confirmed by the evidence that it ever was a target: the same odds without the survival, which else could not exceed τ / Δt however much is
+//! seen. From then on ψ says whether it is still there.
 //! Symbols: Λ likelihood ratio of a scan; τ mean time a target stays in view, s.
 //! Limits: odds stay within 10^±12.
 
@@ -18,11 +20,11 @@ use serde::{Deserialize, Serialize};
 pub struct ExistenceConfig {
     /// New targets per px² and scan, above 0: a track's first odds are this over the clutter density.
     pub new_target_density_per_px2: f64,
-    /// A track at or above this is confirmed, in (0, 1).
+    /// A track is confirmed once it is a target's with at least this probability, in (0, 1), whether or not it may have left since.
     pub confirm_probability: f64,
     /// A track below this is deleted, in (0, 1), below the probability that confirms.
     pub delete_probability: f64,
-    /// A confirmed track that falls below this is tentative again until it recovers, in (0, 1), below the one that
+    /// A confirmed track that falls below this is tentative again until it is back above it, in (0, 1), below the one that
     /// confirms: a target that left is no longer reported, but still known if it comes back.
     pub demotion_probability: f64,
     /// Mean time a target stays in view, s, above 0: existence decays with it while nothing is detected.
@@ -70,6 +72,12 @@ impl ExistenceConfig {
         positive(at, "mean-target-lifetime-s", self.mean_target_lifetime_s, "30 s suits most scenes")
     }
 
+    /// Logarithm of the odds that confirm.
+    pub(super) fn confirm_log_odds(&self) -> f64 {
+        // As good as certain is as far as odds go.
+        (self.confirm_probability / (1.0 - self.confirm_probability)).min(ODDS.1).ln()
+    }
+
     /// Probability that a target stays in view for `dt_s`.
     pub(super) fn survival(&self, dt_s: f64) -> f64 {
         (-dt_s / self.mean_target_lifetime_s).exp()
@@ -85,9 +93,11 @@ impl ExistenceConfig {
     pub(super) fn decide(&self, history: &mut History, likelihood_ratio: f64) -> Decision {
         // ψ ← ψ Λ / (1 − ψ + ψ Λ) is odds ← odds Λ.
         history.value = (history.value * likelihood_ratio).clamp(ODDS.0, ODDS.1);
+        history.best = (history.best + likelihood_ratio.max(f64::MIN_POSITIVE).ln()).clamp(ODDS.0.ln(), ODDS.1.ln());
         let psi = probability_of(history.value);
-        if psi >= self.confirm_probability {
-            history.accepted = true;
+        let known = history.was_accepted || history.best >= self.confirm_log_odds();
+        if known && psi >= self.demotion_probability {
+            history.accept();
         } else if psi < self.demotion_probability {
             history.accepted = false;
         }

@@ -10,7 +10,7 @@ pub struct History {
     pub(super) hits: u64,
     /// Track score (ln Λ summed), or the odds that the target exists; by the rule.
     pub(super) value: f64,
-    /// Largest score so far.
+    /// Largest score so far (sequential test), or ln odds that it ever was a target (existence).
     pub(super) best: f64,
     /// Time of the last detection that was the track's own, ns.
     pub last_hit_ns: i64,
@@ -25,6 +25,8 @@ pub struct History {
     /// Whether the rule holds the track for confirmed. It then chooses its detections before tentative tracks and coasts; whether it
     /// is reported as confirmed is said by [`super::status`].
     pub accepted: bool,
+    /// Whether it ever did.
+    pub(super) was_accepted: bool,
 }
 
 impl History {
@@ -32,6 +34,12 @@ impl History {
     #[inline]
     pub fn last_seen_ns(&self) -> i64 {
         self.last_hit_ns.max(self.last_merged_ns)
+    }
+
+    /// Holds the track for confirmed.
+    #[inline]
+    pub fn accept(&mut self) {
+        (self.accepted, self.was_accepted) = (true, true);
     }
 
     /// Number of hits in the newest `n` scans.

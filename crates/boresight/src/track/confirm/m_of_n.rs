@@ -54,7 +54,7 @@ impl MOfNConfig {
         let scans = u32::from(history.scans);
         let hits = history.hits_in(self.scans);
         if hits >= self.hits && scans >= self.hits {
-            history.accepted = true;
+            history.accept();
             return Decision::Keep;
         }
         let late = (now_ns.saturating_sub(history.initiated_ns)) as f64 * 1e-9 > self.tentative_s;

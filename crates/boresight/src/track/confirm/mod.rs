@@ -1,12 +1,12 @@
 //! Whether a track is real: the rule that confirms and deletes it, and the gate that a confirmed track must pass to be reported.
 //!
-//! [`rule`] chooses among [`m_of_n`], [`sprt`] and [`existence`]; [`confirmation_gate`] stands behind every rule; [`status`] is the
+//! [`rule`] chooses among [`m_of_n`], [`sprt`] and [`existence`]; [`motion_test`] stands behind every rule; [`status`] is the
 //! one place that says "confirmed" to the outside.
 
-pub mod confirmation_gate;
 pub mod existence;
 pub mod history;
 pub mod m_of_n;
+pub mod motion_test;
 pub mod rule;
 pub mod sprt;
 pub(in crate::track) mod status;

@@ -56,15 +56,16 @@ impl ConfirmationConfig {
         let accepted = match self {
             Self::MOfN(c) => c.hits <= n_points,
             Self::Sprt(c) => value >= c.confirm_score(),
-            Self::Existence(c) => probability_of(value) >= c.confirm_probability,
+            Self::Existence(c) => value.ln() >= c.confirm_log_odds(),
         };
         History {
             hits: (1 << n_points) - 1,
             scans: n_points as u8,
             accepted,
+            was_accepted: accepted,
             misses: 0,
             value,
-            best: value,
+            best: if let Self::Existence(_) = self { value.ln() } else { value },
             last_hit_ns: now_ns,
             last_merged_ns: now_ns,
             initiated_ns: now_ns,

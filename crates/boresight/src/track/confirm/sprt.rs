@@ -71,7 +71,7 @@ impl SprtConfig {
         history.best = history.best.max(history.value);
         if !history.accepted {
             if history.value >= self.confirm_score() {
-                history.accepted = true;
+                history.accept();
                 history.best = history.value;
             } else if history.best - history.value
                 > -(self.true_delete_probability / (1.0 - self.false_confirm_probability)).ln()

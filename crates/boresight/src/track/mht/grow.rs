@@ -6,11 +6,10 @@
 use super::super::appearance::Appearance;
 use super::super::association_cost::AssociationCost;
 use super::super::clutter::Clutter;
-use super::super::confirm::confirmation_gate::GateProgress;
 use super::super::confirm::history::{Decision, Evidence};
 use super::super::initiation::from_one_point;
 use super::super::scan_table::Predicted;
-use super::super::single_track::{Outcome, Track, place_of};
+use super::super::single_track::{Outcome, Track, motion_of, place_of};
 use super::super::step::context::Context;
 use super::super::step::delete::budget_is_over;
 use super::super::step::gate::{gate_row, innovation_cov};
@@ -73,7 +72,7 @@ fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut
     let Context { scan, table, config, gate } = growth.context;
     let mut path = [NONE; WINDOW];
     path[1..].copy_from_slice(&leaf.path[..WINDOW - 1]);
-    let miss = 1.0 - config.detection_probability * config.gate_probability;
+    let miss = 1.0 - config.p_detection(leaf.track.history.misses) * config.gate_probability;
     let outcome = Outcome { likelihood_ratio: miss, ..Outcome::default() };
     let mut missed = Hypothesis { path, outcome, ..leaf.clone() };
     missed.score += miss.max(1e-300).ln();
@@ -109,7 +108,7 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
     let mut child = leaf.clone();
     let measurement = Measurement { position: d.position, cov: noise.matrix() };
     child.track.filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
-    let log_ratio = config.detection_probability.ln() + pair.log_likelihood
+    let log_ratio = config.p_detection(leaf.track.history.misses).ln() + pair.log_likelihood
         - growth.clutter.at(d.position.x, d.position.y).max(1e-200).ln();
     child.score += log_ratio;
     let likelihood_ratio = log_ratio.clamp(-100.0, 100.0).exp();
@@ -154,7 +153,7 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
                 duplicate_since_ns: None,
                 last_place: place_of(d, &noise),
                 reported: false,
-                gate_progress: GateProgress::begin([d.position.x, d.position.y], table.camera, d.score),
+                motion: motion_of(d, &noise, table.camera, config.report),
             },
             score: (growth.mht.new_target_density_per_px2 / density).ln(),
             path,

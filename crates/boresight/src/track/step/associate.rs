@@ -90,14 +90,15 @@ pub(in crate::track) fn gate_confirmed(
         }
         let p = &predicted[k];
         let existence = context.config.confirmation.existence(&t.history);
+        let p_detection = context.config.p_detection(t.history.misses);
         let stage = &mut association.stages[CONFIRMED];
         if plain {
-            stage.add(first + k, p, existence, context, |_| true, |_| 0.0);
+            stage.add(first + k, p, existence, p_detection, context, |_| true, |_| 0.0);
         } else {
             let detections = &context.scan.detections;
             let strong = |j: u32| detections[j as usize].score >= high;
             let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
-            stage.add(first + k, p, existence, context, strong, extra);
+            stage.add(first + k, p, existence, p_detection, context, strong, extra);
         }
     }
 }
@@ -177,5 +178,6 @@ fn add_later(
     let free = |j: u32| !used[j as usize] && detections[j as usize].score >= min_score;
     let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
     let existence = context.config.confirmation.existence(&t.history);
-    stage.add(i, p, existence, context, free, extra);
+    let p_detection = context.config.p_detection(t.history.misses);
+    stage.add(i, p, existence, p_detection, context, free, extra);
 }

@@ -9,11 +9,11 @@
 use super::super::appearance::Appearance;
 use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
-use super::super::confirm::confirmation_gate::GateProgress;
+use super::super::confirm::motion_test::MotionProgress;
 use super::super::filter::TrackedFilter;
 use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points};
 use super::super::scan_table::{Cov2, MOST_LOOKED_AT};
-use super::super::single_track::{BATCH, Outcome, Track, place_of};
+use super::super::single_track::{BATCH, Outcome, Track, motion_of, place_of};
 use super::context::Context;
 use super::gate::normalised_square;
 use super::report::report;
@@ -102,7 +102,7 @@ pub(in crate::track) fn from_initial_tracks(
         filter.predict(initial.age_s)?;
         let k = filter.kinematics();
         let mut history = config.confirmation.begin(2, now.ns, config.clutter_density_per_px2, 1.0);
-        history.accepted = true;
+        history.accept();
         // Reach of the first gate: where it can be, and where its detection can then lie.
         let spread = k.cov[(0, 0)].max(k.cov[(2, 2)]).sqrt() + config.extra_noise_px;
         tracks.push(Track {
@@ -113,7 +113,7 @@ pub(in crate::track) fn from_initial_tracks(
             duplicate_since_ns: None,
             last_place: [k.mean[0], k.mean[2], spread],
             reported: true,
-            gate_progress: GateProgress::passed(),
+            motion: MotionProgress::passed(),
         });
         *next_id += 1;
     }
@@ -144,7 +144,7 @@ fn begin(
         duplicate_since_ns: None,
         last_place: place_of(d, &noise),
         reported: false,
-        gate_progress: GateProgress::begin([d.position.x, d.position.y], table.camera, d.score),
+        motion: motion_of(d, &noise, table.camera, config.report),
     };
     let outcome = Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() };
     out.states.push(report(&mut track, &outcome, config, table.camera));

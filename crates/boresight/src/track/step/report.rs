@@ -9,7 +9,7 @@ use crate::camera::CameraPath;
 use crate::{Extent, TrackId, TrackState};
 use boresight_filters::{Filter, Gaussian};
 
-/// Takes the scan's estimate through the confirmation gate and returns the track's record.
+/// Takes the scan's estimate through the motion test and returns the track's record.
 #[inline]
 pub(in crate::track) fn report(
     track: &mut Track,
@@ -19,25 +19,26 @@ pub(in crate::track) fn report(
 ) -> TrackState {
     let kinematics = track.filter.kinematics();
     let at = [kinematics.mean[0], kinematics.mean[2]];
-    let passed = track.gate_progress.passes(&config.confirmation_gate, at, track.appearance.size, camera, outcome.hit);
+    let variance = [kinematics.cov[(0, 0)], kinematics.cov[(2, 2)]];
+    let passed = track.motion.passes(&config.motion_test, at, variance, camera, outcome.hit);
     state_of(track.id, kinematics, &track.appearance, &track.history, passed, outcome, config)
 }
 
-/// The record of a track after a scan; `passed_gate` says whether it has passed the confirmation gate.
+/// The record of a track after a scan; `may_report` says whether it moves, where only that is reported.
 #[inline]
 pub(in crate::track) fn state_of(
     id: u64,
     kinematics: Gaussian<4>,
     appearance: &Appearance,
     history: &History,
-    passed_gate: bool,
+    may_report: bool,
     outcome: &Outcome,
     config: &TrackerConfig,
 ) -> TrackState {
     let [width_px, height_px] = appearance.size;
     TrackState {
         id: TrackId(id),
-        status: status(history, passed_gate, outcome.hit),
+        status: status(history, may_report, outcome.hit),
         extent: Extent {
             left_px: kinematics.mean[0] - 0.5 * width_px,
             top_px: kinematics.mean[2] - 0.5 * height_px,

@@ -74,6 +74,7 @@ impl Stage {
         i: usize,
         track: &Predicted,
         existence: f64,
+        p_detection: f64,
         context: &Context<'_>,
         free: impl Fn(u32) -> bool,
         extra_cost: impl Fn(u32) -> f64,
@@ -83,7 +84,7 @@ impl Stage {
         let max_gated = config.max_gated as usize;
         gate_row(context.table, track, gate, max_gated, self.likelihood, free, extra_cost, &mut self.gates);
         self.gates.end_row(Prior {
-            p_detection: config.detection_probability,
+            p_detection,
             p_gate: config.gate_probability,
             existence,
             miss_cost: gate + self.cost_budget,
