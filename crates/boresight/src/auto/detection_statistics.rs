@@ -37,6 +37,15 @@ const MOST_FALSE_MOTION: f64 = 0.01;
 /// Fewer scans than this tell nothing.
 const LEAST_SCANS: usize = 8;
 
+/// What was found, in the last of the passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Tracks that were reported.
+    pub n_targets: usize,
+    /// Their detections a scan.
+    pub per_scan: f64,
+}
+
 /// What is known of one track.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
@@ -64,12 +73,13 @@ pub fn learn(
     false_per_hour: Option<f64>,
     config: &mut Config,
     reasons: &mut Vec<String>,
-) -> Result<()> {
+) -> Result<Found> {
+    let mut found = Found::default();
     let n_scans = scans.len();
-    let (Some(first), Some(last)) = (scans.first(), scans.last()) else { return Ok(()) };
+    let (Some(first), Some(last)) = (scans.first(), scans.last()) else { return Ok(found) };
     let over_s = last.time.seconds_since(first.time);
     if n_scans < LEAST_SCANS || over_s <= 0.0 || area_px2 <= 0.0 {
-        return Ok(());
+        return Ok(found);
     }
     let interval_s = over_s / (n_scans - 1) as f64;
     for _ in 0..PASSES {
@@ -87,6 +97,7 @@ pub fn learn(
             begun += usize::from(t.first > coast);
             own += t.own;
         }
+        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64 };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;
@@ -116,7 +127,7 @@ pub fn learn(
         });
     }
     let t = &config.tracker;
-    let ConfirmationConfig::Existence(e) = &t.confirmation else { return Ok(()) };
+    let ConfirmationConfig::Existence(e) = &t.confirmation else { return Ok(found) };
     let new_per_hour = e.new_target_density_per_px2 * area_px2 * 3600.0 / interval_s;
     reasons.push(format!(
         "In {n_scans} scans a target is detected with {:.0} %, after a miss with {:.0} %; {:.2} detections a scan are false, {:.1} targets a minute are new and stay {:.1} s: a track is reported from a \
@@ -129,7 +140,7 @@ pub fn learn(
         e.confirm_probability,
         new_per_hour * (1.0 - e.confirm_probability) / e.confirm_probability,
     ));
-    Ok(())
+    Ok(found)
 }
 
 /// Share of `yes` with the counts of a prior.

@@ -7,21 +7,25 @@
 //! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
 use super::choose::{Choice, choose_seen};
+use super::detection_statistics::Found;
 use super::first_pass::{FirstPass, frames_ahead};
 use super::replay::Replay;
 use super::scene::{self, Camera};
 use super::second_look;
 use super::{detection_statistics, noise};
-use crate::track::Tracking;
+use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, Frame, FrameSource, Result};
+use crate::{Config, Frame, FrameSource, Result, Scan};
 
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
 
 /// Most memory that the frames of the first pass take, bytes.
 const LEARN_BYTES: usize = 256 << 20;
+
+/// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
+const FEW_STILL: f64 = 3.0;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
@@ -80,17 +84,33 @@ pub fn learn(
     let detector = crate::vision::build(&choice.config.detector, &info)?;
     let mut pass = FirstPass::over(frames.ahead(), detector);
     let area_px2 = (info.width * info.height).max(1) as f64;
-    noise::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons)?;
-    if is_of_points(&choice.config.detector.threshold) {
-        detection_statistics::learn(
-            pass.scans(),
-            area_px2,
-            false_tracks_per_hour,
-            &mut choice.config,
-            &mut choice.reasons,
-        )?;
+    let assumed = choice.clone();
+    let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
+    if choice.config.tracker.report == Report::Moving && found.n_targets == 0 {
+        // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them.
+        let mut still = assumed;
+        still.config.tracker.report = Report::All;
+        let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut still)?;
+        if things.n_targets > 0 && things.per_scan <= FEW_STILL {
+            still.reasons.push(format!(
+                "Nothing moves by itself, but {:.1} things a frame stand there: they are reported.",
+                things.per_scan
+            ));
+            *choice = still;
+        }
     }
     Ok(Box::new(pass))
+}
+
+/// Learns noise and motion, and of points what the detections are made of.
+fn statistics(scans: &[Scan], area_px2: f64, false_tracks_per_hour: Option<f64>, choice: &mut Choice) -> Result<Found> {
+    noise::learn(scans, area_px2, &mut choice.config, &mut choice.reasons)?;
+    if !is_of_points(&choice.config.detector.threshold) {
+        // Their rule stays, and nobody asks what it found.
+        return Ok(Found { n_targets: 1, per_scan: 0.0 });
+    }
+    let Choice { config, reasons } = choice;
+    detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons)
 }
 
 /// Whether what is detected is a point or a blob that stands alone: one detection a target, false ones anywhere. Regions come in pieces, which lie where

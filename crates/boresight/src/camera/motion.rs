@@ -2,21 +2,30 @@
 //!
 //! Limits: a scan whose shift is unknown adds nothing to the length of the path; if the background was followed before, it counts as a cut.
 
-use crate::CameraMotion;
+use crate::{CameraMotion, MotionBasis};
 
 /// What the camera did so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraPath {
     /// Length of the background's path in the image, px.
     pub length_px: f64,
-    /// How well the way of the background is known: the sum of the variances of its steps, px² per axis, mean over the image.
-    pub variance_px2: f64,
+    /// Variance of the newest step, px² per axis, mean over the image.
+    pub step_variance_px2: f64,
+    /// Sum of the variances of the steps that were not measured but held, px².
+    pub held_variance_px2: f64,
     /// Times that a background which was followed for some scans was lost: another view, or a jerk.
     pub cuts: u32,
     followed: u32,
 }
 
 impl CameraPath {
+    /// Variance of where the background lies now against where it lay at `start`, px² per axis, mean over the image.
+    ///
+    /// Measured steps are known against a key frame, so that only the errors of both ends count; those of held ones add up.
+    pub fn variance_since(&self, start: &Self) -> f64 {
+        start.step_variance_px2 + self.step_variance_px2 + self.held_variance_px2 - start.held_variance_px2
+    }
+
     /// Scans that a background must have been followed before its loss is a cut.
     const FOLLOWED: u32 = 10;
 
@@ -25,7 +34,10 @@ impl CameraPath {
         if let Some(m) = motion.filter(|m| m.is_finite()) {
             // Mean of |p - centre|² over the image, whose half sides are the centre's coordinates, for one axis.
             let spread = m.centre_px.norm_squared() / 6.0;
-            self.variance_px2 += 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
+            self.step_variance_px2 = 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
+            if m.basis == MotionBasis::Held {
+                self.held_variance_px2 += self.step_variance_px2;
+            }
         }
         match motion.and_then(CameraMotion::measured_shift_px).map(|s| s.norm()) {
             Some(length) => {

@@ -136,7 +136,7 @@ impl MotionProgress {
         }
         self.n_tests = self.n_tests.saturating_add(1);
         let parallax = config.parallax_share * (camera.length_px - self.camera.length_px);
-        let of_camera = camera.variance_px2 - self.camera.variance_px2 + parallax * parallax;
+        let of_camera = camera.variance_since(&self.camera) + parallax * parallax;
         let statistic: f64 = (0..2)
             .map(|axis| {
                 let of_all = self.start_var[axis] + variance[axis] + of_camera + 0.5 * self.size_variance(axis);
@@ -165,7 +165,7 @@ mod tests {
 
     fn path(length_px: f64, variance_px2: f64) -> CameraPath {
         let mut path = CameraPath::default();
-        (path.length_px, path.variance_px2) = (length_px, variance_px2);
+        (path.length_px, path.held_variance_px2) = (length_px, variance_px2);
         path
     }
 

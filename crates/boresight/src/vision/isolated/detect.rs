@@ -16,7 +16,9 @@
 
 use super::config::IsolatedConfig;
 use super::levels;
+use super::near::Near;
 use super::ring::{Candidate, Ring};
+use super::sums::Sums;
 use super::sweep::{self, Sweep};
 use crate::vision::centroid::{Surroundings, centroid};
 use crate::vision::config::{DetectorConfig, NoiseConfig};
@@ -35,6 +37,8 @@ pub struct IsolatedDetector {
     isolated: IsolatedConfig,
     sweep: Sweep,
     ring: Ring,
+    sums: Sums,
+    near: Near,
     levels: Vec<f64>,
     samples: Vec<f32>,
     bits: Vec<u64>,
@@ -50,6 +54,8 @@ impl IsolatedDetector {
             isolated: config.clone(),
             sweep: Sweep::default(),
             ring: Ring::default(),
+            sums: Sums::default(),
+            near: Near::default(),
             levels: Vec::new(),
             samples: Vec::new(),
             bits: Vec::new(),
@@ -67,6 +73,7 @@ impl IsolatedDetector {
             NoiseConfig::Estimated => estimated,
         };
         self.bits.resize(words(image.width()), 0);
+        self.sums.read(image);
         for side in [Side::Bright, Side::Dark] {
             if self.isolated.polarity.has(side) {
                 self.side(image, config, side, noise, out);
@@ -108,7 +115,7 @@ impl IsolatedDetector {
                 {
                     continue;
                 }
-                if let Some(c) = self.ring.judge(image, side, level, &blob, noise)
+                if let Some(c) = self.ring.judge(image, &self.sums, side, level, &blob, noise, isolated.min_score)
                     && c.score >= isolated.min_score
                 {
                     self.candidates.push(Candidate { number: self.candidates.len(), ..c });
@@ -124,6 +131,7 @@ impl IsolatedDetector {
         let mut taken = std::mem::take(&mut self.taken);
         taken.clear();
         taken.resize(candidates.len(), false);
+        self.near.fill(image.width(), image.height(), candidates.iter().map(|c| &c.blob));
         for i in 0..candidates.len() {
             if taken[i] {
                 continue;
@@ -131,7 +139,9 @@ impl IsolatedDetector {
             let best = &candidates[i];
             let half = best.background + 0.5 * (best.peak - best.background);
             let mut shape = best;
-            for (j, other) in candidates.iter().enumerate().skip(i) {
+            // Those before it were better, and did not take it.
+            for j in self.near.of(&best.blob).iter().map(|&j| j as usize).filter(|&j| j >= i) {
+                let other = &candidates[j];
                 if !taken[j] && best.blob.overlaps(&other.blob) {
                     taken[j] = true;
                     if (other.level - half).abs() < (shape.level - half).abs() && other.blob.holds(&best.blob) {

@@ -3,7 +3,9 @@
 mod config;
 mod detect;
 mod levels;
+mod near;
 mod ring;
+mod sums;
 mod sweep;
 
 pub use config::IsolatedConfig;

@@ -3,6 +3,7 @@
 //! The ring begins one pixel outside the box (blurred edges) and is as wide as half the blob, at least 3 px. Large rings are
 //! sampled evenly with at most about 600 pixels. The plane takes a gradient of the sky or of the optics out.
 
+use super::sums::Sums;
 use super::sweep::{Blob, band};
 use crate::Image;
 use crate::vision::pixel::Pixel;
@@ -34,14 +35,16 @@ pub struct Ring {
 }
 
 impl Ring {
-    /// Compares a blob with its surroundings; `None` if there are too few of them or the blob does not stand clear.
+    /// Compares a blob with its surroundings; `None` if there are too few of them, or the blob does not stand clear or cannot reach `min_score`.
     pub fn judge<T: Pixel>(
         &mut self,
         image: &Image<T>,
+        sums: &Sums,
         side: Side,
         level: f64,
         blob: &Blob,
         noise: f64,
+        min_score: f64,
     ) -> Option<Candidate> {
         let sign = if side == Side::Bright { 1.0 } else { -1.0 };
         let (w, h) = (blob.right - blob.left + 1, blob.bottom - blob.top + 1);
@@ -55,7 +58,22 @@ impl Ring {
         if !self.closed(image, side, level, [x0, y0, x1, y1]) {
             return None;
         }
+        let (mean, peak) = inside(image, side, level, blob)?;
+        let least_unit = noise + f64::from(T::STEP);
         let stride = ((((x1 - x0 + 1) * (y1 - y0 + 1)) as f64 / MAX_SAMPLES).sqrt() as usize).max(1);
+        let whole = inner.0 >= margin && inner.1 >= margin && inner.2 + margin == x1 && inner.3 + margin == y1;
+        if stride == 1
+            && whole
+            && let (Some(all), Some(middle)) =
+                (sums.of([x0, y0, x1, y1]), sums.of([inner.0, inner.1, inner.2, inner.3]))
+        {
+            // Of a whole ring the plane's height in the middle is the mean. The rest of the judgement only lowers the score.
+            let n = (x1 - x0 + 1) * (y1 - y0 + 1) - (inner.2 - inner.0 + 1) * (inner.3 - inner.1 + 1);
+            let most = sign * (mean - (all - middle) / n as f64);
+            if most < min_score * least_unit * (1.0 - 1e-9) {
+                return None;
+            }
+        }
         self.samples.clear();
         for y in (y0..=y1).step_by(stride) {
             let row = image.row(y);
@@ -73,7 +91,6 @@ impl Ring {
         if self.samples.len() < MIN_SAMPLES {
             return None;
         }
-        let (mean, peak) = inside(image, side, level, blob)?;
         let plane = fit(&self.samples)?;
         self.residuals.clear();
         self.residuals.extend(self.samples.iter().map(|&(x, y, v)| v - plane[0] - plane[1] * x - plane[2] * y));
@@ -85,7 +102,7 @@ impl Ring {
         if height <= 0.0 {
             return None;
         }
-        let unit = noise + f64::from(T::STEP) + spread;
+        let unit = least_unit + spread;
         let score = if unit > 0.0 { height / unit } else { f64::from(f32::MAX) };
         Some(Candidate { blob: *blob, level, background: sign * plane[0], peak, score, number: 0 })
     }
