@@ -14,6 +14,7 @@ mod filter_table;
 mod link_table;
 mod mot;
 mod mot_table;
+mod operating_curves;
 mod video_check;
 
 use clap::{Parser, Subcommand};
@@ -49,6 +50,8 @@ enum Chore {
     LinkTable(link_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
     MotTable(mot_table::Args),
+    /// Delay and share held against the false tracks that are allowed, written to docs/operating-curves.md.
+    OperatingCurves(operating_curves::Args),
     /// Compare decoded video with ffmpeg's frames, live.
     VideoCheck(video_check::Args),
 }
@@ -66,6 +69,7 @@ fn main() -> anyhow::Result<()> {
         Chore::FilterTable(args) => filter_table::table(&args),
         Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
+        Chore::OperatingCurves(args) => operating_curves::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }
 }

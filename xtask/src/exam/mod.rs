@@ -29,6 +29,9 @@ pub struct Args {
     /// Changes of the configuration chosen, as with `boresight track --set`; nothing is written then.
     #[arg(long = "set")]
     sets: Vec<String>,
+    /// False tracks an hour that are allowed, as with `boresight track`; nothing is written then.
+    #[arg(long)]
+    false_tracks_per_hour: Option<f64>,
     /// Folder with SORT's tracks (`MOT17-02.txt` ...), made by `scripts/sort_peer.py`.
     #[arg(long)]
     sort: Option<PathBuf>,
@@ -107,7 +110,7 @@ pub fn run(args: &Args) -> Result<()> {
         if !(clip.name.contains(&args.only) || clip.kind.contains(&args.only)) {
             continue;
         }
-        let s = score(&clip, &args.sets)?;
+        let s = score(&clip, &args.sets, args.false_tracks_per_hour)?;
         let row = row(&clip, half, &s);
         print!("{row}");
         if !args.only.is_empty() {
@@ -140,7 +143,7 @@ pub fn run(args: &Args) -> Result<()> {
     print!("\n{head}{closing}");
     let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
     print!("\n{tables}");
-    if args.only.is_empty() && args.sets.is_empty() {
+    if args.only.is_empty() && args.sets.is_empty() && args.false_tracks_per_hour.is_none() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
         std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}"))?;
     }
