@@ -12,6 +12,7 @@ use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, Scan, SourceInfo};
+use statrs::distribution::{ContinuousCDF as _, Normal};
 
 /// Least blobs a frame.
 const LEAST: f64 = 60.0;
@@ -27,6 +28,11 @@ const SCORE: f64 = 3.0;
 const WIDEST_PX: u32 = 40;
 /// A soft-edged spot's diameter in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
 const DIAMETER_PER_WIDTH: f64 = 2.45;
+
+/// Expected false detections for each blob seen: the tracks' existence weighs them, and a dim particle is worth ten.
+const FALSE_SHARE: f64 = 0.1;
+/// Least and largest threshold, standard deviations.
+const THRESHOLDS: [f64; 2] = [2.0, 5.0];
 
 /// What was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +89,14 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option
     Ok(best.filter(|b| b.per_frame >= MOST_SIDED * other))
 }
 
+/// Threshold in standard deviations of the smoothed noise at which [`FALSE_SHARE`] of a frame's detections is expected to be noise: one independent look for
+/// each disc of the spot's size.
+fn threshold(particles: &Particles, size_px: f64, info: &SourceInfo) -> f64 {
+    let looks = (info.width * info.height) as f64 / (0.25 * std::f64::consts::PI * size_px * size_px);
+    let tail = (FALSE_SHARE * particles.per_frame / looks).clamp(1e-12, 0.5);
+    Normal::standard().inverse_cdf(1.0 - tail).clamp(THRESHOLDS[0], THRESHOLDS[1])
+}
+
 /// Writes detector and tracker.
 pub fn configure(
     particles: &Particles,
@@ -102,7 +116,7 @@ pub fn configure(
     ));
     let spot = SpotConfig {
         size_px,
-        k: 4.5,
+        k: round(threshold(particles, size_px, info)),
         polarity: particles.polarity,
         min_contrast: 1.0,
         surround: 1.0,
