@@ -238,7 +238,10 @@ mod tests {
         let e = evaluate(&t, &r, &o).unwrap();
         assert!(e.optional.is_none() && e.optional_values().is_empty() && e.scores.clear.tp == 2);
         let json = serde_json::to_value(&e).unwrap();
-        assert!(json.get("ospa2").is_none() && json.get("particle").is_none() && json.get("scores").is_some(), "{json}");
+        assert!(
+            json.get("ospa2").is_none() && json.get("particle").is_none() && json.get("scores").is_some(),
+            "{json}"
+        );
         assert_eq!(evaluate(&t, &r, &EvaluateOptions::default()).unwrap().scores.clear.tp, 0);
     }
 
