@@ -135,7 +135,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     }
     options.rate_hz = args.rate_hz.or(options.rate_hz);
     options.skip_bad_rows |= args.skip_bad_rows;
-    let table = boresight::io::read_detections(&args.input, options)?;
+    let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
     let mut reasons = vec![format!(
         "{} detections in {} frames at {} frames/s, read as {}.",
         table.n_rows - table.n_skipped,

@@ -5,10 +5,10 @@
 
 use super::schema_tree::{children, is_choice};
 use super::{renamed, typo};
-use crate::io::{Colour, OpenOptions, RawFormat};
+use crate::io::{Colour, OpenOptions, RawFormat, TableOptions};
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
-use crate::{Error, ErrorKind, Result};
+use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -45,7 +45,7 @@ pub struct InputConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawFormat>,
     /// How a table of detections is read; of no effect on frames.
-    pub table: crate::io::TableOptions,
+    pub table: TableOptions,
 }
 
 impl Default for InputConfig {
@@ -76,12 +76,17 @@ impl InputConfig {
         }
     }
 
+    /// What [`crate::io::read_detections`] takes.
+    pub fn table_options(&self) -> TableOptions {
+        TableOptions { assumed_rate_hz: self.rate_hz, ..self.table.clone() }
+    }
+
     fn validate(&self, at: &str) -> Result<()> {
         self.table.validate(&format!("{at}.table"))?;
         if !(self.rate_hz > 0.0 && self.rate_hz.is_finite()) {
             return Err(Error::new(ErrorKind::Config, "expected a rate above 0 frames/s")
                 .at(format!("{at}.rate-hz = {}", self.rate_hz))
-                .hint("25 is the rate of sequences without times"));
+                .hint(format!("leave it out for {ASSUMED_RATE_HZ} frames/s")));
         }
         if self.max_pixels == 0 {
             return Err(Error::new(ErrorKind::Config, "expected a number of pixels above 0")
