@@ -2,7 +2,7 @@
 //!
 //! Time is CPU time of the process, so that other work on the machine does not count; memory is the growth of the
 //! resident memory over the tracker's lifetime, scans not included.
-//! Scene: that of W4 of the peers' bench (its own random numbers): speeds N(0, 1.5²) px/scan per axis, acceleration 0.1, a
+//! Scene: that of the comparison with peers, tracking from detections (its own random numbers): speeds N(0, 1.5²) px/scan per axis, acceleration 0.1, a
 //! fifth born and a fifth ended on the way, P_D 0.9, noise 1 px, clutter of 10 % or 100 % of N, 100 scans, side 60 √N px.
 
 use anyhow::Result;
@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// How good the tracks are.
 struct Quality {
-    /// GOSPA per root target (c 10, p 2, as W4 samples it: ten scans from the fifth).
+    /// GOSPA per root target (c 10, p 2, as that comparison samples it: ten scans from the fifth).
     gospa: f64,
     /// Identity F1 of points within 5 px.
     idf1: Option<f64>,

@@ -2,7 +2,7 @@
 //!
 //! Files are named `frame_000000.png` by the frame's number; 16-bit frames keep their values (PGM: big end first, as the format asks).
 
-use boresight::{Error, ErrorKind, Frame, Pixels, SourceInfo};
+use boresight::{ASSUMED_RATE_HZ, Error, ErrorKind, Frame, Pixels, SourceInfo};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -78,7 +78,7 @@ impl FrameWriter {
                 .hint("take --format png"));
         }
         // Rates are written as a fraction of thousandths.
-        let rate = (info.rate_hz.unwrap_or(25.0) * 1000.0).round().max(1.0) as u64;
+        let rate = (info.rate_hz.unwrap_or(ASSUMED_RATE_HZ) * 1000.0).round().max(1.0) as u64;
         let header = format!("YUV4MPEG2 W{} H{} F{rate}:1000 Ip A1:1 Cmono\n", info.width, info.height);
         out.write_all(header.as_bytes()).map_err(|e| output_error(Path::new("frames.y4m"), e))?;
         Ok(Self::Stream(out))

@@ -90,6 +90,24 @@ fn an_unmet_demand_gives_exit_code_one_and_an_unknown_one_names_the_known() {
 }
 
 #[test]
+fn a_measure_that_is_best_in_between_is_held_to_a_range() {
+    let dir = tempfile::tempdir().unwrap();
+    let truth = put(dir.path(), "gt.txt", &tracks(2, 1, 0.0, true));
+    let result = put(dir.path(), "result.txt", &tracks(2, 1, 1.0, false));
+    let require = |demand: &str| {
+        let out = boresight(&["evaluate", &truth, &result, "--require", demand]);
+        (out.status.code(), text(&out.stderr))
+    };
+    // One pixel to the right.
+    assert_eq!(require("bias_x=0.5..1.5").0, Some(0));
+    assert_eq!(require("MOTA=0.9..1").0, Some(0));
+    let (code, said) = require("bias_x=-0.5..0.5");
+    assert!(code == Some(1) && said.contains("not met: bias_x = 1.000000, demanded -0.5 to 0.5"), "{said}");
+    let (code, said) = require("bias_x=0.5");
+    assert!(code == Some(2) && said.contains("expected a range") && said.contains("bias_x=0..1"), "{said}");
+}
+
+#[test]
 fn tables_that_do_not_belong_together_are_told_with_the_cause() {
     let dir = tempfile::tempdir().unwrap();
     let truth = put(dir.path(), "gt.txt", &tracks(3, 1, 0.0, true));

@@ -108,7 +108,10 @@ fn the_commands_of_the_chapter_reproduce_work() {
 fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     let dir = tempfile::tempdir().unwrap();
     for (name, seed) in [("a", 4), ("b", 4), ("c", 5)] {
-        run(dir.path(), &format!("boresight simulate d1-fusion-loss --frames 40 --format y4m --seed {seed} -o {name}"));
+        run(
+            dir.path(),
+            &format!("boresight simulate imager-radar-loss --frames 40 --format y4m --seed {seed} -o {name}"),
+        );
     }
     let read = |p: &str| std::fs::read(dir.path().join(p)).unwrap();
     for file in ["frames.y4m", "truth.csv", "gt.txt", "radar.csv", "radar-plots.csv"] {

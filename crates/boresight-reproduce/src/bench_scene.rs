@@ -1,4 +1,4 @@
-//! The Monte Carlo scene of the peers' bench (W5b): generate, mean-filter, segment, follow; one run at a time.
+//! The Monte Carlo scene of the comparison with peers: generate, mean-filter, segment, follow; one run at a time.
 //!
 //! Source: the bench's own definition: 64 x 64, 50 frames, background N(50, 50²), a 9 x 9 target 150 counts above it, start in
 //! 15..30 px, 0.2..0.5 px/frame, acceleration noise 0.02; mean 3 x 3, band 115..=255, 8 neighbours, at least 9 px, grey

@@ -1,6 +1,6 @@
 //! Segmentation of a 1920x1080 frame, from pixels to weighted centroids, beside a plain read of the same bytes.
 //!
-//! Run: `cargo bench -p boresight --bench segment`. Fixed seeds; one thread. The scenes have the numbers of the peers' workload W1:
+//! Run: `cargo bench -p boresight --bench segment`. Fixed seeds; one thread. The scenes have the numbers of those that peers are compared on:
 //! `sparse` 50 targets of 9x9, `particles` 5 000 spots of sigma 3, `noisy` N(50, 50²) with every tenth pixel set.
 
 use boresight::vision::Clusterer;

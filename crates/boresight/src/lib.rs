@@ -101,7 +101,7 @@ pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use similarity::Similarity;
-pub use time::{FrameIndex, Timestamp};
+pub use time::{ASSUMED_RATE_HZ, FrameIndex, Timestamp};
 pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Rate that is assumed where nothing says how fast frames follow each other, frames/s: that of European video.
+pub const ASSUMED_RATE_HZ: f64 = 25.0;
+
 /// A frame's number in its sequence, from 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct FrameIndex(pub u64);

@@ -33,8 +33,9 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let text = if let Some(path) = &args.check {
-        Config::from_file(path)?;
-        format!("{}: a sound configuration\n", path.display())
+        let config = Config::from_file(path)?;
+        let unused = super::run_options::unused(&config).map_or(String::new(), |keys| format!("{keys}\n"));
+        format!("{}: a sound configuration\n{unused}", path.display())
     } else if let Some(key) = &args.explain {
         explain(key)?
     } else if let Some(what) = &args.list {

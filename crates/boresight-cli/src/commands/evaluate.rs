@@ -57,7 +57,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     text.push_str(&table::comparison(&results, &comparison));
     super::print(text.as_bytes())?;
     write_files(&args, &results, &comparison)?;
-    met(&args, &results[0].evaluation.values())
+    met(&args.require, &results[0].evaluation.values())
 }
 
 /// The notes of all sequences, with the sequence's name where there are several.

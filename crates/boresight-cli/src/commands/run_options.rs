@@ -98,7 +98,8 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         let config = changed(base, args, tracker)?;
         let info = source.info().clone();
         let detector = vision::build(&config.detector, &info)?;
-        let reasons = vec!["Configuration as given.".to_string()];
+        let mut reasons = vec!["Configuration as given.".to_string()];
+        reasons.extend(unused(&config));
         return Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None });
     }
     let (mut source, mut choice) = auto::open_and_choose(&args.input, &base)?;
@@ -108,7 +109,14 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     let detector = auto::learn(&mut source, &mut choice, tracker.false_tracks_per_hour)?;
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
-    Ok(Plan { input, config, reasons: choice.reasons, info: Some(info), n_scans: None })
+    let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
+    Ok(Plan { input, config, reasons, info: Some(info), n_scans: None })
+}
+
+/// A sentence that names the detector's keys that are set in vain.
+pub fn unused(config: &Config) -> Option<String> {
+    let keys = config.detector.unused_keys();
+    (!keys.is_empty()).then(|| format!("Without effect beside this detector.threshold: {}.", keys.join(", ")))
 }
 
 /// The configuration with what the command line changes.
@@ -142,7 +150,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     }
     options.rate_hz = args.rate_hz.or(options.rate_hz);
     options.skip_bad_rows |= args.skip_bad_rows;
-    let table = boresight::io::read_detections(&args.input, options)?;
+    let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
     let mut reasons = vec![format!(
         "{} detections in {} frames at {} frames/s, read as {}.",
         table.n_rows - table.n_skipped,

@@ -19,10 +19,10 @@ use std::process::ExitCode;
   boresight simulate ds2 --seed 1 -o sim           data set II of the thesis: sim/frames/*.png, sim/truth.csv, sim/gt.txt
   boresight track sim/frames --config sim/track.toml -o out && boresight evaluate sim/truth.csv out/tracks.csv
   boresight simulate scene.toml -o sim             a scene of your own (`--print` shows one to start from)
-  boresight simulate d1-fusion -o sim              an imager and a radar: sim/frames, sim/radar.csv
+  boresight simulate imager-radar -o sim              an imager and a radar: sim/frames, sim/radar.csv
   boresight simulate tracks.csv --radars radars.toml -o sim   radars that look at trajectories of your own
   boresight simulate ds2 -o - | boresight track - --config sim/track.toml -o out   straight into the tracker
-Scenes by name: ds1, ds2, ds3, d3-s1, d3-s2, d1-fusion, d1-fusion-loss, lms-sines, lms-singer, montecarlo.")]
+Scenes by name: ds1, ds2, ds3, imager-1, imager-2, imager-radar, imager-radar-loss, lms-sines, lms-singer, montecarlo.")]
 pub struct Args {
     /// Name of a scene, a TOML file, or (with --radars) a table of tracks that radars look at.
     scene: String,

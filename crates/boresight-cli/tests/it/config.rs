@@ -16,12 +16,22 @@ fn what_it_prints_it_accepts() {
 }
 
 #[test]
+fn keys_that_the_detector_does_not_look_at_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("my.toml");
+    std::fs::write(&file, "[detector]\nthreshold.spot = {}\ncluster.distance-px = 4.0\n").unwrap();
+    let said = stdout(&run_ok(["config", "--check", file.to_str().unwrap()]));
+    assert!(said.contains("Without effect beside this detector.threshold: detector.cluster.distance-px."), "{said}");
+}
+
+#[test]
 fn every_ready_configuration_is_sound_and_says_how_to_use_it() {
     let mut n = 0;
     for entry in std::fs::read_dir(root().join("configs")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
-            run_ok(["config", "--check", path.to_str().unwrap()]);
+            let out = run_ok(["config", "--check", path.to_str().unwrap()]);
+            assert!(!stdout(&out).contains("Without effect"), "{}", stdout(&out));
             let text = std::fs::read_to_string(&path).unwrap();
             let name = path.file_name().unwrap().to_str().unwrap();
             assert!(text.starts_with("# ") && text.contains(&format!("--config configs/{name}")), "{name}");

@@ -1,6 +1,6 @@
 //! The usual time between frames.
 
-use crate::{Frame, SourceInfo};
+use crate::{ASSUMED_RATE_HZ, Frame, SourceInfo};
 
 /// Usual time between frames, s; from the nominal rate if there are too few frames.
 ///
@@ -16,7 +16,7 @@ pub fn interval_s(frames: &[Frame], info: &SourceInfo) -> f64 {
         .then(|| gaps.iter().sum::<f64>() / gaps.len() as f64)
         .or_else(|| info.rate_hz.map(|r| 1.0 / r))
         .filter(|g| g.is_finite() && *g > 0.0)
-        .unwrap_or(0.04)
+        .unwrap_or(1.0 / ASSUMED_RATE_HZ)
 }
 
 #[cfg(test)]

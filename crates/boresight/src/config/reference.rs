@@ -115,6 +115,18 @@ mod tests {
     }
 
     #[test]
+    fn defaults_have_the_digits_that_stand_in_the_code() {
+        let text = reference();
+        assert!(text.contains("| `low-score` | `0.1` |"), "{text}");
+        let digits = |cell: &str| cell.chars().filter(char::is_ascii_digit).count();
+        // Lists are of thirds, in double precision.
+        let defaults =
+            text.lines().filter_map(|l| l.split(" | ").nth(1)).filter(|c| c.contains('.') && !c.contains('['));
+        let long: Vec<&str> = defaults.clone().filter(|c| digits(c) > 12).collect();
+        assert!(defaults.count() > 50 && long.is_empty(), "{long:?}");
+    }
+
+    #[test]
     fn keys_stand_with_default_and_meaning() {
         let text = reference();
         let row = text.lines().find(|l| l.starts_with("| `gate-probability`")).expect("a row");

@@ -5,10 +5,10 @@
 
 use super::schema_tree::{children, is_choice};
 use super::{renamed, typo};
-use crate::io::{Colour, OpenOptions, RawFormat};
+use crate::io::{Colour, OpenOptions, RawFormat, TableOptions};
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
-use crate::{Error, ErrorKind, Result};
+use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -31,7 +31,7 @@ pub struct Config {
 pub struct InputConfig {
     /// Which pixels are wanted: `native` (grey of video, colour of stills), `gray` or `rgb`.
     pub colour: Colour,
-    /// Rate of sequences that carry no times, frames/s, above 0.
+    /// Rate of sequences and tables that carry no times, frames/s, above 0.
     pub rate_hz: f64,
     /// Largest accepted frame, pixels, above 0; what claims more is refused before memory is taken.
     pub max_pixels: u64,
@@ -45,7 +45,7 @@ pub struct InputConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawFormat>,
     /// How a table of detections is read; of no effect on frames.
-    pub table: crate::io::TableOptions,
+    pub table: TableOptions,
 }
 
 impl Default for InputConfig {
@@ -76,12 +76,17 @@ impl InputConfig {
         }
     }
 
+    /// What [`crate::io::read_detections`] takes.
+    pub fn table_options(&self) -> TableOptions {
+        TableOptions { assumed_rate_hz: self.rate_hz, ..self.table.clone() }
+    }
+
     fn validate(&self, at: &str) -> Result<()> {
         self.table.validate(&format!("{at}.table"))?;
         if !(self.rate_hz > 0.0 && self.rate_hz.is_finite()) {
             return Err(Error::new(ErrorKind::Config, "expected a rate above 0 frames/s")
                 .at(format!("{at}.rate-hz = {}", self.rate_hz))
-                .hint("25 is the rate of sequences without times"));
+                .hint(format!("leave it out for {ASSUMED_RATE_HZ} frames/s")));
         }
         if self.max_pixels == 0 {
             return Err(Error::new(ErrorKind::Config, "expected a number of pixels above 0")
@@ -101,7 +106,27 @@ impl InputConfig {
 
 /// The JSON schema of the configuration, with every key's meaning.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(Config).to_value()
+    let mut schema = schemars::schema_for!(Config).to_value();
+    shorten(&mut schema);
+    schema
+}
+
+/// Writes single-precision defaults as they stand in the code: 0.1, not the 0.10000000149011612 of its neighbour in `f64`.
+fn shorten(at: &mut serde_json::Value) {
+    match at {
+        serde_json::Value::Number(n) => {
+            let single = n.as_f64().filter(|_| n.is_f64()).map(|v| (v, v as f32)).filter(|(v, s)| f64::from(*s) == *v);
+            // A double with a single's 24 bits passes too: 0.5, 1e9, not 0.1; of defaults its shortest decimal is the same.
+            if let Some(short) =
+                single.and_then(|(_, s)| s.to_string().parse().ok()).and_then(serde_json::Number::from_f64)
+            {
+                *n = short;
+            }
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(shorten),
+        serde_json::Value::Object(entries) => entries.iter_mut().for_each(|(_, v)| shorten(v)),
+        _ => {}
+    }
 }
 
 impl Config {

@@ -1,6 +1,6 @@
 //! How a source of frames is opened: wanted pixels, layout of raw frames, rate, limits.
 
-use crate::{Error, ErrorKind, Result};
+use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +64,14 @@ pub struct OpenOptions {
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { colour: Colour::Native, raw: None, rate_hz: 25.0, max_pixels: 1 << 28, page_step: None, first_page: 0 }
+        Self {
+            colour: Colour::Native,
+            raw: None,
+            rate_hz: ASSUMED_RATE_HZ,
+            max_pixels: 1 << 28,
+            page_step: None,
+            first_page: 0,
+        }
     }
 }
 

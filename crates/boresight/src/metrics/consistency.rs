@@ -94,15 +94,21 @@ pub fn average(values: &[f64], dimension: usize, probability: f64) -> Result<Con
         return Err(Error::new(ErrorKind::Numeric, "a normalised square is not a number"));
     }
     let n = values.len() as f64;
-    let chi = ChiSquared::new(n * dimension as f64).map_err(|e| Error::new(ErrorKind::Numeric, e.to_string()))?;
-    let tail = (1.0 - probability) / 2.0;
+    let [lower, upper] = bounds(n, dimension, probability)?;
     Ok(Consistency {
         average: values.iter().sum::<f64>() / n,
         expected: dimension as f64,
-        lower: chi.inverse_cdf(tail) / n,
-        upper: chi.inverse_cdf(1.0 - tail) / n,
+        lower,
+        upper,
         n: values.len() as u64,
     })
+}
+
+/// Bounds that hold the average of `n` values of `dimension` degrees of freedom with `probability`.
+pub(super) fn bounds(n: f64, dimension: usize, probability: f64) -> Result<[f64; 2]> {
+    let chi = ChiSquared::new(n * dimension as f64).map_err(|e| Error::new(ErrorKind::Numeric, e.to_string()))?;
+    let tail = (1.0 - probability) / 2.0;
+    Ok([tail, 1.0 - tail].map(|p| chi.inverse_cdf(p) / n))
 }
 
 /// Noncredibility index: 10 times the mean of |log10(ε / ε*)|, with ε* from the true mean square error; 0 is credible.

@@ -25,6 +25,8 @@ pub struct ParticleScores {
     pub jsc_tracks: f64,
     /// Root mean square distance of the matched positions, px; 0 without any.
     pub rmse_px: f64,
+    /// Matched positions.
+    pub n_matched: u64,
 }
 
 /// Computes the measures with the gate `gate_px` (the challenge: 5).
@@ -70,6 +72,7 @@ pub fn particle_scores(truth: &TrackTable, result: &TrackTable, gate_px: f64) ->
         jsc: tp as f64 / (truth.n_rows() as u64 + result.n_rows() as u64 - tp) as f64,
         jsc_tracks: n / (truth.n_tracks() as f64 + result.n_tracks() as f64 - n),
         rmse_px: if tp == 0 { 0.0 } else { (error2 / tp as f64).sqrt() },
+        n_matched: tp,
     })
 }
 
@@ -114,6 +117,6 @@ mod tests {
     #[test]
     fn an_error_of_one_pixel_under_a_gate_of_five_costs_a_fifth() {
         let s = particle_scores(&table(&[(0, 1, 0.0), (1, 1, 0.0)]), &table(&[(0, 4, 1.0), (1, 4, 1.0)]), 5.0).unwrap();
-        assert!((s.alpha - 0.8).abs() < 1e-12 && (s.rmse_px - 1.0).abs() < 1e-12);
+        assert!((s.alpha - 0.8).abs() < 1e-12 && (s.rmse_px - 1.0).abs() < 1e-12 && s.n_matched == 2);
     }
 }

@@ -19,13 +19,21 @@ pub const NAMES: [(&str, &str); 10] = [
     ("ds1", "data set I of the thesis: one target N(100, 0) on N(50, 0)"),
     ("ds2", "data set II of the thesis: one target N(100, 10²) on N(50, 50²)"),
     ("ds3", "data set III: two targets as in ds2 that cross at scan 22.5"),
-    ("d3-s1", "sensor 1 of the SRIF paper: target N(100, 1²) on N(50, 100²)"),
-    ("d3-s2", "sensor 2 of the SRIF paper: target N(100, 5²) on N(50, 100²)"),
-    ("d1-fusion", "imaging sensor and ground radar of the thesis (Table 4.3): data set II and a radar of 2.6 px"),
-    ("d1-fusion-loss", "the same with the imager lost in scans 15-25, the radar in 30-45 (Table 4.4)"),
+    ("imager-1", "sensor 1 of the SRIF paper: target N(100, 1²) on N(50, 100²)"),
+    ("imager-2", "sensor 2 of the SRIF paper: target N(100, 5²) on N(50, 100²)"),
+    ("imager-radar", "imaging sensor and ground radar of the thesis (Table 4.3): data set II and a radar of 2.6 px"),
+    ("imager-radar-loss", "the same with the imager lost in scans 15-25, the radar in 30-45 (Table 4.4)"),
     ("lms-sines", "the LMS paper's manoeuvres: sines of 40 s and 17 s, amplitude 100 px, 25 frames/s"),
     ("lms-singer", "Singer manoeuvres at 25 frames/s"),
     ("montecarlo", "the Monte Carlo scene of the peers' bench"),
+];
+
+/// Names that scenes had before, and those that they have now.
+const RENAMED: [(&str, &str); 4] = [
+    ("d3-s1", "imager-1"),
+    ("d3-s2", "imager-2"),
+    ("d1-fusion", "imager-radar"),
+    ("d1-fusion-loss", "imager-radar-loss"),
 ];
 
 /// The papers' frame: 64 x 64 px, 50 scans of 1 s, white background, targets of 9 x 9 px with the given start states
@@ -60,11 +68,11 @@ pub fn named(name: &str, seed: Seed) -> Result<SceneConfig> {
         "ds1" => one((100.0, 0.0), (50.0, 0.0)),
         "ds2" => one((100.0, 10.0), (50.0, 50.0)),
         "ds3" => paper_scene(&[PAPER_START, [10.0, 1.0, 55.0, -1.0]], (100.0, 10.0), (50.0, 50.0)),
-        "d3-s1" => one((100.0, 1.0), (50.0, 100.0)),
-        "d3-s2" => one((100.0, 5.0), (50.0, 100.0)),
-        "d1-fusion" => SceneConfig { radars: vec![ground_radar(&[])], ..one((100.0, 10.0), (50.0, 50.0)) },
+        "imager-1" => one((100.0, 1.0), (50.0, 100.0)),
+        "imager-2" => one((100.0, 5.0), (50.0, 100.0)),
+        "imager-radar" => SceneConfig { radars: vec![ground_radar(&[])], ..one((100.0, 10.0), (50.0, 50.0)) },
         // Scan k is frame k - 1.
-        "d1-fusion-loss" => SceneConfig {
+        "imager-radar-loss" => SceneConfig {
             radars: vec![ground_radar(&[[29.0, 44.0]])],
             clock: Clock { silent_s: vec![[14.0, 24.0]], ..Clock::default() },
             ..one((100.0, 10.0), (50.0, 50.0))
@@ -79,10 +87,12 @@ pub fn named(name: &str, seed: Seed) -> Result<SceneConfig> {
         }
         "montecarlo" => montecarlo(seed),
         _ => {
-            let known: Vec<_> = NAMES.iter().map(|(n, _)| *n).collect();
-            return Err(Error::new(ErrorKind::NotFound, "there is no scene of this name and no such file")
-                .at(format!("scene {name}"))
-                .hint(format!("names: {}; or give a TOML file", known.join(", "))));
+            let e = Error::new(ErrorKind::NotFound, "there is no scene of this name and no such file")
+                .at(format!("scene {name}"));
+            return Err(match RENAMED.iter().find(|(old, _)| *old == name) {
+                Some((_, new)) => e.hint(format!("it is called {new} now")),
+                None => e.hint(format!("names: {}; or give a TOML file", NAMES.map(|(n, _)| n).join(", "))),
+            });
         }
     })
 }
@@ -132,6 +142,10 @@ mod tests {
             named(name, Seed::new(1)).unwrap().validate(name).unwrap();
         }
         assert!(named("ds9", Seed::new(1)).unwrap_err().to_string().contains("ds1, ds2"));
+        for (old, new) in RENAMED {
+            assert!(named(old, Seed::new(1)).unwrap_err().to_string().contains(new), "{old}");
+            named(new, Seed::new(1)).unwrap();
+        }
     }
 
     #[test]

@@ -162,6 +162,47 @@ impl DetectorConfig {
     }
 }
 
+impl DetectorConfig {
+    /// Keys that stand at another value than their default although the way of finding (`threshold`) does not look at them.
+    ///
+    /// ```
+    /// use boresight::Config;
+    /// let config = Config::from_toml("[detector]\nthreshold.cfar = {}\ncluster.min-area-px = 4", "example")?;
+    /// assert_eq!(config.detector.unused_keys(), ["detector.cluster.min-area-px"]);
+    /// # Ok::<(), boresight::Error>(())
+    /// ```
+    pub fn unused_keys(&self) -> Vec<&'static str> {
+        let usual = Self::default();
+        let (joined, as_usual) = (&self.cluster, &usual.cluster);
+        let joining = [
+            ("detector.cluster.distance-px", joined.distance_px != as_usual.distance_px),
+            ("detector.cluster.inclusive", joined.inclusive != as_usual.inclusive),
+        ];
+        let areas = [
+            ("detector.cluster.min-area-px", joined.min_area_px.is_some()),
+            ("detector.cluster.max-area-px", joined.max_area_px.is_some()),
+            ("detector.cluster.target-size-px", joined.target_size_px.is_some()),
+        ];
+        let method = ("detector.centroid.method", self.centroid.method != usual.centroid.method);
+        let weight = ("detector.centroid.weight", self.centroid.weight != usual.centroid.weight);
+        let noise = ("detector.noise", self.noise != usual.noise);
+        let shot_noise = ("detector.noise.given.gain", matches!(&self.noise, NoiseConfig::Given(g) if g.gain != 0.0));
+        let unused = match self.threshold {
+            ThresholdConfig::Band(_)
+            | ThresholdConfig::Level(_)
+            | ThresholdConfig::Otsu(_)
+            | ThresholdConfig::Local(_)
+            | ThresholdConfig::Moving(_)
+            | ThresholdConfig::Difference(_)
+            | ThresholdConfig::Colour(_) => Vec::new(),
+            ThresholdConfig::Isolated(_) => [&joining[..], &[weight, shot_noise]].concat(),
+            ThresholdConfig::Spot(_) => [&joining[..], &areas, &[method, weight]].concat(),
+            ThresholdConfig::Cfar(_) => [&joining[..], &areas, &[method, weight, noise]].concat(),
+        };
+        unused.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
+    }
+}
+
 impl ClusterConfig {
     /// Checks every parameter; `at` is the path of this table.
     /// # Errors
@@ -245,6 +286,28 @@ mod tests {
         let e = config.validate("detector").unwrap_err().to_string();
         assert!(e.starts_with("detector.cluster.distance-px = 0: expected a distance above 0"), "{e}");
         assert!(e.contains("hint: 2 joins"), "{e}");
+    }
+
+    #[test]
+    fn keys_that_a_way_of_finding_does_not_look_at_are_named() {
+        let unused = |threshold: &str, more: &str| {
+            let config: DetectorConfig = toml::from_str(&format!("threshold.{threshold} = {{}}\n{more}")).unwrap();
+            config.unused_keys()
+        };
+        let all = "cluster = { distance-px = 3.0, inclusive = true, min-area-px = 2 }\n\
+                   centroid = { method = 'bbox', weight = 'intensity' }\nnoise.given = { gain = 1.0 }";
+        let [distance, inclusive, area] =
+            ["detector.cluster.distance-px", "detector.cluster.inclusive", "detector.cluster.min-area-px"];
+        let [method, weight] = ["detector.centroid.method", "detector.centroid.weight"];
+        assert_eq!(unused("isolated", all), [distance, inclusive, weight, "detector.noise.given.gain"]);
+        assert_eq!(unused("spot", all), [distance, inclusive, area, method, weight]);
+        assert_eq!(unused("cfar", all), [distance, inclusive, area, method, weight, "detector.noise"]);
+        for threshold in ["band", "level", "otsu", "local", "moving", "difference"] {
+            assert!(unused(threshold, all).is_empty(), "{threshold}");
+        }
+        for threshold in ["isolated", "spot", "cfar"] {
+            assert!(unused(threshold, "centroid.extra-sd-px = 0.1\nmax-detections = 5").is_empty(), "{threshold}");
+        }
     }
 
     #[test]

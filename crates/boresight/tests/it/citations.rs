@@ -119,6 +119,27 @@ fn every_source_file_that_a_text_names_exists() {
     assert!(n_named > 50, "only {n_named} names seen");
 }
 
+#[test]
+fn every_script_that_is_named_exists() {
+    let (mut paths, mut n_named) = (Vec::new(), 0);
+    files(&root(), &[".rs", ".md", ".json", ".py"], &mut paths);
+    paths.retain(|p| !p.ends_with("it/citations.rs"));
+    let mut wrong = Vec::new();
+    for path in paths {
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (at, _) in text.match_indices("scripts/").filter(|(at, _)| !text[..*at].ends_with(['/', '.'])) {
+            let is_of_path = |c: &char| c.is_ascii_alphanumeric() || "/-_.".contains(*c);
+            let named: String = text[at..].chars().take_while(is_of_path).collect();
+            n_named += 1;
+            if !root().join(named.trim_end_matches('.')).exists() {
+                wrong.push(format!("{} names {named}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "scripts that are not there:\n{}", wrong.join("\n"));
+    assert!(n_named > 10, "only {n_named} names seen");
+}
+
 /// The anchor that a heading gets on GitHub.
 fn anchor(heading: &str) -> String {
     // A link in a heading counts with its text only.

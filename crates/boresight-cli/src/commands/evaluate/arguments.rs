@@ -1,5 +1,6 @@
 //! The arguments of `boresight evaluate`, and the options of the library that they stand for.
 
+use super::demand::{Demand, demand};
 use boresight::TrackTable;
 use boresight::io::tracks::Format;
 use boresight::metrics::evaluation::{BoundModel, ClearConvention, EvaluateOptions, Matching, MeasureSet};
@@ -107,9 +108,10 @@ pub struct Args {
     /// Frames of MOTChallenge results count from 0 in the file.
     #[arg(long)]
     pub result_from_zero: bool,
-    /// Demand a score, for instance HOTA=0.4 (at least) or GOSPA=5 (at most); exit code 1 if it is not met.
+    /// Demand a score, for instance HOTA=0.4 (at least), GOSPA=5 (at most) or ANEES=1.5..2.5 (within); exit code 1 if it is
+    /// not met.
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = demand)]
-    pub require: Vec<(String, f64)>,
+    pub require: Vec<Demand>,
     /// Write the scores of each sequence as CSV.
     #[arg(long)]
     pub csv: Option<PathBuf>,
@@ -191,13 +193,6 @@ fn bound(text: &str) -> Result<BoundModel, String> {
     let good = r > 0.0 && r.is_finite() && q >= 0.0 && q.is_finite() && p_d > 0.0 && p_d <= 1.0;
     let model = BoundModel { measurement_var_px2: r, acceleration_density_px2_per_s3: q, p_detection: p_d };
     if good { Ok(model) } else { Err(expected.into()) }
-}
-
-fn demand(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("expected MEASURE=VALUE, for instance HOTA=0.4")?;
-    let number = value.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-    let value = number.ok_or_else(|| format!("expected a number after =, found \"{value}\""))?;
-    Ok((name.trim().to_string(), value))
 }
 
 impl Args {

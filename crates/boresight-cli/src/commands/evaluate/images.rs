@@ -86,5 +86,5 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let all = serde_json::json!({"mean": named, "names": mean.map(|v| v.name), "frames": numbers});
         put(path, &serde_json::to_string_pretty(&all)?)?;
     }
-    met(args, &mean)
+    met(&args.require, &mean)
 }

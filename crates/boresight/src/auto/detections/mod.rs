@@ -57,7 +57,7 @@ fn area_px2(scans: &[Scan]) -> f64 {
 
 /// What is assumed before a tracker has run; whether it is what boxes of an object detector showed.
 fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) -> bool {
-    let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { 25.0 };
+    let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { crate::ASSUMED_RATE_HZ };
     let mut sides: Vec<f64> = scans
         .iter()
         .flat_map(|s| &s.detections)

@@ -10,7 +10,8 @@
 use crate::io::options::{Colour, OpenOptions};
 use crate::io::pixels::check_size;
 use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
+    ASSUMED_RATE_HZ, Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo,
+    Timestamp,
 };
 use std::io::{BufRead, Read};
 
@@ -306,7 +307,7 @@ impl<R: BufRead + Send> FrameSource for Y4m<R> {
         self.n_given += 1;
         let time = match self.period {
             Some((num, den)) => Timestamp::from_ticks(i64::try_from(index.0).unwrap_or(i64::MAX), num, den),
-            None => Timestamp::from_secs_f64(index.0 as f64 / self.info.rate_hz.unwrap_or(25.0)),
+            None => Timestamp::from_secs_f64(index.0 as f64 / self.info.rate_hz.unwrap_or(ASSUMED_RATE_HZ)),
         };
         Ok(Some(Frame { index, time, pixels }))
     }

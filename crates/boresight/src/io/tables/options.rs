@@ -1,7 +1,7 @@
 //! How tables from elsewhere are read: columns, rate, assumed errors, origin of pixels and frames, bad rows.
 
 use super::columns::Columns;
-use crate::{Error, ErrorKind, Result};
+use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
 /// How a table of detections is read.
@@ -11,9 +11,12 @@ pub struct TableOptions {
     /// Columns by name or number where the usual names do not fit.
     pub columns: Columns,
     /// Rate, frames/s, above 0. Given, it makes all times (frame / rate); absent, the table's times count, then the
-    /// `frameRate` of a `seqinfo.ini` beside it, then 25.
+    /// `frameRate` of a `seqinfo.ini` beside it, then `input.rate-hz`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
+    /// Rate of a table that says nothing of time, frames/s: `input.rate-hz` of a configuration.
+    #[serde(skip)]
+    pub assumed_rate_hz: f64,
     /// Standard deviation of a position where the table has none, px, above 0. Larger values make tracks smoother.
     pub std_px: f64,
     /// Standard deviation of a position as a share of the box's side, 0..=1, where the table has none and this is more
@@ -35,6 +38,7 @@ impl Default for TableOptions {
         Self {
             columns: Columns::default(),
             rate_hz: None,
+            assumed_rate_hz: ASSUMED_RATE_HZ,
             std_px: 1.0,
             std_per_side: 0.0,
             box_px: 5.0,

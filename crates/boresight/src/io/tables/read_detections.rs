@@ -259,6 +259,9 @@ mod tests {
         let table = plain("frame,x,y\n2,1,1\n");
         assert_eq!((table.rate_hz, table.scans[0].time.ns), (25.0, 80_000_000));
         assert!(table.warnings.iter().any(|w| w.contains("25 frames/s were taken")));
+        let slow = TableOptions { assumed_rate_hz: 10.0, ..usual.clone() };
+        assert_eq!(read("frame,x,y\n2,1,1\n", &slow).unwrap().scans[0].time.ns, 200_000_000);
+        assert_eq!(read("frame,x,y,time_s\n2,1,1,0.5\n", &slow).unwrap().scans[0].time.ns, 500_000_000);
     }
 
     #[test]

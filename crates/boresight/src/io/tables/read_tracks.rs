@@ -71,7 +71,8 @@ fn own_tracks(table: &mut Table, options: &TableOptions) -> Result<StateTable> {
         .filter(|p| *p > 0.0)
         .collect();
     periods.sort_by(f64::total_cmp);
-    out.rate_hz = options.rate_hz.or_else(|| periods.get(periods.len() / 2).map(|p| 1.0 / p)).unwrap_or(25.0);
+    out.rate_hz =
+        options.rate_hz.or_else(|| periods.get(periods.len() / 2).map(|p| 1.0 / p)).unwrap_or(options.assumed_rate_hz);
     Ok(out)
 }
 

@@ -13,9 +13,6 @@ const MAX_GAP_FRAMES: u64 = 1_000_000;
 /// All holes of a table together may have this many frames: empty scans take memory as well (10⁷ of them about 0.8 GB).
 const MAX_EMPTY_FRAMES: u64 = 10_000_000;
 
-/// Rate of a table that says nothing of time, frames/s.
-const USUAL_RATE_HZ: f64 = 25.0;
-
 /// Groups rows, sorted by frame, into one scan a frame; with the time of each frame as far as its first row has one.
 /// # Errors
 /// [`ErrorKind::Damaged`] for holes that no pause explains.
@@ -74,7 +71,7 @@ pub(super) fn set_times(
     let timed: Option<Vec<(usize, Timestamp)>> = with_rows.map(|(i, (_, time))| time.map(|t| (i, t))).collect();
     let Some(timed) = timed.filter(|t| options.rate_hz.is_none() && !t.is_empty()) else {
         let known = options.rate_hz.or(rate_beside);
-        let rate_hz = known.unwrap_or(USUAL_RATE_HZ);
+        let rate_hz = known.unwrap_or(options.assumed_rate_hz);
         for scan in scans.iter_mut() {
             scan.time = Timestamp::from_secs_f64(scan.index.0 as f64 / rate_hz);
         }
@@ -107,6 +104,6 @@ pub(super) fn set_times(
     }
     periods_s.sort_by(f64::total_cmp);
     let median_s = periods_s.get(periods_s.len() / 2);
-    let rate_hz = median_s.map_or_else(|| rate_beside.unwrap_or(USUAL_RATE_HZ), |p| 1.0 / p);
+    let rate_hz = median_s.map_or_else(|| rate_beside.unwrap_or(options.assumed_rate_hz), |p| 1.0 / p);
     Ok(Rate { rate_hz, is_assumed: false })
 }

@@ -8,6 +8,7 @@ mod evaluate;
 mod note;
 mod optional;
 mod options;
+mod pooled;
 mod result;
 mod sequence;
 mod states;

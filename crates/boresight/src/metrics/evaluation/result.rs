@@ -1,6 +1,7 @@
 //! The sequences of one result together.
 
 use super::evaluate::Evaluation;
+use super::pooled::pooled;
 use super::values::mot_values;
 use crate::metrics::clear_classic::ClearClassic;
 use crate::metrics::multi_object::MotScores;
@@ -25,8 +26,8 @@ impl ResultEvaluation {
         Self { label: label.into(), combined: MotScores::combined(&scores), sequences }
     }
 
-    /// The combined measures by name: first CLEAR, identity and HOTA as TrackEval combines them, then the rest as the mean
-    /// of the sequences, weighted by their frames.
+    /// The combined measures by name: first CLEAR, identity and HOTA as TrackEval combines them, then
+    /// [the rest](Self::optional_values).
     pub fn values(&self) -> Vec<Value> {
         let mut values = self.mot_values();
         values.extend(self.optional_values());
@@ -40,22 +41,10 @@ impl ResultEvaluation {
         mot_values(&self.combined, classic.as_ref())
     }
 
-    /// The other measures: means over the sequences, weighted by their frames.
+    /// The other measures: errors and averages over matched rows as over the rows of all sequences, the rest as means over
+    /// the sequences weighted by their frames.
     pub fn optional_values(&self) -> Vec<Value> {
-        let mut sums: Vec<(Value, f64, f64)> = Vec::new();
-        for sequence in &self.sequences {
-            let weight = sequence.optional.as_ref().map_or(0.0, |f| f.gospa.len() as f64);
-            for v in sequence.optional_values() {
-                match sums.iter_mut().find(|s| s.0.name == v.name) {
-                    Some(s) => {
-                        s.1 += v.value * weight;
-                        s.2 += weight;
-                    }
-                    None => sums.push((v, v.value * weight, weight)),
-                }
-            }
-        }
-        sums.into_iter().map(|(v, sum, weight)| Value { value: sum / weight.max(1.0), ..v }).collect()
+        pooled(self.sequences.iter().flat_map(Evaluation::parts))
     }
 }
 

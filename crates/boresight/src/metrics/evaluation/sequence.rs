@@ -1,10 +1,7 @@
 //! A truth, a result, and what is known of their sequence.
 
 use crate::metrics::cells::CellSequence;
-use crate::{Scan, TrackTable};
-
-/// Frame rate where none is known, frames/s.
-const DEFAULT_RATE_HZ: f64 = 25.0;
+use crate::{ASSUMED_RATE_HZ, Scan, TrackTable};
 
 /// A truth and a result, and what is known of their sequence.
 #[derive(Clone, Copy, Debug)]
@@ -16,7 +13,7 @@ pub struct Sequence<'a> {
     pub truth: &'a TrackTable,
     /// What was found.
     pub result: &'a TrackTable,
-    /// Frame rate, frames/s; 25 is assumed where a measure needs one.
+    /// Frame rate, frames/s; [`ASSUMED_RATE_HZ`] where a measure needs one and none is given.
     pub rate_hz: Option<f64>,
     /// Width and height of the frames, px.
     pub size_px: Option<(f64, f64)>,
@@ -34,6 +31,6 @@ impl<'a> Sequence<'a> {
 
     /// Time from one frame to the next, s.
     pub(super) fn dt_s(&self) -> f64 {
-        1.0 / self.rate_hz.unwrap_or(DEFAULT_RATE_HZ)
+        1.0 / self.rate_hz.unwrap_or(ASSUMED_RATE_HZ)
     }
 }

@@ -18,7 +18,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Probability of the bounds of averages.
-const LEVEL: f64 = 0.95;
+pub(super) const LEVEL: f64 = 0.95;
 /// Standard deviations of the bounds beside the errors.
 const N_SIGMA: f64 = 2.0;
 /// Variance of a target of which nothing is known, in variances of a measurement.
@@ -30,6 +30,11 @@ const UNKNOWN: f64 = 1e9;
 pub struct StateMeasures {
     /// Errors over all matched rows.
     pub errors: StateErrors,
+    /// Matched rows.
+    pub n_rows: u64,
+    /// Σ x² and Σ y² of the truth over them: what the percentage fit errors are shares of, px².
+    #[serde(skip)]
+    pub(super) norm2: [f64; 2],
     /// Whether both tables have velocities.
     pub has_velocity: bool,
     /// Root mean over the frame's matched rows of the squared position error, px, by frame.
@@ -88,6 +93,8 @@ impl StateMeasures {
         m.result = m.rows.iter().map(|m| state(r, m.1)).collect();
         let mut out = Self {
             errors: state_errors(&m.truth, &m.result)?,
+            n_rows: m.rows.len() as u64,
+            norm2: [0, 2].map(|k| m.truth.iter().map(|t| t[k] * t[k]).sum()),
             has_velocity: t.has_velocity() && r.has_velocity(),
             ..Self::default()
         };

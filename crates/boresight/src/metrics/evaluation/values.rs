@@ -1,6 +1,7 @@
-//! The measures by name, with unit and direction.
+//! The measures by name, with unit, direction and the way in which several sequences make one value.
 
 use super::evaluate::Evaluation;
+use super::pooled::{Part, Pooling};
 use super::states::StateMeasures;
 use crate::metrics::clear_classic::ClearClassic;
 use crate::metrics::consistency::Consistency;
@@ -77,8 +78,15 @@ impl Evaluation {
 
     /// The other measures by name.
     pub fn optional_values(&self) -> Vec<Value> {
+        self.parts().into_iter().map(|p| p.value).collect()
+    }
+
+    /// The other measures, each with its weight among sequences: frames, or matched rows.
+    pub(super) fn parts(&self) -> Vec<Part> {
         let Some(f) = &self.optional else { return Vec::new() };
         let d = &f.detection;
+        let by_frames = |v: Value| Part::mean(v, f.gospa.len() as f64);
+        let by_rows = |v: Value| Part::mean(v, d.tp as f64);
         let mut values = vec![
             Value::lower("GOSPA", mean_of(f.gospa.iter().map(|g| g.distance)), "px"),
             Value::lower("GOSPA_location", mean_of(f.gospa.iter().map(|g| g.localisation)), "px^p"),
@@ -105,48 +113,61 @@ impl Evaluation {
             Value::higher("particle_beta", f.particle.beta),
             Value::higher("JSC", f.particle.jsc),
             Value::higher("JSC_tracks", f.particle.jsc_tracks),
-            Value::lower("RMSE", f.particle.rmse_px, "px"),
-            Value::higher("AP", f.average_precision),
-            Value::neither("bias_x", d.bias_px[0], "px"),
-            Value::neither("bias_y", d.bias_px[1], "px"),
-            Value::lower("scatter_x", d.scatter_px[0], "px"),
-            Value::lower("scatter_y", d.scatter_px[1], "px"),
+        ]);
+        let mut parts: Vec<Part> = values.into_iter().map(by_frames).collect();
+        let ([bias_x, bias_y], [scatter_x, scatter_y]) = (d.bias_px, d.scatter_px);
+        let scatter = |name, value, mean| by_rows(Value::lower(name, value, "px")).pooled(Pooling::Spread { mean });
+        parts.extend([
+            Part::root_mean_square(Value::lower("RMSE", f.particle.rmse_px, "px"), f.particle.n_matched as f64),
+            by_frames(Value::higher("AP", f.average_precision)),
+            by_rows(Value::neither("bias_x", bias_x, "px")),
+            by_rows(Value::neither("bias_y", bias_y, "px")),
+            scatter("scatter_x", scatter_x, bias_x),
+            scatter("scatter_y", scatter_y, bias_y),
         ]);
         if let Some((w, h)) = self.size_px {
-            values.push(Value::lower("FP/Mpx", d.fp_per_megapixel(w, h), "1/Mpx"));
+            parts.push(by_frames(Value::lower("FP/Mpx", d.fp_per_megapixel(w, h), "1/Mpx")));
         }
         if let Some(rate) = self.rate_hz {
-            values.push(Value::lower("FP/hour", d.fp_per_hour(rate), "1/h"));
+            parts.push(by_frames(Value::lower("FP/hour", d.fp_per_hour(rate), "1/h")));
         }
-        if let Some(state) = &f.state {
-            values.extend(state.values());
-        }
+        parts.extend(f.state.iter().flat_map(StateMeasures::parts));
         if let Some(c) = &f.cells {
-            values.extend([Value::higher("DET", c.det()), Value::higher("TRA", c.tra())]);
+            parts.extend([Value::higher("DET", c.det()), Value::higher("TRA", c.tra())].map(by_frames));
         }
-        values
+        parts
     }
 }
 
 impl StateMeasures {
     /// The measures by name.
     pub fn values(&self) -> Vec<Value> {
-        let e = &self.errors;
-        let mut values = vec![
-            Value::lower("PFE_x", e.pfe_x, "%"),
-            Value::lower("PFE_y", e.pfe_y, "%"),
-            Value::lower("RMSPE", e.rmspe, "px"),
-            Value::lower("RMSPE/2", e.rmspe_halved, "px"),
+        self.parts().into_iter().map(|p| p.value).collect()
+    }
+
+    fn parts(&self) -> Vec<Part> {
+        let (e, n) = (&self.errors, self.n_rows as f64);
+        let rms = |name, value| Part::root_mean_square(Value::lower(name, value, "px"), n);
+        let mut parts = vec![
+            Part::root_mean_square(Value::lower("PFE_x", e.pfe_x, "%"), self.norm2[0]),
+            Part::root_mean_square(Value::lower("PFE_y", e.pfe_y, "%"), self.norm2[1]),
+            rms("RMSPE", e.rmspe),
+            rms("RMSPE/2", e.rmspe_halved),
         ];
         if self.has_velocity {
-            values.extend([Value::lower("RMSVE", e.rmsve, "px/s"), Value::lower("RMSVE/2", e.rmsve_halved, "px/s")]);
+            let rms = |name, value| Part::root_mean_square(Value::lower(name, value, "px/s"), n);
+            parts.extend([rms("RMSVE", e.rmsve), rms("RMSVE/2", e.rmsve_halved)]);
         }
         if let Some(bound) = self.bound_px {
-            values.extend([Value::neither("bound", bound, "px"), Value::lower("RMSPE/bound", e.rmspe / bound, "")]);
+            // √(Σ n error² / Σ n bound²) is the root mean square of the ratios, weighted by n bound².
+            let ratio = Value::lower("RMSPE/bound", e.rmspe / bound, "");
+            parts.push(Part::root_mean_square(Value::neither("bound", bound, "px"), n));
+            parts.push(Part::root_mean_square(ratio, n * bound * bound));
         }
         if !self.bounded.is_empty() {
-            let within = share_within(&self.bounded);
-            values.extend([Value::neither("x_in_2sigma", within[0], ""), Value::neither("y_in_2sigma", within[2], "")]);
+            let (within, n) = (share_within(&self.bounded), self.bounded.len() as f64);
+            let shares = [("x_in_2sigma", within[0]), ("y_in_2sigma", within[2])];
+            parts.extend(shares.map(|(name, share)| Part::mean(Value::neither(name, share, ""), n)));
         }
         let tests: [([&str; 3], &Option<Consistency>); 3] = [
             (["ANEES", "ANEES_lower", "ANEES_upper"], &self.nees),
@@ -154,14 +175,20 @@ impl StateMeasures {
             (["ANIS", "ANIS_lower", "ANIS_upper"], &self.nis),
         ];
         for (names, test) in tests {
-            if let Some(c) = test {
-                let numbers = [c.average, c.lower, c.upper];
-                values.extend(names.into_iter().zip(numbers).map(|(name, v)| Value::neither(name, v, "")));
-            }
+            let Some(c) = test else { continue };
+            let dimension = c.expected as usize;
+            let part = |name, v| Part::mean(Value::neither(name, v, ""), c.n as f64);
+            parts.extend([
+                part(names[0], c.average),
+                part(names[1], c.lower).pooled(Pooling::LowerBound { dimension }),
+                part(names[2], c.upper).pooled(Pooling::UpperBound { dimension }),
+            ]);
         }
         if let Some((index, inclination)) = self.noncredibility {
-            values.extend([Value::lower("NCI", index, "dB"), Value::neither("inclination", inclination, "dB")]);
+            let n = self.nees.map_or(0.0, |c| c.n as f64);
+            parts.push(Part::mean(Value::lower("NCI", index, "dB"), n));
+            parts.push(Part::mean(Value::neither("inclination", inclination, "dB"), n));
         }
-        values
+        parts
     }
 }

@@ -53,7 +53,10 @@ pub enum FormConfig {
 impl FormConfig {
     /// Whether it takes any model, innovation and learning of the noise.
     pub fn takes_a_model(&self) -> bool {
-        !matches!(self, Self::Imm(_) | Self::Lms(_) | Self::Ar1(_) | Self::Displacement(_))
+        match self {
+            Self::Kf | Self::KfShort | Self::Ud | Self::Srif | Self::Information | Self::SquareRoot | Self::Ukf => true,
+            Self::Imm(_) | Self::Lms(_) | Self::Ar1(_) | Self::Displacement(_) => false,
+        }
     }
 
     pub(super) fn validate(&self, at: &str) -> Checked<()> {
@@ -62,7 +65,9 @@ impl FormConfig {
             Self::Lms(c) => c.validate(&format!("{at}.lms")),
             Self::Ar1(c) => c.validate(&format!("{at}.ar1")),
             Self::Displacement(c) => c.validate(&format!("{at}.displacement")),
-            _ => Ok(()),
+            Self::Kf | Self::KfShort | Self::Ud | Self::Srif | Self::Information | Self::SquareRoot | Self::Ukf => {
+                Ok(())
+            }
         }
     }
 
@@ -80,7 +85,9 @@ impl FormConfig {
             Self::Lms(c) => c.start(start, noise),
             Self::Ar1(c) => c.start(start),
             Self::Displacement(c) => c.start(start, noise),
-            _ => conditioned(around(self, model, start, noise)?, innovation, adaptive),
+            Self::Kf | Self::KfShort | Self::Ud | Self::Srif | Self::Information | Self::SquareRoot | Self::Ukf => {
+                conditioned(around(self, model, start, noise)?, innovation, adaptive)
+            }
         }
     }
 }
@@ -106,7 +113,9 @@ fn around(
                 FormConfig::Information => boxed(Information::<_, $n>::from_kinematics(m, start)?),
                 FormConfig::SquareRoot => boxed(SquareRoot::<_, $n>::from_kinematics(m, start)?),
                 FormConfig::Ukf => boxed(Ukf::<_, $n>::from_kinematics(m, start)?),
-                _ => return Err(FilterError::OutOfRange("a form that takes a model")),
+                FormConfig::Imm(_) | FormConfig::Lms(_) | FormConfig::Ar1(_) | FormConfig::Displacement(_) => {
+                    return Err(FilterError::OutOfRange("a form that takes a model"));
+                }
             }
         }};
     }
