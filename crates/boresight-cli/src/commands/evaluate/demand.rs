@@ -1,6 +1,7 @@
 //! Checks the scores that `--require` demands.
 
 use super::arguments::Args;
+use crate::console::say;
 use anyhow::bail;
 use boresight::metrics::evaluation::{Better, Value};
 use std::process::ExitCode;
@@ -22,7 +23,7 @@ pub fn met(args: &Args, combined: &[Value]) -> anyhow::Result<ExitCode> {
         if !ok {
             met = false;
             let word = if at_most { "at most" } else { "at least" };
-            eprintln!("not met: {key} = {value:.6}, demanded {word} {limit}");
+            say!("not met: {key} = {value:.6}, demanded {word} {limit}");
         }
     }
     Ok(if met { ExitCode::SUCCESS } else { ExitCode::from(1) })
