@@ -89,7 +89,7 @@ pub fn table(args: &Args) -> Result<()> {
     let scans: Shared<Vec<Scan>> = Shared::default();
     let go_on = &mut |_: &boresight::pipeline::Summary| ControlFlow::Continue(());
     let input = Input::Frames(Box::new(replay), detector);
-    let (_, broken) = run(input, None, vec![Box::new(Scans(Arc::clone(&scans)))], go_on)?;
+    let (_, broken) = run(input, None, vec![Box::new(Scans(Arc::clone(&scans)))], go_on).all_written()?;
     broken.map_or(Ok(()), Err)?;
     println!("| filter | held | rms error, px | mean NIS | confirmed tracks | µs a frame |");
     println!("| --- | --- | --- | --- | --- | --- |");
@@ -101,7 +101,7 @@ pub fn table(args: &Args) -> Result<()> {
         let shown: Shared<Shown> = Shared::default();
         let watch = Watch(Arc::clone(&shown), Arc::clone(&truth));
         let tracking = boresight::track::build(&tracker)?;
-        let (summary, broken) = run(Input::Scans(all), Some(tracking), vec![Box::new(watch)], go_on)?;
+        let (summary, broken) = run(Input::Scans(all), Some(tracking), vec![Box::new(watch)], go_on).all_written()?;
         broken.map_or(Ok(()), Err)?;
         let shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
         let near: Vec<f64> = shown.nearest.values().copied().filter(|d| *d < 8.0).collect();

@@ -1,6 +1,8 @@
 //! Exit codes that scripts can trust, and how an error is shown.
 
+use crate::console::{self, say};
 use boresight::ErrorKind;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// The table of exit codes, shown under every help text.
@@ -14,6 +16,15 @@ pub const HELP: &str = "Exit codes:
   6  a numerical step could not be done
   130  interrupted; what was finished is on disk";
 
+/// Shows what is asked for (help, version) or wrong in the arguments; returns the exit code.
+pub fn usage(words: &clap::Error) -> ExitCode {
+    let shown = words.print().and_then(|()| std::io::stdout().flush());
+    if words.use_stderr() {
+        return ExitCode::from(2);
+    }
+    console::written(shown).map_or_else(|e| report(&e.into()), |_| ExitCode::SUCCESS)
+}
+
 /// Prints an error to standard error and returns its exit code.
 pub fn report(error: &anyhow::Error) -> ExitCode {
     if reader_left(error) {
@@ -24,7 +35,7 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
     if kind.is_some() {
         text = error.to_string();
     }
-    eprintln!("error: {text}");
+    say!("error: {text}");
     ExitCode::from(match kind {
         Some(ErrorKind::Config) => 2,
         Some(ErrorKind::NotFound | ErrorKind::Damaged | ErrorKind::Unsupported) => 3,

@@ -1,11 +1,13 @@
 //! Writes frames: a folder of PNG or PGM files, or one YUV4MPEG2 stream (a file or standard output).
 //!
 //! Files are named `frame_000000.png` by the frame's number; 16-bit frames keep their values (PGM: big end first, as the format asks).
+//! Folder and file appear at the end, whole; frames of an earlier scene in the folder go then.
 
+use boresight::io::{AtomicFile, AtomicFolder, remove_folder};
 use boresight::{ASSUMED_RATE_HZ, Error, ErrorKind, Frame, Pixels, SourceInfo};
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// How frames are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -27,22 +29,25 @@ impl FrameFormat {
 /// An open output for frames.
 pub enum FrameWriter {
     /// A folder and the format of its files.
-    Folder(PathBuf, FrameFormat),
+    Folder(AtomicFolder, FrameFormat),
+    /// A YUV4MPEG2 file.
+    File(BufWriter<AtomicFile>),
     /// A YUV4MPEG2 stream.
     Stream(Box<dyn Write>),
 }
 
-/// A file of an image in the folder that this run does not overwrite.
-fn left_over(folder: &Path, format: FrameFormat, n_frames: Option<u64>) -> Option<String> {
-    let ours = |name: &str| {
-        let number =
-            name.strip_prefix("frame_")?.strip_suffix(&format!(".{}", format.extension()))?.parse::<u64>().ok()?;
-        n_frames.is_none_or(|n| number < n).then_some(())
-    };
+/// Whether a file has the name of a frame.
+fn is_frame(name: &str) -> bool {
+    let number = name.strip_prefix("frame_").and_then(|n| n.strip_suffix(".png").or_else(|| n.strip_suffix(".pgm")));
+    number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// An image in the folder that is no frame of an earlier scene, so not to be removed.
+fn stranger(folder: &Path) -> Option<String> {
+    const IMAGES: [&str; 6] = [".png", ".pgm", ".tif", ".tiff", ".jpg", ".bmp"];
     let names = std::fs::read_dir(folder).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());
-    let image =
-        |n: &str| [".png", ".pgm", ".tif", ".tiff", ".jpg", ".bmp"].iter().any(|e| n.to_lowercase().ends_with(e));
-    names.filter(|n| image(n) && ours(n).is_none()).min()
+    let image = |n: &str| IMAGES.iter().any(|e| n.to_lowercase().ends_with(e));
+    names.filter(|n| image(n) && !is_frame(n)).min()
 }
 
 fn output_error(path: &Path, e: std::io::Error) -> Error {
@@ -53,13 +58,12 @@ impl FrameWriter {
     /// Opens `dir/frames/` or `dir/frames.y4m`.
     pub fn create(dir: &Path, format: FrameFormat, info: &SourceInfo) -> boresight::Result<Self> {
         if format == FrameFormat::Y4m {
-            let path = dir.join("frames.y4m");
-            let file = File::create(&path).map_err(|e| output_error(&path, e))?;
-            return Self::stream(Box::new(BufWriter::with_capacity(1 << 20, file)), info);
+            let mut file = BufWriter::with_capacity(1 << 20, AtomicFile::create(dir.join("frames.y4m"))?);
+            header(&mut file, info)?;
+            return Ok(Self::File(file));
         }
         let path = dir.join("frames");
-        std::fs::create_dir_all(&path).map_err(|e| output_error(&path, e))?;
-        if let Some(other) = left_over(&path, format, info.n_frames) {
+        if let Some(other) = stranger(&path) {
             return Err(Error::new(
                 ErrorKind::Output,
                 format!("holds {other}, which would be read as a frame of this run"),
@@ -67,20 +71,21 @@ impl FrameWriter {
             .at(path.display())
             .hint("remove that folder, or choose another with --output"));
         }
-        Ok(Self::Folder(path, format))
+        Ok(Self::Folder(AtomicFolder::create(path, is_frame)?, format))
+    }
+
+    /// Removes what an earlier scene wrote in another format.
+    pub fn remove_others(dir: &Path, format: FrameFormat) {
+        if format == FrameFormat::Y4m {
+            remove_folder(&dir.join("frames"), is_frame);
+        } else {
+            let _ = std::fs::remove_file(dir.join("frames.y4m"));
+        }
     }
 
     /// Starts a YUV4MPEG2 stream.
     pub fn stream(mut out: Box<dyn Write>, info: &SourceInfo) -> boresight::Result<Self> {
-        if info.kind != boresight::PixelKind::Gray8 {
-            return Err(Error::new(ErrorKind::Config, "YUV4MPEG2 holds 8-bit frames, these have more bits")
-                .at("--format y4m")
-                .hint("take --format png"));
-        }
-        // Rates are written as a fraction of thousandths.
-        let rate = (info.rate_hz.unwrap_or(ASSUMED_RATE_HZ) * 1000.0).round().max(1.0) as u64;
-        let header = format!("YUV4MPEG2 W{} H{} F{rate}:1000 Ip A1:1 Cmono\n", info.width, info.height);
-        out.write_all(header.as_bytes()).map_err(|e| output_error(Path::new("frames.y4m"), e))?;
+        header(&mut out, info)?;
         Ok(Self::Stream(out))
     }
 
@@ -88,16 +93,10 @@ impl FrameWriter {
     pub fn put(&mut self, frame: &Frame) -> boresight::Result<()> {
         let (w, h) = (frame.pixels.width(), frame.pixels.height());
         match self {
-            Self::Stream(out) => {
-                let Pixels::Gray8(image) = &frame.pixels else {
-                    return Err(
-                        Error::new(ErrorKind::Unsupported, "YUV4MPEG2 holds 8-bit grey frames").at("frames.y4m")
-                    );
-                };
-                let written = out.write_all(b"FRAME\n").and_then(|()| out.write_all(image.as_slice()));
-                written.map_err(|e| output_error(Path::new("frames.y4m"), e))
-            }
-            Self::Folder(dir, format) => {
+            Self::Stream(out) => append(out, frame),
+            Self::File(file) => append(file, frame),
+            Self::Folder(folder, format) => {
+                let dir = folder.part_path();
                 let (sixteen, bytes) = match &frame.pixels {
                     Pixels::Gray8(i) => (false, i.as_slice().to_vec()),
                     Pixels::Gray16(i) => (true, i.as_slice().iter().flat_map(|v| v.to_be_bytes()).collect()),
@@ -129,8 +128,35 @@ impl FrameWriter {
     /// Ends the output.
     pub fn finish(self) -> boresight::Result<()> {
         match self {
-            Self::Stream(mut out) => out.flush().map_err(|e| output_error(Path::new("frames.y4m"), e)),
-            Self::Folder(..) => Ok(()),
+            Self::Stream(mut out) => out.flush().map_err(|e| output_error(Path::new(STREAM), e)),
+            Self::File(file) => match file.into_inner() {
+                Ok(file) => file.finish(),
+                Err(e) => Err(output_error(Path::new(STREAM), e.into_error())),
+            },
+            Self::Folder(folder, _) => folder.finish(),
         }
     }
+}
+
+/// What a stream of frames is called in errors.
+const STREAM: &str = "frames.y4m";
+
+fn header(out: &mut dyn Write, info: &SourceInfo) -> boresight::Result<()> {
+    if info.kind != boresight::PixelKind::Gray8 {
+        return Err(Error::new(ErrorKind::Config, "YUV4MPEG2 holds 8-bit frames, these have more bits")
+            .at("--format y4m")
+            .hint("take --format png"));
+    }
+    // Rates are written as a fraction of thousandths.
+    let rate = (info.rate_hz.unwrap_or(ASSUMED_RATE_HZ) * 1000.0).round().max(1.0) as u64;
+    let text = format!("YUV4MPEG2 W{} H{} F{rate}:1000 Ip A1:1 Cmono\n", info.width, info.height);
+    out.write_all(text.as_bytes()).map_err(|e| output_error(Path::new(STREAM), e))
+}
+
+fn append(out: &mut dyn Write, frame: &Frame) -> boresight::Result<()> {
+    let Pixels::Gray8(image) = &frame.pixels else {
+        return Err(Error::new(ErrorKind::Unsupported, "YUV4MPEG2 holds 8-bit grey frames").at(STREAM));
+    };
+    let written = out.write_all(b"FRAME\n").and_then(|()| out.write_all(image.as_slice()));
+    written.map_err(|e| output_error(Path::new(STREAM), e))
 }

@@ -1,6 +1,9 @@
 //! The command `boresight`: image sequences in, tracks one can trust out.
+// They panic where nothing can be written: `console` says and prints.
+#![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod commands;
+mod console;
 mod exit;
 mod frame_writer;
 mod progress;
@@ -43,7 +46,10 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(words) => return exit::usage(&words),
+    };
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
         Command::Detect(args) => commands::detect::run(args),

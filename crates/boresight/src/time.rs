@@ -1,5 +1,6 @@
 //! Time as it is: integer nanoseconds and frame numbers, never mixed up.
 
+use crate::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
 /// Rate that is assumed where nothing says how fast frames follow each other, frames/s: that of European video.
@@ -46,6 +47,17 @@ impl Timestamp {
     }
 }
 
+/// Refuses a rate whose frames whole nanoseconds cannot tell apart, or that 64 bits of them hold only a few of.
+pub(crate) fn check_rate(rate_hz: f64) -> Result<()> {
+    if (1e-6..=1e9).contains(&rate_hz) {
+        return Ok(());
+    }
+    Err(Error::new(
+        ErrorKind::Config,
+        "expected a rate from 1e-6 to 1e9 frames/s: times are whole nanoseconds, up to 292 years",
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,5 +74,11 @@ mod tests {
         let late = Timestamp::from_ns(i64::MAX);
         assert!(late.seconds_since(Timestamp::from_ns(i64::MIN)) > 9e9);
         assert_eq!(Timestamp::from_ticks(i64::MAX, i64::MAX, 1), late);
+    }
+
+    #[test]
+    fn rates_that_nanoseconds_do_not_hold_are_refused() {
+        assert!([1e-6, 25.0, 1e9].iter().all(|r| check_rate(*r).is_ok()));
+        assert!([1e-12, 1.1e9, 1e12, f64::INFINITY, f64::NAN].iter().all(|r| check_rate(*r).is_err()));
     }
 }

@@ -76,7 +76,8 @@ pub fn score(clip: &Clip, sets: &[String], false_tracks_per_hour: Option<f64>) -
     let seen = Arc::new(Mutex::new(Reported::default()));
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&seen)))];
     let go_on = &mut |_: &boresight::pipeline::Summary| ControlFlow::Continue(());
-    let (summary, broken) = run(Input::Frames(Box::new(source), detector), Some(tracker), sinks, go_on)?;
+    let (summary, broken) =
+        run(Input::Frames(Box::new(source), detector), Some(tracker), sinks, go_on).all_written()?;
     if let Some(e) = broken {
         return Err(e.into());
     }

@@ -1,5 +1,6 @@
 //! `boresight completions`: shell completions and the manual page.
 
+use crate::console;
 use clap::{CommandFactory, ValueEnum};
 use std::process::ExitCode;
 
@@ -40,6 +41,6 @@ pub fn run<C: CommandFactory>(args: &Args) -> anyhow::Result<ExitCode> {
         Some(shell) => clap_complete::generate(shell, &mut command, "boresight", &mut out),
         None => clap_mangen::Man::new(command).render(&mut out)?,
     }
-    super::print(&out)?;
+    console::print(&out)?;
     Ok(ExitCode::SUCCESS)
 }

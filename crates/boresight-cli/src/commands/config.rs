@@ -1,5 +1,6 @@
 //! `boresight config`: prints, checks and explains configurations.
 
+use crate::console;
 use boresight::track::PRESETS;
 use boresight::{Config, Error, ErrorKind};
 use std::path::PathBuf;
@@ -45,7 +46,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     } else {
         Config::default().to_toml()?
     };
-    super::print(text.as_bytes())?;
+    console::print(text.as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }
 

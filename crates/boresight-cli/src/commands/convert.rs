@@ -1,6 +1,8 @@
 //! `boresight convert`: a table of tracks from one format into another, saying what is lost.
 
+use crate::console::{self, say};
 use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc_write, read, write};
+use boresight::io::{refuse_to_overwrite, write_whole};
 use boresight::{Error, ErrorKind};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,13 +51,16 @@ pub struct Args {
 /// # Errors
 /// An input that cannot be read; an output that cannot be written; a loss where none is allowed.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.output.as_os_str() != "-" {
+        refuse_to_overwrite(&args.input, [args.output.as_path()])?;
+    }
     let options = ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, frames_from_zero: args.from_zero };
     let file = read(&args.input, args.from, options, args.tentative)?;
     if let Some(first) = &file.bad.first {
-        eprintln!("note: {} malformed rows left out; the first: {first}", file.bad.count);
+        say!("note: {} malformed rows left out; the first: {first}", file.bad.count);
     }
     if file.bad.without_track > 0 {
-        eprintln!("note: {} rows belong to no track and were left out", file.bad.without_track);
+        say!("note: {} rows belong to no track and were left out", file.bad.without_track);
     }
     let mut bytes = Vec::new();
     let to_folder = args.to == Format::Ctc;
@@ -68,21 +73,23 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 .hint("without --lossless it is written without them")
                 .into());
         }
-        eprintln!("note: {what}");
+        say!("note: {what}");
     }
     let mot = |f: Format| matches!(f, Format::Mot | Format::MotTruth);
     if mot(file.format) && args.to == Format::Kitti || file.format == Format::Kitti && mot(args.to) {
-        eprintln!("note: classes keep their numbers: 1 is a car in KITTI and a pedestrian in MOTChallenge");
+        say!("note: classes keep their numbers: 1 is a car in KITTI and a pedestrian in MOTChallenge");
     }
     if args.output.as_os_str() == "-" {
-        super::print(&bytes)?;
+        console::print(&bytes)?;
         return Ok(ExitCode::SUCCESS);
     }
     if !to_folder {
-        std::fs::write(&args.output, &bytes)
-            .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(args.output.display()).because(e))?;
+        write_whole(&args.output, &bytes)?;
     }
-    eprintln!(
+    if file.table.n_rows() == 0 {
+        say!("warning: {}: the table has no rows", args.input.display());
+    }
+    say!(
         "{} rows of {} tracks in {} frames: {} -> {}",
         file.table.n_rows(),
         file.table.n_tracks(),

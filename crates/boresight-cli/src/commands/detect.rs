@@ -1,6 +1,7 @@
 //! `boresight detect`: frames in, detections out.
 
-use super::run_options::{self, InputArgs, TrackerArgs};
+use super::run_options::{self, InputArgs, Stop, TrackerArgs};
+use crate::console::say;
 use crate::progress;
 use boresight::io::DetectionsCsv;
 use boresight::io::Output;
@@ -24,24 +25,28 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
     let path = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "detections.csv"));
     let to_stdout = path.as_os_str() == "-";
+    if !to_stdout {
+        boresight::io::refuse_to_overwrite(&args.input.input, [path.as_path()])?;
+    }
+    let stop = Stop::on_signal()?;
+    let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
     if !args.input.quiet {
-        plan.reasons.iter().for_each(|r| eprintln!("  {r}"));
+        plan.reasons.iter().for_each(|r| say!("  {r}"));
     }
     let bar = progress::bar(plan.total(), "frames");
-    let stop = run_options::stop_on_signal()?;
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(sink)];
-    let (summary, broken) = pipeline::run(plan.input, None, sinks, &mut |so_far| {
+    stop.run_begins();
+    let done = pipeline::run(plan.input, None, sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
-        run_options::go_on(&stop)
-    })?;
+        stop.go_on()
+    });
     bar.finish_and_clear();
     if !args.input.quiet {
-        eprintln!("{} frames, {} detections", summary.frames, summary.detections);
-        summary.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+        say!("{} frames, {} detections", done.summary.frames, done.summary.detections);
     }
-    run_options::outcome(&summary, broken)
+    plan.lost.iter().chain(&done.summary.warnings).for_each(|w| say!("warning: {w}"));
+    run_options::outcome(&args.input.input, done)
 }

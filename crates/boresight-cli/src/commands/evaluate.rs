@@ -12,12 +12,13 @@ mod read;
 mod sequences;
 mod table;
 
+use crate::console::{self, say};
 use anyhow::{Context, bail};
 use boresight::metrics::evaluation::{self, Comparison, ResultEvaluation};
 use demand::met;
 use judged::Judged;
-use output::put;
 use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 pub use arguments::{Args, format, size};
@@ -29,6 +30,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.distance > 0.0 && args.distance.is_finite()) {
         bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
     }
+    refuse_inputs(&args)?;
     if images::are_frames(&args.truth) {
         return images::run(&args);
     }
@@ -40,7 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let evaluation = ResultEvaluation::new(result, sequences);
         let notes = named_notes(&evaluation, notes);
         for note in &notes {
-            eprintln!("note: {note}");
+            say!("note: {note}");
         }
         results.push(Judged { evaluation, notes });
     }
@@ -55,9 +57,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         text.push_str(&table::sequences(&judged.evaluation));
     }
     text.push_str(&table::comparison(&results, &comparison));
-    super::print(text.as_bytes())?;
-    write_files(&args, &results, &comparison)?;
+    let mut files = output::Files::default();
+    write_files(&args, &results, &comparison, &mut files)?;
+    files.take(console::print(text.as_bytes()).map(drop));
+    files.all_written()?;
     met(&args.require, &results[0].evaluation.values())
+}
+
+/// Refuses files of scores in the place of what is judged.
+fn refuse_inputs(args: &Args) -> boresight::Result<()> {
+    let outputs: Vec<&Path> = [&args.csv, &args.json, &args.html].into_iter().flatten().map(PathBuf::as_path).collect();
+    let inputs = [&args.truth, &args.result].into_iter().chain(&args.compare).chain(&args.detections);
+    inputs.into_iter().try_for_each(|i| boresight::io::refuse_to_overwrite(i, outputs.iter().copied()))
 }
 
 /// The notes of all sequences, with the sequence's name where there are several.
@@ -70,19 +81,24 @@ fn named_notes(evaluation: &ResultEvaluation, notes: Vec<Vec<String>>) -> Vec<St
     evaluation.sequences.iter().zip(notes).flat_map(named).collect()
 }
 
-fn write_files(args: &Args, results: &[Judged], comparison: &[Comparison]) -> anyhow::Result<()> {
+fn write_files(
+    args: &Args,
+    results: &[Judged],
+    comparison: &[Comparison],
+    files: &mut output::Files,
+) -> anyhow::Result<()> {
     if let Some(path) = &args.csv {
-        put(path, &table::csv(results))?;
+        files.put(path, &table::csv(results));
     }
     if let Some(path) = &args.json {
         let value = serde_json::json!({
             "results": results.iter().map(json::result).collect::<Vec<_>>(),
             "comparison": comparison,
         });
-        put(path, &serde_json::to_string_pretty(&value).context("scores as JSON")?)?;
+        files.put(path, &serde_json::to_string_pretty(&value).context("scores as JSON")?);
     }
     if let Some(path) = &args.html {
-        put(path, &html::report(results, comparison))?;
+        files.put(path, &html::report(results, comparison));
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 mod input;
 
+use crate::console::say;
 use boresight::fuse::{
     FuseConfig, PlaneMap, Registration, RegistrationConfig, Rule, SensorScans, Timeline, fuse_tables, merge_scans,
 };
@@ -109,6 +110,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let e = boresight::Error::new(boresight::ErrorKind::Config, "expected two numbers").at("--pivot");
         return Err(e.hint("--pivot 0,0 turns about the origin").into());
     }
+    refuse_inputs(&args)?;
     let config = args.config.as_deref().map(Config::from_file).transpose()?;
     let (a, b) = sensors(&args, config.as_ref())?;
     let wanted = |e| args.register.contains(&e);
@@ -139,7 +141,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (Some(_), Some(_)) => Level::Measurements,
         _ => Level::Tracks,
     });
-    fused.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    fused.warnings.iter().for_each(|w| say!("warning: {w}"));
     let frames = match (level, &a.scans, &b.scans) {
         (Level::Tracks, ..) => fused.frames,
         (Level::Measurements, Some(x), Some(y)) => together(&a, x, y, &fused.registration, config.as_ref())?,
@@ -151,12 +153,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let times: Vec<f64> = frames.iter().map(|(t, _)| *t).collect();
     let (numbers, own) = a.number(&times);
     if !own {
-        eprintln!(
-            "note: the times are not all frames of the first sensor: frames are numbered anew, compare by time_s"
-        );
+        say!("note: the times are not all frames of the first sensor: frames are numbered anew, compare by time_s");
     }
     write(&args.output, &frames, &numbers)?;
-    eprintln!(
+    say!(
         "{} + {} tracks, {} paired; {} at {} times: {}",
         a.tracks.len(),
         b.tracks.len(),
@@ -166,6 +166,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.output.display()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses an output in the place of a table, a map or the configuration.
+fn refuse_inputs(args: &Args) -> boresight::Result<()> {
+    let maps = [&args.map_a, &args.map_b].into_iter().flatten();
+    let maps = maps.map(|m| Path::new(m.split_once(':').map_or(m.as_str(), |(_, points)| points)));
+    let mut inputs = [&args.a, &args.b].into_iter().chain(&args.config).map(PathBuf::as_path).chain(maps);
+    inputs.try_for_each(|i| boresight::io::refuse_to_overwrite(i, [args.output.as_path()]))
 }
 
 /// Reads both sensors into the common frame.
@@ -226,7 +234,7 @@ fn write(path: &Path, frames: &[(f64, Vec<TrackState>)], numbers: &[u64]) -> bor
 }
 
 fn say_registration(r: &Registration) {
-    eprintln!(
+    say!(
         "registration from {} common points: offset ({:.3} ± {:.3}, {:.3} ± {:.3}) px, rotation {:.5} ± {:.5} rad about ({:.1}, {:.1}), second clock ahead by {:.4} ± {:.4} s; mean d² {:.2} -> {:.2}",
         r.n_points,
         r.offset_px[0],

@@ -1,6 +1,8 @@
 //! `boresight reproduce`: the papers' tables and figures, side by side with ours.
 
+use crate::console::{self, say};
 use crate::progress;
+use boresight::io::write_whole;
 use boresight::{Error, ErrorKind};
 use boresight_reproduce::{ITEMS, Item, Options, Output, html};
 use std::fmt::Write;
@@ -35,7 +37,7 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.list {
         let text: String = ITEMS.iter().map(|i| format!("{:12} {}\n", i.name, i.what)).collect();
-        super::print(text.as_bytes())?;
+        console::print(text.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
     if args.runs == 0 {
@@ -57,21 +59,29 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(Some(total), "runs");
     let tick = |n| bar.inc(n);
     let options = Options { runs: args.runs, seed: args.seed, progress: &tick };
-    let mut outputs = Vec::new();
+    let (mut outputs, mut printed) = (Vec::new(), Ok(()));
     for item in chosen {
         bar.set_message(item.name);
         let output = (item.make)(&options)?;
-        bar.suspend(|| super::print(text(&output).as_bytes()))?;
+        // Numbers that cannot be shown are not lost if they go to a folder as well.
+        let shown = bar.suspend(|| console::print(text(&output).as_bytes()));
+        if args.output.is_some() {
+            printed = printed.and(shown.map(drop));
+        } else if !shown? {
+            break;
+        }
         outputs.push(output);
     }
     bar.finish_and_clear();
     if let Some(dir) = &args.output {
         let fail = |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").at(dir.display()).because(e);
         std::fs::create_dir_all(dir).map_err(fail)?;
-        std::fs::write(dir.join("index.html"), html::page(&outputs, args.runs, args.seed)).map_err(fail)?;
-        std::fs::write(dir.join("reproduce.json"), serde_json::to_string_pretty(&outputs)?).map_err(fail)?;
-        eprintln!("report: {}", dir.join("index.html").display());
+        let page = write_whole(dir.join("index.html"), html::page(&outputs, args.runs, args.seed).as_bytes());
+        let numbers = write_whole(dir.join("reproduce.json"), serde_json::to_string_pretty(&outputs)?.as_bytes());
+        page.and(numbers)?;
+        say!("report: {}", dir.join("index.html").display());
     }
+    printed?;
     Ok(ExitCode::SUCCESS)
 }
 

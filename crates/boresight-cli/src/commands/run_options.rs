@@ -1,9 +1,10 @@
 //! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
 
+use crate::console::say;
 use anyhow::Context;
 use boresight::FrameSource as _;
 use boresight::auto;
-use boresight::pipeline::{Input, Summary};
+use boresight::pipeline::{Input, Outcome};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,10 @@ pub struct InputArgs {
     /// Leave out rows of a table that cannot be read, and count them.
     #[arg(long)]
     pub skip_bad_rows: bool,
-    /// Print nothing but errors.
+    /// Memory that reading one picture may take, MB; half of the machine's if absent.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
+    pub max_memory: Option<u64>,
+    /// Print nothing but errors, and what is lost of the input.
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -67,6 +71,8 @@ pub struct Plan {
     pub config: Config,
     /// Why it is what it is.
     pub reasons: Vec<String>,
+    /// What is lost of the input already; the source tells the rest.
+    pub lost: Vec<String>,
     /// What is known of the source.
     pub info: Option<boresight::SourceInfo>,
     n_scans: Option<u64>,
@@ -81,6 +87,9 @@ impl Plan {
 
 /// Opens the input and settles the configuration.
 pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
+    if let Some(mb) = args.max_memory {
+        boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
+    }
     let given = args.config.as_deref().map(Config::from_file).transpose()?;
     let mut base = given.clone().unwrap_or_default();
     if let Some(rate) = args.rate_hz {
@@ -100,7 +109,8 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         let detector = vision::build(&config.detector, &info)?;
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
-        return Ok(Plan { input: Input::Frames(source, detector), config, reasons, info: Some(info), n_scans: None });
+        let input = Input::Frames(source, detector);
+        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None });
     }
     let (mut source, mut choice) = auto::open_and_choose(&args.input, &base)?;
     let info = source.info().clone();
@@ -110,7 +120,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan { input, config, reasons, info: Some(info), n_scans: None })
+    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None })
 }
 
 /// A sentence that names the detector's keys that are set in vain.
@@ -151,6 +161,11 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     options.rate_hz = args.rate_hz.or(options.rate_hz);
     options.skip_bad_rows |= args.skip_bad_rows;
     let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
+    if table.scans.is_empty() {
+        return Err(Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track")
+            .at(&args.input)
+            .into());
+    }
     let mut reasons = vec![format!(
         "{} detections in {} frames at {} frames/s, read as {}.",
         table.n_rows - table.n_skipped,
@@ -158,7 +173,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
         table.rate_hz,
         table.format
     )];
-    reasons.extend(table.warnings.iter().cloned());
+    reasons.extend(table.warnings.iter().filter(|w| !table.lost.contains(w)).cloned());
     let mut config = base;
     match given {
         Some(_) => reasons.push("Configuration as given.".to_string()),
@@ -171,7 +186,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     }
     config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);
-    Ok(Plan { input: Input::Scans(table.scans), config, reasons, info: None, n_scans })
+    Ok(Plan { input: Input::Scans(table.scans), config, reasons, lost: table.lost, info: None, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.
@@ -185,62 +200,63 @@ pub fn default_folder(input: &str, ending: &str) -> PathBuf {
     PathBuf::from(format!("{name}.{ending}"))
 }
 
-/// Makes the results' folder.
-pub fn make_folder(dir: &Path) -> anyhow::Result<()> {
-    if dir.as_os_str() == "-" {
-        return Err(Error::new(ErrorKind::Config, "expected a folder: the results are several files")
-            .at("--output -")
-            .hint("give a folder; `boresight detect INPUT -o -` writes a table to standard output")
-            .into());
+/// What Ctrl-C and a polite kill do: before a run nothing is written yet, so they end the command at once; a run ends behind its
+/// frame and keeps its results; a second signal ends it at once.
+pub struct Stop {
+    raised: Arc<AtomicBool>,
+    running: Arc<AtomicBool>,
+}
+
+impl Stop {
+    /// Takes the signals.
+    /// # Errors
+    /// A system that lets no signal be taken.
+    pub fn on_signal() -> anyhow::Result<Self> {
+        let stop = Self { raised: Arc::default(), running: Arc::default() };
+        let (raised, running) = (Arc::clone(&stop.raised), Arc::clone(&stop.running));
+        ctrlc::set_handler(move || {
+            if raised.swap(true, Ordering::SeqCst) || !running.load(Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+        })
+        .context("no handler for Ctrl-C could be set")?;
+        Ok(stop)
     }
-    std::fs::create_dir_all(dir).map_err(|e| {
-        Error::new(ErrorKind::Output, "the folder for the results cannot be made")
-            .at(dir.display())
-            .because(e)
-            .hint("choose another with --output DIR")
-    })?;
-    Ok(())
-}
 
-/// Writes the configuration with its reasons as comments.
-pub fn write_config(dir: &Path, plan: &Plan) -> anyhow::Result<()> {
-    let mut text =
-        String::from("# The configuration of this run; `--config` with this file gives the identical result.\n");
-    for reason in &plan.reasons {
-        text.push_str(&format!("# {}\n", reason.replace('\n', " ")));
+    /// The run begins: from now on there are results to keep.
+    pub fn run_begins(&self) {
+        self.running.store(true, Ordering::SeqCst);
     }
-    text.push('\n');
-    text.push_str(&plan.config.to_toml()?);
-    let path = dir.join("config.toml");
-    std::fs::write(&path, text)
-        .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
-    Ok(())
-}
 
-/// A flag that Ctrl-C and a polite kill raise; the second signal ends the process at once.
-pub fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
-        }
-    })
-    .context("no handler for Ctrl-C could be set")?;
-    Ok(stop)
-}
-
-/// Whether the run goes on.
-pub fn go_on(stop: &AtomicBool) -> ControlFlow<()> {
-    if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-}
-
-/// The exit code of a run, and the error that broke it off.
-pub fn outcome(summary: &Summary, broken: Option<Error>) -> anyhow::Result<ExitCode> {
-    if let Some(e) = broken {
-        return Err(e.hint(format!("the {} frames before it are in the results", summary.frames)).into());
+    /// Whether the run goes on.
+    pub fn go_on(&self) -> ControlFlow<()> {
+        if self.raised.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
-    Ok(if summary.interrupted { ExitCode::from(130) } else { ExitCode::SUCCESS })
+}
+
+/// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
+/// # Errors
+/// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.
+pub fn outcome(input: &str, done: Outcome) -> anyhow::Result<ExitCode> {
+    let Outcome { summary, broken, unwritten } = done;
+    let kept = match summary.frames {
+        0 => "nothing is written; what an earlier run wrote stays".to_string(),
+        1 => "the frame before it is in the results".to_string(),
+        n => format!("the {n} frames before it are in the results"),
+    };
+    let mut errors: Vec<Error> = unwritten;
+    errors.extend(broken.map(|e| e.hint(&kept)));
+    if errors.is_empty() && summary.frames == 0 && !summary.interrupted {
+        errors.push(Error::new(ErrorKind::Damaged, "holds no frames").at(input).hint(kept));
+    }
+    let mut errors = errors.into_iter();
+    let Some(first) = errors.next() else {
+        return Ok(if summary.interrupted { ExitCode::from(130) } else { ExitCode::SUCCESS });
+    };
+    for other in errors {
+        say!("error: {other}");
+    }
+    Err(first.into())
 }
 
 #[cfg(test)]
@@ -256,6 +272,7 @@ mod tests {
             rate_hz: None,
             columns: None,
             skip_bad_rows: false,
+            max_memory: None,
             quiet: true,
         };
         let associator = |name: &str| TrackerArgs { associator: Some(name.into()), ..TrackerArgs::default() };

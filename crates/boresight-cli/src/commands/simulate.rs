@@ -3,10 +3,12 @@
 mod config;
 mod plots;
 
+use crate::console::{self, say};
 use crate::frame_writer::{FrameFormat, FrameWriter};
 use crate::progress;
-use boresight::io::Output;
-use boresight::io::{TableOptions, TracksCsv, mot_box_of_extent, read_tracks};
+use boresight::io::{
+    Output, TableOptions, TracksCsv, mot_box_of_extent, read_tracks, refuse_to_overwrite, write_whole,
+};
 use boresight::sim::{SceneConfig, SceneSource, Seed, named, scene::Background};
 use boresight::{Error, ErrorKind, FrameSource, Scan, Sink, View};
 use std::fmt::Write as _;
@@ -64,7 +66,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         scene.n_frames = n;
     }
     if args.print {
-        super::print(toml::to_string(&scene)?.as_bytes())?;
+        console::print(toml::to_string(&scene)?.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut source = build(&scene, seed)?;
@@ -78,15 +80,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let dir = &args.output;
+    refuse_inputs(&args, &scene)?;
+    // A folder is one scene: what another one left under these names goes when this one is whole.
+    let earlier = dir.join("scene.toml").is_file();
     std::fs::create_dir_all(dir)
         .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(dir.display()).because(e))?;
-    let write = |name: &str, text: &str| {
-        let path = dir.join(name);
-        std::fs::write(&path, text)
-            .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))
-    };
-    let mut frames = FrameWriter::create(dir, args.format, source.info())?;
+    let write = |name: &str, text: &str| write_whole(dir.join(name), text.as_bytes());
     let mut truth = TracksCsv::to(Output::file(dir.join("truth.csv"))?)?;
+    let mut frames = FrameWriter::create(dir, args.format, source.info())?;
     let mut radars = plots::Radars::create(dir, &scene.radars, seed)?;
     let (mut gt, mut times) = (String::new(), String::from("frame,time_s\n"));
     let bar = progress::bar(Some(scene.n_frames), "frames");
@@ -114,12 +115,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(config) = config::for_scene(&args.scene, &scene) {
         write("track.toml", &config.to_toml()?)?;
         written.push("track.toml".into());
+    } else if earlier {
+        let _ = std::fs::remove_file(dir.join("track.toml"));
+    }
+    if earlier {
+        FrameWriter::remove_others(dir, args.format);
     }
     written.push("scene.toml".into());
     write("gt.txt", &gt)?;
     write("frames.csv", &times)?;
     write("scene.toml", &toml::to_string(&scene)?)?;
-    eprintln!(
+    say!(
         "{}: {n_frames} frames of {} x {} px at {} frames/s, {n_boxes} truth positions, seed {} run {}\n  {}",
         args.scene,
         source.info().width,
@@ -132,6 +138,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Refuses files of the scene in the place of what it is made from.
+fn refuse_inputs(args: &Args, scene: &SceneConfig) -> boresight::Result<()> {
+    const NAMES: [&str; 7] = ["frames", "frames.y4m", "truth.csv", "gt.txt", "frames.csv", "track.toml", "scene.toml"];
+    let radars = scene.radars.iter().flat_map(|r| plots::names(&r.name));
+    let outputs: Vec<PathBuf> =
+        NAMES.map(String::from).into_iter().chain(radars).map(|n| args.output.join(n)).collect();
+    let mut inputs = vec![PathBuf::from(&args.scene)];
+    inputs.extend(args.radars.clone());
+    if let Background::File(path) = &scene.background {
+        inputs.push(path.into());
+    }
+    inputs.iter().try_for_each(|i| refuse_to_overwrite(i, outputs.iter().map(PathBuf::as_path)))
+}
+
 /// Radars that look at a table of tracks.
 fn on_tracks(args: &Args, seed: Seed) -> anyhow::Result<ExitCode> {
     let Some(file) = &args.radars else {
@@ -139,15 +159,21 @@ fn on_tracks(args: &Args, seed: Seed) -> anyhow::Result<ExitCode> {
         return Err(e.hint("give --radars FILE with [[radars]]; docs/simulate.md shows one").into());
     };
     let table = read_tracks(&args.scene, &TableOptions::default())?;
-    table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", args.scene));
+    table.warnings.iter().for_each(|w| say!("warning: {}: {w}", args.scene));
     std::fs::create_dir_all(&args.output)
         .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(args.output.display()).because(e))?;
-    let mut radars = plots::Radars::create(&args.output, &plots::read_radars(file)?, seed)?;
+    let configs = plots::read_radars(file)?;
+    let outputs: Vec<PathBuf> =
+        configs.iter().flat_map(|r| plots::names(&r.name)).map(|n| args.output.join(n)).collect();
+    for input in [Path::new(&args.scene), file] {
+        refuse_to_overwrite(input, outputs.iter().map(PathBuf::as_path))?;
+    }
+    let mut radars = plots::Radars::create(&args.output, &configs, seed)?;
     for frame in &table.frames {
         radars.see(frame.time.as_secs_f64(), &frame.tracks)?;
     }
     for name in radars.finish()? {
-        eprintln!("{}", args.output.join(name).display());
+        say!("{}", args.output.join(name).display());
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
-use boresight::io::{TableOptions, TracksCsv, read_tracks};
+use crate::console::say;
+use boresight::io::{TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod};
 use boresight::track::{AccelerationNoise, smooth_table};
 use boresight::{Config, Scan, Sink, View};
@@ -69,12 +70,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         skip_bad_rows: args.skip_bad_rows,
         ..TableOptions::default()
     };
+    refuse_to_overwrite(&args.tracks, [args.output.as_path()])?;
     let table = read_tracks(&args.tracks, &options)?;
-    table.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+    table.warnings.iter().for_each(|w| say!("warning: {w}"));
+    if table.frames.is_empty() {
+        say!("warning: {}: the table has no rows", args.tracks.display());
+    }
     let own = table.has_states;
     let config = settings(&args, own)?;
     if !own {
-        eprintln!("rows are positions of deviation {} px where the table has none: filtered first", args.std_px);
+        say!("rows are positions of deviation {} px where the table has none: filtered first", args.std_px);
     }
     let done = smooth_table(&table.frames, &config, (!own).then_some(args.speed_std), args.fill)
         .map_err(|e| e.at(args.tracks.display()))?;
@@ -84,7 +89,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         out.put(&View { frame: None, scan: &scan, tracks: &frame.tracks })?;
     }
     Box::new(out).finish()?;
-    eprintln!(
+    say!(
         "{} tracks, {} rows ({} filled in): median deviation of a position {:.3} -> {:.3} px: {}",
         done.n_tracks,
         done.n_rows,
@@ -108,14 +113,14 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
         let tracker = Config::from_file(&beside)?.tracker;
         config.acceleration = tracker.acceleration_noise(0.0);
         config.density_per_height2_per_s3 = tracker.acceleration_density_per_height2_per_s3;
-        eprintln!("{}, from {}", config.acceleration, beside.display());
+        say!("{}, from {}", config.acceleration, beside.display());
         if !tracker.filter.is_constant_velocity() {
-            eprintln!(
+            say!(
                 "note: these tracks are of another model than constant velocity; their covariances become approximate"
             );
         }
     } else {
-        eprintln!("{}, the tracker's default (--acceleration-density)", config.acceleration);
+        say!("{}, the tracker's default (--acceleration-density)", config.acceleration);
     }
     config.method = match (args.lag, args.method) {
         (Some(lag), _) => SmoothMethod::FixedLag(lag),

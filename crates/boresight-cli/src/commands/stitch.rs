@@ -1,6 +1,7 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
-use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks};
+use crate::console::say;
+use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::{AccelerationNoise, StitchConfig, join, with_empty_frames};
 use boresight::{Scan, Sink, View};
 use std::path::PathBuf;
@@ -60,8 +61,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         gate_probability: args.gate_probability,
     };
     config.validate("stitch")?;
+    refuse_to_overwrite(&args.tracks, [args.output.as_path()])?;
     let table = read_tracks(&args.tracks, &TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() })?;
-    table.warnings.iter().for_each(|w| eprintln!("warning: {}: {w}", args.tracks.display()));
+    table.warnings.iter().for_each(|w| say!("warning: {}: {w}", args.tracks.display()));
+    if table.frames.is_empty() {
+        say!("warning: {}: the table has no rows", args.tracks.display());
+    }
     // Frames without any track have no rows in a table; a gap needs them.
     let mut scans =
         if args.smooth { with_empty_frames(table.frames, args.max_gap, table.rate_hz) } else { table.frames };
@@ -77,9 +82,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     out.finish()?;
     if done.filtered {
-        eprintln!("the table has no velocities: its positions were filtered first");
+        say!("the table has no velocities: its positions were filtered first");
     }
-    eprintln!(
+    say!(
         "{} tracks -> {} ({} joined), {} rows filled, {} coasting rows dropped: {}",
         done.before,
         done.after,

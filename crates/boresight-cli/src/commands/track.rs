@@ -1,10 +1,12 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
-use super::run_options::{self, InputArgs, Plan, TrackerArgs};
+use super::run_folder::RunFolder;
+use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
+use crate::console::say;
 use crate::progress;
 use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
 use boresight::io::video::Mp4Options;
-use boresight::pipeline::{self, Input, Summary};
+use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
 use boresight::{Sink, track};
 use std::path::PathBuf;
@@ -54,61 +56,93 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let input = args.input.input.as_str();
+    let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
+    let mut folder = RunFolder::new(dir, made(&args), input)?;
+    let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &args.tracker)?;
-    let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "tracks"));
-    run_options::make_folder(&dir)?;
+    if matches!(plan.input, Input::Scans(..)) {
+        folder.leave_out(&["annotated.mp4", "frames/"]);
+    }
+    folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
-    let mut report = (!args.no_report).then(|| HtmlReport::create(dir.join("report.html"))).transpose()?;
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&args, &plan, &dir)?;
+    let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
     let mut notes = notes(&args, &plan)?;
-    run_options::write_config(&dir, &plan)?;
+    let config = folder.begin_config(&plan, input)?;
     let quiet = args.input.quiet;
     if !quiet {
-        for reason in &plan.reasons {
-            eprintln!("  {reason}");
-        }
+        plan.reasons.iter().for_each(|r| say!("  {r}"));
     }
     let bar = progress::bar(plan.total(), "frames");
-    let stop = run_options::stop_on_signal()?;
     let started = std::time::Instant::now();
-    let (summary, broken) = pipeline::run(plan.input, Some(tracking), sinks, &mut |so_far| {
+    stop.run_begins();
+    let mut done = pipeline::run(plan.input, Some(tracking), sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
-        run_options::go_on(&stop)
-    })?;
+        stop.go_on()
+    });
     bar.finish_and_clear();
-    if let Some(report) = report {
-        add_outcome(&mut notes, &summary, broken.as_ref());
-        report.write(&notes)?;
+    let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
+    if done.summary.frames > 0 {
+        notes.warnings = warnings.clone();
+        add_outcome(&mut notes, &done);
+        if let Some(report) = report {
+            done.unwritten.extend(report.write(&notes).err());
+        }
+        match config.finish(&notes.warnings) {
+            Ok(left_over) if done.unwritten.is_empty() => left_over.remove(),
+            Ok(_) => {}
+            Err(e) => done.unwritten.push(e),
+        }
     }
     if !quiet {
-        print_summary(&summary, started.elapsed().as_secs_f64(), &dir);
+        print_summary(&done.summary, started.elapsed().as_secs_f64());
     }
-    run_options::outcome(&summary, broken)
+    warnings.iter().for_each(|w| say!("warning: {w}"));
+    if !quiet && done.summary.frames > 0 {
+        say!("results: {}", folder.dir().display());
+    }
+    run_options::outcome(input, done)
 }
 
-fn sinks(args: &Args, plan: &Plan, dir: &std::path::Path) -> boresight::Result<Vec<Box<dyn Sink>>> {
+/// The files that a run with frames makes.
+fn made(args: &Args) -> Vec<&'static str> {
+    let asked = [
+        ("tracks.csv", true),
+        ("detections.csv", true),
+        ("mot.txt", true),
+        ("tracks.jsonl", args.json),
+        ("camera.csv", args.camera),
+        ("annotated.mp4", !args.no_video),
+        ("frames/", args.png),
+        ("report.html", !args.no_report),
+        ("config.toml", true),
+    ];
+    asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).collect()
+}
+
+fn sinks(folder: &RunFolder) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let mut sinks: Vec<Box<dyn Sink>> = vec![
-        Box::new(TracksCsv::create(dir.join("tracks.csv"))?),
-        Box::new(DetectionsCsv::create(dir.join("detections.csv"))?),
-        Box::new(MotWriter::create(dir.join("mot.txt"))?),
+        Box::new(TracksCsv::create(folder.path("tracks.csv"))?),
+        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?),
+        Box::new(MotWriter::create(folder.path("mot.txt"))?),
     ];
-    if args.json {
-        sinks.push(Box::new(JsonLines::create(dir.join("tracks.jsonl"))?));
+    if folder.makes("tracks.jsonl") {
+        sinks.push(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?));
     }
-    if args.camera {
-        sinks.push(Box::new(CameraCsv::create(dir.join("camera.csv"))?));
+    if folder.makes("camera.csv") {
+        sinks.push(Box::new(CameraCsv::create(folder.path("camera.csv"))?));
     }
-    let pictures = matches!(plan.input, Input::Frames(..));
-    if pictures && !args.no_video {
-        let path = dir.join("annotated.mp4");
+    if folder.makes("annotated.mp4") {
+        let path = folder.path("annotated.mp4");
         sinks.push(Box::new(AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?));
     }
-    if pictures && args.png {
-        sinks.push(Box::new(PngFolder::create(dir.join("frames"), DrawOptions::default())?));
+    if folder.makes("frames/") {
+        sinks.push(Box::new(PngFolder::create(folder.path("frames/"), DrawOptions::default())?));
     }
     Ok(sinks)
 }
@@ -131,17 +165,15 @@ fn notes(args: &Args, plan: &Plan) -> anyhow::Result<Notes> {
 }
 
 /// Adds what is known only at the end.
-fn add_outcome(notes: &mut Notes, summary: &Summary, broken: Option<&boresight::Error>) {
-    let t = &summary.times;
-    let stages = [("read", t.read), ("detect", t.detect), ("track", t.track), ("write", t.write)];
-    notes.stages = stages.map(|(name, time)| (name.to_string(), time.as_secs_f64())).to_vec();
-    notes.warnings.extend(summary.warnings.iter().cloned());
-    if let Some(error) = broken {
+fn add_outcome(notes: &mut Notes, done: &Outcome) {
+    // The times of the stages are said, not written: the same input gives the same report.
+    if let Some(error) = &done.broken {
         notes.warnings.push(format!("The input broke off: {error}"));
     }
-    if summary.interrupted {
+    if done.summary.interrupted {
         notes.warnings.push("The run was interrupted; the results end there.".to_string());
     }
+    notes.warnings.extend(done.unwritten.iter().map(|e| format!("An output is missing: {e}")));
 }
 
 /// A number with its thing, in the plural where it is not one.
@@ -150,9 +182,9 @@ fn counted(n: u64, thing: &str) -> String {
 }
 
 /// The summary on the terminal.
-fn print_summary(s: &Summary, wall_s: f64, dir: &std::path::Path) {
+fn print_summary(s: &Summary, wall_s: f64) {
     let per_frame = |d: std::time::Duration| 1e3 * d.as_secs_f64() / s.frames.max(1) as f64;
-    eprintln!(
+    say!(
         "{} ({:.1} s), {}, {} (at most {} at once)",
         counted(s.frames, "frame"),
         s.duration_s,
@@ -161,9 +193,9 @@ fn print_summary(s: &Summary, wall_s: f64, dir: &std::path::Path) {
         s.most_at_once
     );
     if let Some((nis, n)) = s.mean_nis {
-        eprintln!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");
+        say!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");
     }
-    eprintln!(
+    say!(
         "{:.1} frames/s; a frame took {:.2} ms to read, {:.2} to detect, {:.2} to track, {:.2} to write",
         s.frames as f64 / wall_s.max(1e-9),
         per_frame(s.times.read),
@@ -171,8 +203,4 @@ fn print_summary(s: &Summary, wall_s: f64, dir: &std::path::Path) {
         per_frame(s.times.track),
         per_frame(s.times.write)
     );
-    for w in &s.warnings {
-        eprintln!("warning: {w}");
-    }
-    eprintln!("results: {}", dir.display());
 }

@@ -5,6 +5,9 @@ mod detect;
 mod exit_codes;
 mod help;
 mod interrupt;
+mod loss;
+mod outputs;
+mod streams;
 mod track;
 
 use std::collections::HashMap;

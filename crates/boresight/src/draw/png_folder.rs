@@ -2,16 +2,17 @@
 
 use super::annotate::{Annotator, DrawOptions};
 use super::canvas::Rgb;
-use crate::io::AtomicFile;
+use crate::io::{AtomicFile, AtomicFolder, remove_folder};
 use crate::{Error, ErrorKind, Image, Result, Sink, View};
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a folder of PNG files, `frame_000000.png` and so on, numbered as the frames are.
 ///
-/// Every file appears whole; those of an earlier run are overwritten one by one.
+/// The folder appears at the end, whole; frames of an earlier run in it go then, other files stay.
 pub struct PngFolder {
-    folder: PathBuf,
+    folder: AtomicFolder,
     annotator: Annotator,
     picture: Image<Rgb>,
 }
@@ -19,46 +20,63 @@ pub struct PngFolder {
 opaque_debug!(PngFolder);
 
 impl PngFolder {
-    /// Makes the folder.
+    /// Begins the folder.
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be made, [`ErrorKind::Config`] if an option is out of range.
     pub fn create(folder: impl Into<PathBuf>, draw: DrawOptions) -> Result<Self> {
-        let folder = folder.into();
-        std::fs::create_dir_all(&folder)
-            .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(folder.display()).because(e))?;
-        Ok(Self { folder, annotator: Annotator::new(draw)?, picture: Image::default() })
+        let annotator = Annotator::new(draw)?;
+        Ok(Self { folder: AtomicFolder::create(folder, is_frame)?, annotator, picture: Image::default() })
     }
+
+    /// Removes the frames of an earlier run, and the folder if nothing else is in it.
+    pub fn remove(folder: &Path) {
+        remove_folder(folder, is_frame);
+    }
+}
+
+/// Whether a file has the name of a frame.
+fn is_frame(name: &str) -> bool {
+    let number = name.strip_prefix("frame_").and_then(|n| n.strip_suffix(".png"));
+    number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 impl Sink for PngFolder {
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         self.annotator.draw(view, &mut self.picture)?;
-        let path = self.folder.join(format!("frame_{:06}.png", view.scan.index.0));
-        write_png(&path, &self.picture)
+        let path = self.folder.part_path().join(format!("frame_{:06}.png", view.scan.index.0));
+        let mut file = BufWriter::new(File::create(&path).map_err(|e| failed(&path, &e))?);
+        encode(&mut file, &self.picture).and_then(|()| Ok(file.flush()?)).map_err(|e| failed(&path, &e))
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        Ok(())
+        self.folder.finish()
     }
+}
+
+fn failed(path: &Path, e: &dyn std::fmt::Display) -> Error {
+    Error::new(ErrorKind::Output, format!("cannot be written: {e}")).at(path.display())
 }
 
 /// Writes one RGB picture as PNG; the file appears whole.
 /// # Errors
 /// [`ErrorKind::Output`] if it cannot be written.
 pub fn write_png(path: &Path, picture: &Image<Rgb>) -> Result<()> {
-    let failed = |e: String| Error::new(ErrorKind::Output, format!("cannot be written: {e}")).at(path.display());
-    let side = |n: usize| u32::try_from(n).map_err(|e| failed(e.to_string()));
     let mut file = AtomicFile::create(path)?;
-    let mut encoder =
-        png::Encoder::new(std::io::BufWriter::new(&mut file), side(picture.width())?, side(picture.height())?);
+    let mut out = BufWriter::new(&mut file);
+    encode(&mut out, picture).and_then(|()| Ok(out.flush()?)).map_err(|e| failed(path, &e))?;
+    drop(out);
+    file.finish()
+}
+
+fn encode(out: &mut impl Write, picture: &Image<Rgb>) -> std::result::Result<(), png::EncodingError> {
+    let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
+    let mut encoder = png::Encoder::new(out, side(picture.width())?, side(picture.height())?);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
-    let mut writer = encoder.write_header().map_err(|e| failed(e.to_string()))?;
-    writer.write_image_data(picture.as_slice().as_flattened()).map_err(|e| failed(e.to_string()))?;
-    writer.finish().map_err(|e| failed(e.to_string()))?;
-    file.flush().map_err(|e| failed(e.to_string()))?;
-    file.finish()
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(picture.as_slice().as_flattened())?;
+    writer.finish()
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Files that appear whole: written beside under `NAME.part`, renamed at the end.
 //!
 //! A run that is killed leaves nothing under the final name, and under `NAME.part` all that was written up to the last
-//! whole frame (the text writers hand over whole frames, each in one write). The part file is locked while it is
-//! written, so that two runs cannot mix their lines in it.
+//! whole frame (the text writers hand over whole frames, each in one write). A writer that fails is dropped unfinished: its part
+//! goes, and what stood under the final name stays. The part file is locked while it is written, so that two runs cannot mix their
+//! lines in it.
 //! Why not `tempfile`: what it keeps has a random name, and a killed run's table must be found; it neither locks, nor follows a
 //! link to the file that is to be replaced, nor refuses to replace a device.
 
@@ -17,7 +18,6 @@ pub struct AtomicFile {
     file: File,
     path: PathBuf,
     part: PathBuf,
-    keep_part: bool,
     finished: bool,
 }
 
@@ -28,10 +28,13 @@ impl AtomicFile {
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let mut path = path.into();
         // A link keeps pointing where it points: its target is replaced, not the link.
-        if path.is_symlink()
-            && let Ok(target) = path.canonicalize()
-        {
-            path = target;
+        if path.is_symlink() {
+            path = path.canonicalize().map_err(|e| {
+                Error::new(ErrorKind::Output, "is a link that leads nowhere, or in a circle")
+                    .at(path.display())
+                    .because(e)
+                    .hint("remove the link, or make what it points to")
+            })?;
         }
         if is_special(&path) {
             return Err(Error::new(ErrorKind::Output, "is a device or a pipe, which a file must not replace")
@@ -58,14 +61,7 @@ impl AtomicFile {
             }
         }
         file.set_len(0).map_err(failed)?;
-        Ok(Self { file, path, part, keep_part: false, finished: false })
-    }
-
-    /// Keeps the part file if the writer is dropped unfinished: for tables, whose whole lines can be read.
-    #[must_use]
-    pub fn keep_part(mut self) -> Self {
-        self.keep_part = true;
-        self
+        Ok(Self { file, path, part, finished: false })
     }
 
     /// The final name.
@@ -108,7 +104,7 @@ impl Seek for AtomicFile {
 
 impl Drop for AtomicFile {
     fn drop(&mut self) {
-        if !self.finished && !self.keep_part {
+        if !self.finished {
             // Nothing can be done about a failure here, and an old part file harms nobody.
             let _ = std::fs::remove_file(&self.part);
         }
@@ -131,8 +127,7 @@ pub enum Output {
 opaque_debug!(Output);
 
 impl Output {
-    /// A file that appears whole; unfinished, its lines stay readable under `path.part`. A device or a pipe gets the lines
-    /// as they come.
+    /// A file that appears whole. A device or a pipe gets the lines as they come.
     /// # Errors
     /// As [`AtomicFile::create`].
     pub fn file(path: impl Into<PathBuf>) -> Result<Self> {
@@ -142,7 +137,7 @@ impl Output {
             let failed = |e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e);
             return Ok(Self::Stream(Box::new(device.map_err(failed)?)));
         }
-        Ok(Self::File(AtomicFile::create(path)?.keep_part()))
+        Ok(Self::File(AtomicFile::create(path)?))
     }
 
     /// Standard output.
@@ -172,6 +167,15 @@ impl Output {
     }
 }
 
+/// Writes a whole file: it appears under its name when it is whole, or not at all. A device or a pipe gets the bytes as they are.
+/// # Errors
+/// [`ErrorKind::Output`] if it cannot be written.
+pub fn write_whole(path: impl Into<PathBuf>, bytes: &[u8]) -> Result<()> {
+    let mut output = Output::file(path)?;
+    output.put(bytes)?;
+    output.finish()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,13 +194,15 @@ mod tests {
     }
 
     #[test]
-    fn an_unfinished_file_goes_unless_its_part_is_worth_keeping() {
+    fn an_unfinished_file_goes_and_the_earlier_one_stays() {
         let dir = tempfile::tempdir().unwrap();
-        drop(AtomicFile::create(dir.path().join("a.png")).unwrap());
-        assert!(!dir.path().join("a.png.part").exists());
-        drop(AtomicFile::create(dir.path().join("b.csv")).unwrap().keep_part());
-        assert!(dir.path().join("b.csv.part").exists());
-        assert!(!dir.path().join("b.csv").exists());
+        let path = dir.path().join("b.csv");
+        write_whole(&path, b"earlier").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"half").unwrap();
+        drop(file);
+        assert_eq!(std::fs::read(&path).unwrap(), b"earlier");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[test]
@@ -239,5 +245,8 @@ mod tests {
         file.finish().unwrap();
         assert!(link.is_symlink());
         assert_eq!(std::fs::read(&target).unwrap(), b"new");
+        let circle = dir.path().join("c.csv");
+        std::os::unix::fs::symlink(&circle, &circle).unwrap();
+        assert!(AtomicFile::create(&circle).unwrap_err().to_string().contains("in a circle"));
     }
 }

@@ -31,6 +31,8 @@ pub struct ImageFiles {
     n_given: u64,
     /// Numbers in the files' names, if they have holes.
     numbering: Option<Numbering>,
+    /// Place of the newest frame in the full sequence.
+    place: u64,
     options: OpenOptions,
     bytes: Vec<u8>,
     warnings: Vec<String>,
@@ -65,6 +67,7 @@ impl ImageFiles {
             first_file,
             n_given: 0,
             numbering: None,
+            place: 0,
             options: options.clone(),
             bytes: Vec::new(),
             warnings: Vec::new(),
@@ -87,9 +90,7 @@ impl ImageFiles {
             (Some(_), false) => None,
         };
         source.first = Some(first);
-        if source.pages.is_none() {
-            source.note_holes();
-        }
+        source.note_holes();
         Ok(source)
     }
 
@@ -200,8 +201,8 @@ impl FrameSource for ImageFiles {
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         let index = FrameIndex(self.n_given);
-        let pixels = match self.first.take() {
-            Some(first) => first,
+        let (at, pixels) = match self.first.take() {
+            Some(first) => (0, first),
             None => match self.read_pixels() {
                 Ok(None) => return Ok(None),
                 Ok(Some((at, pixels))) => {
@@ -220,7 +221,7 @@ impl FrameSource for ImageFiles {
                         return Err(Error::new(ErrorKind::Damaged, what)
                             .hint("one sequence has one type of pixels: read it as grey, or convert the odd files"));
                     }
-                    pixels
+                    (at, pixels)
                 }
                 Err((at, error)) if self.is_tail(at) => {
                     let n = self.files.len() - at;
@@ -242,8 +243,12 @@ impl FrameSource for ImageFiles {
             },
         };
         self.n_given += 1;
-        let place = self.numbering.as_ref().map_or(index.0, |n| n.place(index.0));
-        let time = Timestamp::from_secs_f64(place as f64 / self.options.rate_hz);
+        // A name's number is that of a frame only as long as every file gave one.
+        let own = self.numbering.as_ref().filter(|_| at as u64 == index.0).and_then(|n| n.place(index.0));
+        if index.0 > 0 {
+            self.place = own.unwrap_or(0).max(self.place + 1);
+        }
+        let time = Timestamp::from_secs_f64(self.place as f64 / self.options.rate_hz);
         Ok(Some(Frame { index, time, pixels }))
     }
 

@@ -12,3 +12,12 @@ pub(crate) fn guarded<T>(decode: impl FnOnce() -> Result<T>) -> Result<T> {
 pub(crate) fn damaged(what: &str, cause: impl std::fmt::Display) -> Error {
     Error::new(ErrorKind::Damaged, format!("{what}: {cause}"))
 }
+
+/// Refuses a picture whose file is too short for what its header claims: it takes at least `least` bytes, however well it was packed.
+pub(crate) fn backed(least: u64, bytes: usize, (width, height): (usize, usize)) -> Result<()> {
+    if bytes as u64 >= least {
+        return Ok(());
+    }
+    let what = format!("the header claims {width} x {height} pixels, for which {bytes} bytes are too few");
+    Err(Error::new(ErrorKind::Damaged, what))
+}

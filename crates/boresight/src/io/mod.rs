@@ -1,6 +1,8 @@
 //! Frames and tables in and out: images, video, CSV, MOTChallenge.
 
 mod atomic;
+mod atomic_folder;
+mod budget;
 #[cfg(feature = "images")]
 mod folder;
 #[cfg(feature = "images")]
@@ -13,6 +15,7 @@ mod options;
 #[cfg(feature = "images")]
 mod pattern;
 mod pixels;
+mod same_file;
 #[cfg(test)]
 mod same_rows;
 #[cfg(feature = "images")]
@@ -29,13 +32,16 @@ pub mod tracks;
 pub mod video;
 pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 
-pub use atomic::{AtomicFile, Output};
+pub use atomic::{AtomicFile, Output, write_whole};
+pub use atomic_folder::{AtomicFolder, remove_folder};
+pub use budget::set_memory_budget;
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
 pub use natural::natural_order;
 pub use open::{is_table, open};
 pub use options::{Colour, OpenOptions, RawFormat, RawType};
 pub use pixels::gray_of_rgb8;
+pub use same_file::{is_same_file, refuse_to_overwrite};
 #[cfg(feature = "images")]
 pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;

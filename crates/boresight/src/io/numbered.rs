@@ -17,10 +17,9 @@ pub(crate) struct Numbering {
 }
 
 impl Numbering {
-    /// A frame's place in the full sequence; frames beyond the files (pages of one) follow on.
-    pub fn place(&self, frame: u64) -> u64 {
-        let known = usize::try_from(frame).ok().and_then(|i| self.places.get(i));
-        known.copied().unwrap_or_else(|| frame.saturating_add(self.n_missing))
+    /// A file's place in the full sequence.
+    pub fn place(&self, file: u64) -> Option<u64> {
+        usize::try_from(file).ok().and_then(|i| self.places.get(i)).copied()
     }
 }
 

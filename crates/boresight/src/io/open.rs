@@ -40,9 +40,31 @@ pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
     if let Some(files) = super::pattern::expand(input)? {
         return open_images(input, files, options);
     }
+    if path.is_symlink() {
+        return Err(Error::new(ErrorKind::NotFound, "is a link that leads nowhere, or in a circle").at(input));
+    }
     Err(Error::new(ErrorKind::NotFound, "no such file or folder")
         .at(input)
         .hint("give a video, an image, a folder of images, a quoted glob such as 'frames/*.png', an address, or - for standard input"))
+}
+
+/// The files that an input is read from, as far as it names any: itself, a folder and the images in it, the files of a pattern.
+pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
+    if path.is_dir() {
+        let inside = std::fs::read_dir(path).into_iter().flatten().flatten().map(|e| e.path());
+        return std::iter::once(path.to_path_buf()).chain(inside.filter(|p| has_image_name(p))).collect();
+    }
+    if path.exists() {
+        return vec![path.to_path_buf()];
+    }
+    #[cfg(feature = "images")]
+    if let Some(Ok(Some(files))) = path.to_str().map(super::pattern::expand) {
+        // Frames are written by the folder.
+        let folder =
+            files.first().and_then(|f| f.parent()).filter(|f| !f.as_os_str().is_empty()).map(Path::to_path_buf);
+        return files.into_iter().chain(folder).collect();
+    }
+    Vec::new()
 }
 
 /// Whether an input is a file of text: a table of detections or tracks, not frames.

@@ -84,6 +84,7 @@ impl OpenOptions {
             return Err(Error::new(ErrorKind::Config, "expected a positive number of frames/s")
                 .at(format!("rate-hz = {}", self.rate_hz)));
         }
+        crate::time::check_rate(self.rate_hz).map_err(|e| e.at(format!("rate-hz = {}", self.rate_hz)))?;
         if self.max_pixels == 0 {
             return Err(Error::new(ErrorKind::Config, "expected at least 1 pixel").at("max-pixels = 0"));
         }

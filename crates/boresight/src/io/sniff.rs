@@ -82,13 +82,20 @@ pub(crate) fn sniff(head: &[u8]) -> Content {
         // Audio frames may begin with FF FE as well; Latin letters in UTF-16 leave every second byte 0.
         [0xff, 0xfe, rest @ ..] if rest.iter().skip(1).step_by(2).all(|b| *b == 0) => Content::Utf16,
         [0xfe, 0xff, rest @ ..] if rest.iter().step_by(2).all(|b| *b == 0) => Content::Utf16,
-        _ if is_text(head) => Content::Text,
+        _ if is_text(head) || is_damaged_table(head) => Content::Text,
         _ => Content::Other,
     }
 }
 
 fn is_text(head: &[u8]) -> bool {
     head.iter().all(|&b| b >= 0x20 && b != 0x7f || matches!(b, b'\n' | b'\r' | b'\t')) && !head.starts_with(b"#EXTM3U")
+}
+
+/// Whether it is a table with a few bytes that no text has: an error of its reader, not pictures for ffmpeg (which draws text).
+fn is_damaged_table(head: &[u8]) -> bool {
+    let n_odd = head.iter().filter(|b| !is_text(std::slice::from_ref(b))).count();
+    let n_numbers = head.iter().filter(|b| b.is_ascii_digit() || b",;.-+ \t\r\n".contains(b)).count();
+    n_odd * 8 <= head.len() && n_numbers * 2 > head.len() && head.iter().any(|b| b",;\t ".contains(b))
 }
 
 #[cfg(test)]
@@ -106,6 +113,8 @@ mod tests {
         assert_eq!(sniff(b"\0\0\0\x20ftypisom"), Content::Mp4);
         assert_eq!(sniff(b"\xff\xfef\0r\0"), Content::Utf16);
         assert_eq!(sniff(b"\xfe\xff\0f\0r"), Content::Utf16);
+        assert_eq!(sniff(b"1,1,3,3,5,5,1,-1,-1,-1\n2,1,3,3,\x005,5,1\n"), Content::Text, "a table with a hole in it");
+        assert_eq!(sniff(b"\x1aE\xdf\xa3\x01\0\0\0\0\0\0\x23B\x86\x81\x01B\xf7"), Content::Other, "Matroska");
         assert_eq!(sniff(b"RIFF\0\0\0\0AVI "), Content::Other);
     }
 }

@@ -64,6 +64,43 @@ fn a_cut_file_gives_the_frames_before_the_cut_and_counts_the_lost() {
     assert_eq!(n + lost(&text), 25, "{n} {text}");
 }
 
+/// Boxes of these names: where each begins and ends, parents before their children.
+fn boxes(bytes: &[u8], wanted: &[&[u8; 4]]) -> Vec<std::ops::Range<usize>> {
+    let size = |at: usize| u32::from_be_bytes(bytes[at - 4..at].try_into().unwrap()) as usize;
+    let named = (4..bytes.len() - 4).filter(|&at| wanted.iter().any(|w| bytes[at..].starts_with(*w)));
+    named.map(|at| at - 4..at - 4 + size(at)).collect()
+}
+
+#[test]
+fn one_damaged_byte_of_the_tables_never_loses_frames_in_silence() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("damaged.mp4");
+    let tables: [&[u8; 4]; 6] = [b"moof", b"mfhd", b"traf", b"tfhd", b"trun", b"mdat"];
+    for (name, tables) in
+        [("fragmented.mp4", &tables[..]), ("fragmented_offset.mp4", &tables), ("b_frames.mp4", &[b"ctts"])]
+    {
+        let sound = std::fs::read(data_folder().join(name)).unwrap();
+        std::fs::write(&path, &sound).unwrap();
+        assert_eq!(drain(&path, 1 << 20).unwrap(), (25, Vec::new()), "{name}");
+        let mut n_said = 0;
+        for (k, found) in boxes(&sound, tables).into_iter().enumerate() {
+            // Size, name, and the fields in front: what follows is alike, row by row.
+            for at in found.start..found.end.min(found.start + 36) {
+                let mut bytes = sound.clone();
+                bytes[at] ^= [0x01, 0x10, 0x40][(at + k) % 3];
+                std::fs::write(&path, &bytes).unwrap();
+                match drain(&path, 1 << 16) {
+                    Ok((n, warnings)) if warnings.is_empty() => {
+                        assert_eq!(n, 25, "{name}, byte {at} (box {k}): frames are gone without a word");
+                    }
+                    _ => n_said += 1,
+                }
+            }
+        }
+        assert!(n_said > 5, "{name}: {n_said}");
+    }
+}
+
 #[test]
 fn headers_that_claim_absurd_sizes_are_refused() {
     let path = data_folder().join("b_frames.mp4");

@@ -1,5 +1,6 @@
 //! Checks the scores that `--require` demands.
 
+use crate::console::say;
 use boresight::metrics::evaluation::{Better, Value};
 use boresight::{Error, ErrorKind};
 use std::process::ExitCode;
@@ -52,7 +53,7 @@ pub fn met(demands: &[Demand], combined: &[Value]) -> anyhow::Result<ExitCode> {
         })?;
         if let Some(unmet) = unmet(found, *limit)? {
             met = false;
-            eprintln!("not met: {unmet}");
+            say!("not met: {unmet}");
         }
     }
     Ok(if met { ExitCode::SUCCESS } else { ExitCode::from(1) })

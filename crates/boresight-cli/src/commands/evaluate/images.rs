@@ -2,8 +2,9 @@
 
 use super::arguments::Args;
 use super::demand::met;
-use super::output::put;
+use super::output::Files;
 use super::table::aligned;
+use crate::console::{self, say};
 use anyhow::bail;
 use boresight::io::{OpenOptions, is_table, open};
 use boresight::metrics::evaluation::Value;
@@ -58,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         frames.push(frame(&a.pixels, &b.pixels, args.peak).map_err(|e| e.at(at))?);
     }
     for warning in truth.warnings().iter().chain(result.warnings()) {
-        eprintln!("warning: {warning}");
+        say!("warning: {warning}");
     }
     let mean = mean_values(&frames);
     let shown = |v: &[Value; 6]| v.map(|v| format!("{:.4}", v.value)).to_vec();
@@ -71,20 +72,22 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if frames.len() != 1 {
         rows.push([vec![format!("mean of {}", frames.len())], shown(&mean)].concat());
     }
-    super::super::print(aligned(&head, &rows).as_bytes())?;
+    let mut files = Files::default();
+    files.take(console::print(aligned(&head, &rows).as_bytes()).map(drop));
     let mut csv = format!("frame,{}\n", mean.map(|v| v.name).join(","));
     for (k, f) in frames.iter().enumerate() {
         let _ = writeln!(csv, "{k},{}", f.values().map(|v| v.value.to_string()).join(","));
     }
     if let Some(path) = &args.csv {
-        put(path, &csv)?;
+        files.put(path, &csv);
     }
     if let Some(path) = &args.json {
         let named: serde_json::Map<String, serde_json::Value> =
             mean.iter().map(|v| (v.name.to_string(), v.value.into())).collect();
         let numbers: Vec<[f64; 6]> = frames.iter().map(|f| f.values().map(|v| v.value)).collect();
         let all = serde_json::json!({"mean": named, "names": mean.map(|v| v.name), "frames": numbers});
-        put(path, &serde_json::to_string_pretty(&all)?)?;
+        files.put(path, &serde_json::to_string_pretty(&all)?);
     }
+    files.all_written()?;
     met(&args.require, &mean)
 }

@@ -1,5 +1,6 @@
 //! What `fuse` reads: tracks as they are, detections through the tracker, and each table's frame of reference.
 
+use crate::console::say;
 use boresight::fuse::{MapKind, Timeline, timelines};
 use boresight::fuse::{PlaneMap, common_points};
 use boresight::io::{TableOptions, read_detections, read_tracks};
@@ -39,7 +40,7 @@ impl Sensor {
 /// Reads a table of tracks, or one of detections and tracks them with `config` (chosen from the table if none is given).
 pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Result<Sensor> {
     let options = TableOptions::default();
-    let warn = |all: &[String]| all.iter().for_each(|w| eprintln!("warning: {}: {w}", path.display()));
+    let warn = |all: &[String]| all.iter().for_each(|w| say!("warning: {}: {w}", path.display()));
     let tracks = read_tracks(path, &options);
     if let Ok(table) = &tracks
         && table.frames.iter().any(|f| !f.tracks.is_empty())
@@ -71,7 +72,7 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
     let config = tracker_of(&scans, table.rate_hz, config);
     let states = run_tracker(&config, &scans)?;
     let tracks = timelines(states.iter().map(|(t, s)| (*t, s.as_slice())));
-    eprintln!(
+    say!(
         "{}: {} detections in {} scans, {} tracks",
         path.display(),
         scans.iter().map(|s| s.detections.len()).sum::<usize>(),
@@ -87,7 +88,7 @@ pub fn tracker_of(scans: &[Scan], rate_hz: f64, given: Option<&Config>) -> Confi
     given.cloned().unwrap_or_else(|| {
         let (mut config, mut reasons) = (Config::default(), Vec::new());
         boresight::auto::for_detections(scans, rate_hz, None, &mut config, &mut reasons);
-        reasons.iter().for_each(|r| eprintln!("  {r}"));
+        reasons.iter().for_each(|r| say!("  {r}"));
         config
     })
 }
@@ -129,7 +130,7 @@ impl MapSpec {
                 })
                 .collect::<Result<_>>()?;
             let found = PlaneMap::estimate(&points, kind).map_err(|e| e.at(path))?;
-            eprintln!("{name} map from {} points of {path}: rms {:.3}", found.n_points, found.rms);
+            say!("{name} map from {} points of {path}: rms {:.3}", found.n_points, found.rms);
             return Ok(Self::Known(found.map));
         }
         let rows = match numbers(text) {
@@ -198,7 +199,7 @@ pub fn map_from_tracks(
         points.extend(common_points(&find(a, *i, "first")?, &find(b, *j, "second")?, max_gap_s));
     }
     let found = PlaneMap::estimate(&points, kind)?;
-    eprintln!(
+    say!(
         "map from {} common points: rms {:.3}; rows {:?}",
         found.n_points,
         found.rms,

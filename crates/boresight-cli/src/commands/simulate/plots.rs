@@ -1,6 +1,6 @@
 //! Radars of a scene to disk: `NAME.csv` (a table of detections) and `NAME-plots.csv` (range, azimuth, arrival, origin).
 
-use boresight::io::DetectionsCsv;
+use boresight::io::{DetectionsCsv, write_whole};
 use boresight::sim::{Radar, RadarConfig, Seed};
 use boresight::{Error, ErrorKind, Sink, TrackState, View};
 use std::fmt::Write as _;
@@ -29,6 +29,11 @@ pub fn read_radars(path: &Path) -> boresight::Result<Vec<RadarConfig>> {
     Ok(file.radars)
 }
 
+/// Names of a radar's files: its detections, its plots.
+pub fn names(radar: &str) -> [String; 2] {
+    [format!("{radar}.csv"), format!("{radar}-plots.csv")]
+}
+
 struct Station {
     name: String,
     radar: Radar,
@@ -49,7 +54,7 @@ impl Radars {
             Ok(Station {
                 name: c.name.clone(),
                 radar: Radar::new(c, seed, i as u64)?,
-                table: DetectionsCsv::create(dir.join(format!("{}.csv", c.name)))?,
+                table: DetectionsCsv::create(dir.join(&names(&c.name)[0]))?,
                 plots: String::from("frame,time_s,arrival_s,range_px,azimuth_rad,x_px,y_px,target\n"),
             })
         });
@@ -77,10 +82,9 @@ impl Radars {
         let mut names = Vec::new();
         for s in self.stations {
             Box::new(s.table).finish()?;
-            let (table, plots) = (format!("{}.csv", s.name), format!("{}-plots.csv", s.name));
+            let [table, plots] = self::names(&s.name);
             let path = self.dir.join(&plots);
-            std::fs::write(&path, s.plots)
-                .map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
+            write_whole(path, s.plots.as_bytes())?;
             names.extend([table, plots]);
         }
         Ok(names)

@@ -6,6 +6,7 @@
 //! for these 200 lines, and cannot spare the reader of PNM. Source: Microsoft, *Bitmap
 //! Storage* (BITMAPFILEHEADER, BITMAPCOREHEADER, BITMAPINFOHEADER, BITMAPV5HEADER, *Bitmap Compression*).
 
+use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
@@ -53,6 +54,8 @@ fn header(b: &[u8], max_pixels: u64) -> Result<Header> {
     };
     let (w, h, bits, coding, n_colours) = fields().ok_or_else(short)?;
     let (width, height) = check_size(w.unsigned_abs(), h.unsigned_abs(), max_pixels)?;
+    // The samples and the pixels.
+    afford(width, height, 6)?;
     let bits = usize::from(bits);
     let sound = match coding {
         0 => matches!(bits, 1 | 4 | 8 | 16 | 24 | 32),

@@ -1,7 +1,8 @@
 //! PNG, 1 to 16 bits, grey, palette and colour, interlaced too. 16-bit samples stay exact; 1, 2 and 4 bit grey is
 //! scaled to 0..=255 as the standard says; palettes are expanded to RGB; alpha is dropped. Checksums are checked.
 
-use crate::io::guard::damaged;
+use crate::io::budget::afford;
+use crate::io::guard::{backed, damaged};
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
@@ -11,6 +12,9 @@ use std::io::Cursor;
 
 /// What the decoder may take beside the pixels, bytes: a palette and a row of the interlaced.
 const PALETTE: u64 = 1 << 16;
+
+/// Deflate makes at most this many bytes of one (258 bytes of two bits).
+const MOST_DEFLATED: u64 = 1032;
 
 pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pixels> {
     let limits =
@@ -22,12 +26,17 @@ pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pi
     let mut reader = decoder.read_info().map_err(|e| damaged("not a whole PNG", e))?;
     let (width, height) = check_size(reader.info().width.into(), reader.info().height.into(), max_pixels)?;
     let (kind, depth) = reader.output_color_type();
+    let raw = (reader.info().raw_row_length() as u64).saturating_mul(height as u64);
+    backed(raw / MOST_DEFLATED, bytes.len(), (width, height))?;
     let channels = match kind {
         ColorType::Grayscale => 1,
         ColorType::GrayscaleAlpha => 2,
         ColorType::Rgb | ColorType::Indexed => 3,
         ColorType::Rgba => 4,
     };
+    // The decoder's bytes, the samples, the pixels.
+    let sample = if depth == BitDepth::Sixteen { 2 } else { 1 };
+    afford(width, height, 3 * sample * channels as u64)?;
     let n = reader.output_buffer_size().ok_or_else(|| damaged("not a whole PNG", "its size overflows"))?;
     let mut data = vec![0u8; n];
     reader.next_frame(&mut data).map_err(|e| damaged("not a whole PNG", e))?;

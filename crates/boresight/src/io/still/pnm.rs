@@ -5,6 +5,7 @@
 //! maxval 4095 becomes 16) and reads no float PFM.
 //! Source: netpbm's format pages pbm(5), pgm(5), ppm(5), pfm(5). A PBM's black (1) becomes 0, white (0) becomes 255.
 
+use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
@@ -65,6 +66,8 @@ pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pi
     let mut words = Words { bytes, at: 2 };
     let (w, h) = (words.number("the width")?, words.number("the height")?);
     let (width, height) = check_size(w, h, max_pixels)?;
+    // The samples and the pixels, of up to three channels of two bytes.
+    afford(width, height, 12)?;
     let n = width * height;
     let channels = if matches!(&magic, b"P3" | b"P6" | b"PF") { 3 } else { 1 };
     match &magic {

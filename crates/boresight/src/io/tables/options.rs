@@ -61,6 +61,9 @@ impl TableOptions {
         if let Some(rate) = self.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
             return config("rate-hz", rate, "a positive number of frames/s");
         }
+        if let Some(rate) = self.rate_hz {
+            crate::time::check_rate(rate).map_err(|e| e.at(format!("{at}.rate-hz = {rate}")))?;
+        }
         if !(self.std_px.is_finite() && self.std_px > 0.0) {
             return config("std-px", self.std_px, "a positive number of pixels");
         }

@@ -6,7 +6,7 @@
 use super::columns::Field;
 use super::detection_row::RowReader;
 use super::options::TableOptions;
-use super::scan_times::{scans_of, set_times};
+use super::scan_times::{Grouped, scans_of, set_times};
 use super::table::Table;
 use crate::{Error, ErrorKind, Result, Scan};
 use std::path::Path;
@@ -28,6 +28,8 @@ pub struct DetectionTable {
     pub n_skipped: u64,
     /// Whole sentences about what was assumed or left out.
     pub warnings: Vec<String>,
+    /// Those of the warnings that say what is lost.
+    pub lost: Vec<String>,
 }
 
 /// Reads detections from a table.
@@ -65,6 +67,7 @@ pub(crate) fn identified_of(
         n_rows: 0,
         n_skipped: 0,
         warnings: Vec::new(),
+        lost: Vec::new(),
     };
     let mut seen = Vec::new();
     let mut n_loose = 0;
@@ -80,14 +83,14 @@ pub(crate) fn identified_of(
             // A run that was cut off leaves a last line without an end.
             Err(e) if row.line.cut && !seen.is_empty() => {
                 out.n_skipped += 1;
-                out.warnings.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
+                out.lost.push(format!("The table breaks off in its last line, 1 row is lost: {e}."));
             }
             Err(e) => return Err(e.hint("mend the row, or leave such rows out with --skip-bad-rows")),
         }
     }
     let (label, layout) = (&table.form.label, &table.form.layout);
     if out.n_skipped > 0 && options.skip_bad_rows {
-        out.warnings.push(format!("{label}: {} of {} rows were bad and left out.", out.n_skipped, out.n_rows));
+        out.lost.push(format!("{label}: {} of {} rows were bad and left out.", out.n_skipped, out.n_rows));
     }
     if seen.is_empty() && out.n_skipped > 0 {
         return Err(Error::new(ErrorKind::Damaged, format!("none of its {} rows can be read", out.n_rows)).at(label));
@@ -99,11 +102,13 @@ pub(crate) fn identified_of(
         ));
     }
     if n_loose > 0 {
-        out.warnings.push(format!("{}: {n_loose} rows belong to no track and were left out.", label));
+        out.lost.push(format!("{}: {n_loose} rows belong to no track and were left out.", label));
     }
+    out.warnings.extend_from_slice(&out.lost);
     seen.sort_by_key(|s| s.frame);
     let ids = seen.iter().map(|s| s.id.unwrap_or_default().unsigned_abs()).collect();
-    let (mut scans, times) = scans_of(label, seen)?;
+    let Grouped { mut scans, times, warning } = scans_of(label, seen)?;
+    out.warnings.extend(warning);
     let rate = set_times(&mut scans, &times, label, options, rate_beside)?;
     (out.scans, out.rate_hz) = (scans, rate.rate_hz);
     if rate.is_assumed {
@@ -185,6 +190,13 @@ mod tests {
         assert!(read("frame,time_s,x,y\n0,1,0,0\n1,0.5,0,0\n", &TableOptions::default()).is_err());
         let given = TableOptions { rate_hz: Some(10.0), ..TableOptions::default() };
         assert_eq!(read("frame,time_s,x,y\n0,1,0,0\n1,0.5,0,0\n", &given).unwrap().scans[1].time.ns, 100_000_000);
+    }
+
+    #[test]
+    fn rows_of_one_frame_that_state_different_times_are_said() {
+        let table = plain("frame,time_s,x,y\n0,0,1,1\n0,0.5,2,2\n1,1,1,1\n1,1,2,2\n");
+        assert!(table.warnings[0].contains("1 rows state another time") && table.warnings[0].contains("0 s and 0.5 s"));
+        assert_eq!(table.scans[0].time.ns, 0);
     }
 
     #[test]

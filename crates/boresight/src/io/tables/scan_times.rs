@@ -13,16 +13,34 @@ const MAX_GAP_FRAMES: u64 = 1_000_000;
 /// All holes of a table together may have this many frames: empty scans take memory as well (10⁷ of them about 0.8 GB).
 const MAX_EMPTY_FRAMES: u64 = 10_000_000;
 
-/// Groups rows, sorted by frame, into one scan a frame; with the time of each frame as far as its first row has one.
+/// The scans of a table, before they have their times.
+pub(super) struct Grouped {
+    pub scans: Vec<Scan>,
+    /// The time of each frame, as far as its first row has one.
+    pub times: Vec<Option<Timestamp>>,
+    /// What is odd about the times of the rows.
+    pub warning: Option<String>,
+}
+
+/// Groups rows, sorted by frame, into one scan a frame.
 /// # Errors
 /// [`ErrorKind::Damaged`] for holes that no pause explains.
-pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec<Option<Timestamp>>)> {
+pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<Grouped> {
     let mut scans: Vec<Scan> = Vec::new();
-    let mut times = Vec::new();
+    let mut times: Vec<Option<Timestamp>> = Vec::new();
+    let (mut n_odd, mut first_odd) = (0, None);
     let mut n_empty = 0;
     for one in seen {
         match scans.last_mut() {
-            Some(last) if last.index.0 == one.frame => last.detections.push(one.detection),
+            Some(last) if last.index.0 == one.frame => {
+                if let (Some(Some(first)), Some(time)) = (times.last(), one.time)
+                    && *first != time
+                {
+                    n_odd += 1;
+                    first_odd.get_or_insert((one.frame, first.as_secs_f64(), time.as_secs_f64()));
+                }
+                last.detections.push(one.detection);
+            }
             last => {
                 let next = last.map_or(one.frame, |l| l.index.0 + 1);
                 let hole = one.frame - next;
@@ -44,7 +62,12 @@ pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<(Vec<Scan>, Vec<O
             }
         }
     }
-    Ok((scans, times))
+    let warning = first_odd.map(|(frame, first, other)| {
+        format!(
+            "{label}: {n_odd} rows state another time than the first row of their frame, which was taken (frame {frame}: {first} s and {other} s)."
+        )
+    });
+    Ok(Grouped { scans, times, warning })
 }
 
 /// What [`set_times`] found.

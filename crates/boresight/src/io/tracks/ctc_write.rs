@@ -6,8 +6,10 @@
 //! Limits: labels up to 65535; images up to 2²⁸ pixels.
 
 use super::ctc::Lineage;
+use crate::io::AtomicFolder;
 use crate::io::tables::lost::lost;
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackTable};
+use std::io::Write;
 use std::path::Path;
 use tiff::encoder::{TiffEncoder, colortype::Gray16};
 
@@ -95,7 +97,7 @@ fn parents(table: &TrackTable) -> Vec<(usize, usize)> {
     out
 }
 
-/// Writes a folder; says what it cannot hold. `size_px` is the size of the images; without it they reach to the last row.
+/// Writes a folder, which appears whole (an earlier result in it goes then, other files stay); says what it cannot hold. `size_px` is the size of the images; without it they reach to the last row.
 /// Without a folder nothing is written, only said.
 /// # Errors
 /// More than 65535 labels; an id twice in a frame; an image too large; files that cannot be written.
@@ -115,9 +117,9 @@ pub fn write_folder(table: &TrackTable, folder: Option<&Path>, size_px: Option<(
     let failed = |place: &Path, e: Box<dyn std::error::Error + Send + Sync>| {
         Error::new(ErrorKind::Output, "cannot be written").at(place.display()).because(e)
     };
-    if let Some(folder) = folder {
-        std::fs::create_dir_all(folder).map_err(|e| failed(folder, e.into()))?;
-        let path = folder.join("res_track.txt");
+    let folder = folder.map(|folder| AtomicFolder::create(folder, is_result)).transpose()?;
+    if let Some(folder) = &folder {
+        let path = folder.part_path().join("res_track.txt");
         let lines: Vec<String> =
             plan.lineages.iter().map(|l| format!("{} {} {} {}\n", l.label, l.begin, l.end, l.parent)).collect();
         std::fs::write(&path, lines.concat()).map_err(|e| failed(&path, e.into()))?;
@@ -144,14 +146,23 @@ pub fn write_folder(table: &TrackTable, folder: Option<&Path>, size_px: Option<(
                 None => n_outside += 1,
             }
         }
-        let Some(folder) = folder else { continue };
-        let path = folder.join(format!("mask{frame:03}.tif"));
+        let Some(folder) = &folder else { continue };
+        let path = folder.part_path().join(format!("mask{frame:03}.tif"));
         let file = std::fs::File::create(&path).map_err(|e| failed(&path, e.into()))?;
-        TiffEncoder::new(std::io::BufWriter::new(file))
+        let mut file = std::io::BufWriter::new(file);
+        TiffEncoder::new(&mut file)
             .and_then(|mut e| e.write_image::<Gray16>(width as u32, height as u32, &image))
             .map_err(|e| failed(&path, e.into()))?;
+        file.flush().map_err(|e| failed(&path, e.into()))?;
     }
+    folder.map_or(Ok(()), AtomicFolder::finish)?;
     Ok(dropped(table, &plan, n_hidden, n_outside))
+}
+
+/// Whether a file has the name of a part of a result.
+fn is_result(name: &str) -> bool {
+    let number = name.strip_prefix("mask").and_then(|n| n.strip_suffix(".tif"));
+    name == "res_track.txt" || number.is_some_and(|n| n.len() >= 3 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 fn dropped(table: &TrackTable, plan: &Plan, n_hidden: usize, n_outside: usize) -> Vec<String> {

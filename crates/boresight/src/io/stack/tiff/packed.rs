@@ -5,6 +5,7 @@
 
 use super::chunk::chunk_bytes;
 use super::failure::failed;
+use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
@@ -79,6 +80,8 @@ fn page<R: Read + Seek>(decoder: &mut Decoder<R>, max_pixels: u64) -> Result<Opt
         return Ok(None);
     }
     let (width, height) = check_size(w.into(), h.into(), max_pixels)?;
+    // The unpacked samples, those of a strip, the pixels.
+    afford(width, height, 8)?;
     let predictor = tag(Tag::Predictor)?.unwrap_or(1);
     let compression = tag(Tag::Compression)?.unwrap_or(1);
     let order = tag(Tag::FillOrder)?.unwrap_or(1);

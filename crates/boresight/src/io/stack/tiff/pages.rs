@@ -7,6 +7,7 @@
 
 use super::failure::failed;
 use super::{hyperstack, lzw, packed};
+use crate::io::budget::afford;
 use crate::io::guard::{damaged, guarded};
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
@@ -139,6 +140,9 @@ impl<R: Read + Seek> TiffPages<R> {
             return Ok(pixels);
         }
         let colour_type = self.decoder.colortype().map_err(failed)?;
+        // The decoder's samples and the pixels.
+        let sample = u64::from(colour_type.bit_depth().div_ceil(8));
+        afford(width, height, 2 * sample * u64::from(colour_type.num_samples()))?;
         let mut buffer = DecodingResult::U8(Vec::new());
         let planes = match lzw::read(&mut self.decoder, width, height)? {
             Some(samples) => {

@@ -2,6 +2,8 @@
 //!
 //! Source: ISO/IEC 14496-12, 8.8 (`tfhd`, `tfdt`, `trun`, defaults from `trex`).
 //! Fragments are placed by their own decoding time (`tfdt`), so that a lost fragment leaves a gap in time.
+//! Damage is told by what does not add up: numbers of fragments (`mfhd`) that skip, tables of tracks that the file does not have,
+//! media bytes that no table claims.
 
 use super::boxes::{Cursor, be32, cut};
 use super::sample::{Sample, damaged};
@@ -48,14 +50,53 @@ pub(super) struct Reader {
     /// Bytes claimed by the samples so far.
     claimed: u64,
     first_offset: Option<i32>,
+    /// Tracks that the file has, and whether a fragment's table names another one.
+    tracks: Vec<u32>,
+    strange: u32,
+    /// Number of the newest fragment, and how often the next one is not its successor.
+    sequence: Option<u32>,
+    skips: u32,
+    /// Bytes claimed by the samples of all tracks.
+    claimed_by_all: u64,
     /// Whether composition and decoding times differ by more than a constant.
     pub reordered: bool,
 }
 
 impl Reader {
     pub fn new(track: u32, defaults: &[Defaults], file_len: u64) -> Self {
+        let tracks = defaults.iter().map(|d| d.track).collect();
         let defaults = defaults.iter().find(|d| d.track == track).copied().unwrap_or_default();
-        Self { track, defaults, next_dts: 0, file_len, claimed: 0, first_offset: None, reordered: false }
+        Self {
+            track,
+            defaults,
+            next_dts: 0,
+            file_len,
+            claimed: 0,
+            first_offset: None,
+            tracks,
+            strange: 0,
+            sequence: None,
+            skips: 0,
+            claimed_by_all: 0,
+            reordered: false,
+        }
+    }
+
+    /// What is lost as far as the fragments tell, of `media` bytes in the file.
+    pub fn lost(&self, media: u64) -> Option<String> {
+        // A few bytes are padding.
+        let unclaimed = media.saturating_sub(self.claimed_by_all);
+        let mut signs = Vec::new();
+        if self.skips > 0 {
+            signs.push(format!("the numbers of its fragments skip {} times", self.skips));
+        }
+        if self.strange > 0 {
+            signs.push(format!("{} tables are of a track that the file does not have", self.strange));
+        }
+        if unclaimed > 16 {
+            signs.push(format!("{unclaimed} of {media} bytes of pictures and sound stand in no table"));
+        }
+        (!signs.is_empty()).then(|| format!("frames are missing: {}", signs.join(", ")))
     }
 
     /// Adds the samples of one `moof` box whose header starts at `moof_start`.
@@ -67,11 +108,21 @@ impl Reader {
         // Without a base of its own, a track's data follow those of the track before it.
         let mut data_end = moof_start;
         while let Some((name, body)) = children.next_box() {
-            if &name == b"traf" {
-                self.add_track(body, moof_start, &mut data_end, samples)?;
+            match &name {
+                b"traf" => self.add_track(body, moof_start, &mut data_end, samples)?,
+                b"mfhd" => self.number(body),
+                _ => {}
             }
         }
         Ok(())
+    }
+
+    /// Takes a fragment's number: it follows the one before, but where files were joined and it begins anew.
+    fn number(&mut self, mut mfhd: Cursor<'_>) {
+        let Some(number) = mfhd.version_flags().and_then(|_| mfhd.u32()) else { return };
+        let follows = self.sequence.is_none_or(|last| number == last.wrapping_add(1) || number <= 1);
+        self.skips += u32::from(!follows);
+        self.sequence = Some(number);
     }
 
     fn add_track(&mut self, traf: Cursor<'_>, moof_start: u64, end: &mut u64, out: &mut Vec<Sample>) -> Result<()> {
@@ -83,6 +134,7 @@ impl Reader {
             match &name {
                 b"tfhd" => {
                     (track, base) = read_header(&mut b, &mut d, moof_start, *end).ok_or_else(|| cut("tfhd"))?;
+                    self.strange += u32::from(!self.tracks.is_empty() && !self.tracks.contains(&track));
                 }
                 b"tfdt" if track == self.track => {
                     let version = b.version_flags().ok_or_else(|| cut("tfdt"))?.0;
@@ -132,6 +184,7 @@ impl Reader {
         for i in 0..count as usize {
             let row = rows.get(i * row_len..(i + 1) * row_len).unwrap_or_default();
             let bytes = if size > 0 { be32(row, dur) } else { d.size };
+            self.claimed_by_all = self.claimed_by_all.saturating_add(u64::from(bytes));
             if let Some(out) = out.as_deref_mut() {
                 let duration = if dur > 0 { be32(row, 0) } else { d.duration };
                 let row_flags = if flg > 0 { be32(row, dur + size) } else { d.flags };

@@ -71,7 +71,7 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
         }
     })?;
     let bytes = read_box(file, moov, file_len)?;
-    let mut movie_timescale = 0;
+    let (mut movie_timescale, mut n_tracks) = (0, 0);
     let mut tracks = Vec::new();
     let mut defaults = Vec::new();
     let mut children = Cursor::new(&bytes);
@@ -79,6 +79,7 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
         match &name {
             b"mvhd" => movie_timescale = header_timescale(&mut body).unwrap_or(0),
             b"trak" => {
+                n_tracks += 1;
                 if let Some(track) = read_track(body, file_len)? {
                     tracks.push(track);
                 }
@@ -99,6 +100,7 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
     }
     let codec = track.codec.take().unwrap_or(Codec::Other("unknown".into()));
     let fragmented = top.iter().any(|b| b.name == *b"moof");
+    let in_tables: u64 = track.samples.iter().map(|s| u64::from(s.size)).sum();
     if fragmented {
         let mut reader = fragments::Reader::new(track.id, &defaults, file_len);
         for moof in top.iter().filter(|b| b.name == *b"moof") {
@@ -106,6 +108,11 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
             reader.add(&bytes, moof.start, &mut track.samples)?;
         }
         track.reordered |= reader.reordered;
+        // Frames that the movie's own tables hold lie among the same bytes.
+        let media = top.iter().filter(|b| b.name == *b"mdat").map(|b| b.end.min(file_len) - b.body).sum::<u64>();
+        if in_tables == 0 || n_tracks == 1 {
+            warnings.extend(reader.lost(media.saturating_sub(in_tables)));
+        }
     }
     if track.samples.is_empty() {
         return Err(damaged("its video track holds no frames"));
@@ -116,8 +123,29 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
         );
     }
     let steps = timeline::steps(&track.samples, &track.edits, track.timescale, movie_timescale, fragmented)?;
+    if fragmented {
+        warnings.extend(not_understood(file, &top, file_len));
+    }
+    warnings.extend(timeline::hidden(&steps, &track.edits));
     let Track { samples, timescale, reordered, .. } = track;
     Ok(Movie { codec, samples, steps, timescale, reordered, file_len, warnings })
+}
+
+/// Boxes that stand on the top level of a fragmented file.
+const TOP: [&[u8; 4]; 20] = [
+    b"ftyp", b"styp", b"sidx", b"ssix", b"prft", b"emsg", b"moov", b"moof", b"mdat", b"mfra", b"free", b"skip", b"wide",
+    b"uuid", b"meta", b"pdin", b"pnot", b"udta", b"imda", b"junk",
+];
+
+/// What follows the last box that is known: after a damaged size everything is read as what it is not. Zeros are padding.
+fn not_understood(file: &mut File, top: &[TopBox], file_len: u64) -> Option<String> {
+    let odd = top.iter().find(|b| !TOP.contains(&&b.name)).map(|b| b.start);
+    let from = odd.or_else(|| top.last().map(|b| b.end))?;
+    let mut bytes = vec![0; usize::try_from(file_len.checked_sub(from)?).ok()?.min(1 << 16)];
+    let read = file.seek(SeekFrom::Start(from)).and_then(|_| file.read_exact(&mut bytes));
+    let padding = read.is_ok() && bytes.iter().all(|b| *b == 0);
+    let n = file_len - from;
+    (!padding).then(|| format!("the last {n} bytes of the file are no part of it that is known: frames in them are lost"))
 }
 
 fn read_box(file: &mut File, b: &TopBox, file_len: u64) -> Result<Vec<u8>> {

@@ -105,6 +105,19 @@ pub(super) fn steps(
     Ok(out)
 }
 
+/// Says how many pictures behind the first shown one are never shown: an edit list that cuts them off, or times that are damaged.
+/// Those before it are how every decoder starts, and a list of several edits repeats and skips as it likes.
+pub(super) fn hidden(steps: &[Step], edits: &[Edit]) -> Option<String> {
+    if edits.iter().filter(|e| e.media_time >= 0).count() > 1 {
+        return None;
+    }
+    let first = steps.iter().filter(|s| s.shown).map(|s| s.pts).min()?;
+    let n = steps.iter().filter(|s| !s.shown && s.pts > first).count();
+    (n > 0).then(|| {
+        format!("{n} of {} frames lie outside of what the file's edit list shows and are left out", steps.len())
+    })
+}
+
 /// Appends the pictures of one edit: from the sync sample before its start to a sync sample after its end.
 fn push_edit(samples: &[Sample], start: i64, end: i64, at: i64, out: &mut Vec<Step>) {
     // Media time is composition time; the sync sample is looked for by it.
