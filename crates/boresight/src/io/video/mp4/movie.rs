@@ -133,8 +133,8 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
 
 /// Boxes that stand on the top level of a fragmented file.
 const TOP: [&[u8; 4]; 20] = [
-    b"ftyp", b"styp", b"sidx", b"ssix", b"prft", b"emsg", b"moov", b"moof", b"mdat", b"mfra", b"free", b"skip", b"wide",
-    b"uuid", b"meta", b"pdin", b"pnot", b"udta", b"imda", b"junk",
+    b"ftyp", b"styp", b"sidx", b"ssix", b"prft", b"emsg", b"moov", b"moof", b"mdat", b"mfra", b"free", b"skip",
+    b"wide", b"uuid", b"meta", b"pdin", b"pnot", b"udta", b"imda", b"junk",
 ];
 
 /// What follows the last box that is known: after a damaged size everything is read as what it is not. Zeros are padding.
@@ -145,7 +145,8 @@ fn not_understood(file: &mut File, top: &[TopBox], file_len: u64) -> Option<Stri
     let read = file.seek(SeekFrom::Start(from)).and_then(|_| file.read_exact(&mut bytes));
     let padding = read.is_ok() && bytes.iter().all(|b| *b == 0);
     let n = file_len - from;
-    (!padding).then(|| format!("the last {n} bytes of the file are no part of it that is known: frames in them are lost"))
+    (!padding)
+        .then(|| format!("the last {n} bytes of the file are no part of it that is known: frames in them are lost"))
 }
 
 fn read_box(file: &mut File, b: &TopBox, file_len: u64) -> Result<Vec<u8>> {
