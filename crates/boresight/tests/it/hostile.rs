@@ -1,9 +1,11 @@
 //! Sound files of every kind, damaged in thousands of seeded ways: an error or a result, never a panic, and little memory.
 //!
 //! The same parsers have targets for `cargo fuzz` in `fuzz/`; this test needs no other toolchain. `BORESIGHT_MUTATIONS`
-//! sets how often each file is damaged (default 60).
+//! sets how often each file is damaged (default 60), `BORESIGHT_MUTATION_SECONDS` how long instead (each file), beginning with the seed
+//! `BORESIGHT_MUTATION_SEED` (default 0).
 
 use super::memory::peak_of;
+use boresight::io::tracks::ctc_write::write_folder;
 use boresight::io::tracks::{Format, ReadOptions, read, write};
 use boresight::io::{OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_tracks};
 use boresight::metrics::{MatchOptions, mot_scores};
@@ -12,6 +14,7 @@ use boresight::{Config, Error};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Most bytes that one input may have in use at a time. Frames are limited to 2¹⁶ pixels here and files are small; but while
 /// the `tiff` crate opens a file, its own default limits hold (256 MiB, of which damage can bring half to be taken).
@@ -60,8 +63,19 @@ fn damaged(sound: &[u8], seed: u64) -> Vec<u8> {
     bytes
 }
 
-fn rounds() -> u64 {
-    std::env::var("BORESIGHT_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(60)
+/// A number that the environment sets.
+fn set<T: std::str::FromStr>(name: &str) -> Option<T> {
+    std::env::var(name).ok().and_then(|n| n.parse().ok())
+}
+
+/// The seeds with which a file is damaged: a number of them, or as many as a time allows.
+fn seeds() -> impl Iterator<Item = u64> {
+    let first: u64 = set("BORESIGHT_MUTATION_SEED").unwrap_or(0);
+    let seconds: Option<f64> = set("BORESIGHT_MUTATION_SECONDS");
+    let (rounds, begun) = (set("BORESIGHT_MUTATIONS").unwrap_or(60), Instant::now());
+    (0..)
+        .take_while(move |k| seconds.map_or(*k < rounds, |s| begun.elapsed().as_secs_f64() < s))
+        .map(move |k| first + k)
 }
 
 /// Damages `sound` again and again and hands each wreck to `each` as a file of this name; both outcomes must occur.
@@ -71,7 +85,7 @@ fn torture(name: &str, sound: &[u8], mut each: impl FnMut(&Path) -> Result<(), E
     std::fs::write(&path, sound).unwrap();
     each(&path).unwrap_or_else(|e| panic!("{name}, undamaged: {e}"));
     let mut refused = 0;
-    for seed in 0..rounds() {
+    for seed in seeds() {
         let _ = std::fs::remove_file(&path);
         std::fs::write(&path, damaged(sound, seed)).unwrap();
         let peak = peak_of(|| {
@@ -235,10 +249,46 @@ fn damaged_configurations_and_scenes_are_survived() {
         Config::from_toml(&text, "config.toml").map(|_| ())
     });
     let seed = Seed::new(1);
-    let scene = toml::to_string(&named("ds2", seed).unwrap()).unwrap();
-    torture("scene.toml", scene.as_bytes(), |p| {
-        let text = String::from_utf8_lossy(&std::fs::read(p).unwrap()).into_owned();
-        let scene = SceneConfig::from_toml(&text)?;
-        scene.build(seed).map(|_| ())
+    // The second has a radar.
+    for name in ["ds2", "d1-fusion"] {
+        let scene = toml::to_string(&named(name, seed).unwrap()).unwrap();
+        torture(&format!("{name}.toml"), scene.as_bytes(), |p| {
+            let text = String::from_utf8_lossy(&std::fs::read(p).unwrap()).into_owned();
+            let scene = SceneConfig::from_toml(&text)?;
+            scene.build(seed).map(|_| ())
+        });
+    }
+}
+
+#[test]
+fn damaged_folders_of_cells_are_survived() {
+    let rows = "frame,track_id,x,y,width,height\n0,1,5,5,4,4\n0,2,15,9,4,4\n1,1,6,5,4,4\n2,1,7,5,4,4\n";
+    let made = tempfile::tempdir().unwrap();
+    std::fs::write(made.path().join("t.csv"), rows).unwrap();
+    let table = read(&made.path().join("t.csv"), None, ReadOptions::default(), false).unwrap().table;
+    write_folder(&table, Some(&made.path().join("RES")), Some((32, 24))).unwrap();
+    for damaged in ["res_track.txt", "mask001.tif"] {
+        let sound = std::fs::read(made.path().join("RES").join(damaged)).unwrap();
+        torture(damaged, &sound, |p| {
+            let folder = p.parent().unwrap();
+            for entry in std::fs::read_dir(made.path().join("RES")).unwrap().map(|e| e.unwrap()) {
+                if entry.file_name() != damaged {
+                    std::fs::copy(entry.path(), folder.join(entry.file_name())).unwrap();
+                }
+            }
+            read(folder, None, ReadOptions::default(), false).map(|_| ())
+        });
+    }
+}
+
+#[test]
+fn a_damaged_seqinfo_is_passed_over() {
+    let sound = b"[Sequence]\nname=MOT16-02\nimDir=img1\nframeRate=14\nseqLength=600\nimWidth=1920\n";
+    torture("seqinfo.ini", sound, |p| {
+        let table = p.with_file_name("det.txt");
+        std::fs::write(&table, "1,-1,10,20,5,5,1,-1,-1,-1\n2,-1,11,20,5,5,1,-1,-1,-1\n").unwrap();
+        let rate_hz = read_detections(&table, &TableOptions::default()).unwrap().rate_hz;
+        assert!(rate_hz > 0.0 && rate_hz.is_finite());
+        if rate_hz == 14.0 { Ok(()) } else { Err(Error::new(boresight::ErrorKind::Damaged, "another rate")) }
     });
 }

@@ -15,7 +15,7 @@ fn rate_of(ini: &str) -> Option<f64> {
     ini.lines().find_map(|line| {
         let (key, value) = line.split_once('=')?;
         let rate: f64 = if key.trim() == "frameRate" { value.trim().parse().ok()? } else { return None };
-        (rate.is_finite() && rate > 0.0).then_some(rate)
+        crate::time::check_rate(rate).is_ok().then_some(rate)
     })
 }
 
@@ -26,7 +26,7 @@ mod tests {
     #[test]
     fn the_rate_is_found_whatever_the_spacing() {
         assert_eq!(rate_of("[Sequence]\r\nname=A\r\nframeRate = 14\r\n"), Some(14.0));
-        assert_eq!(rate_of("frameRate=0"), None);
+        assert_eq!((rate_of("frameRate=0"), rate_of("frameRate=1e300")), (None, None));
         assert_eq!(rate_of(""), None);
     }
 }

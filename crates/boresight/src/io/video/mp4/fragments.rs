@@ -134,7 +134,6 @@ impl Reader {
             match &name {
                 b"tfhd" => {
                     (track, base) = read_header(&mut b, &mut d, moof_start, *end).ok_or_else(|| cut("tfhd"))?;
-                    self.strange += u32::from(!self.tracks.is_empty() && !self.tracks.contains(&track));
                 }
                 b"tfdt" if track == self.track => {
                     let version = b.version_flags().ok_or_else(|| cut("tfdt"))?.0;
@@ -148,6 +147,9 @@ impl Reader {
                 _ => {}
             }
         }
+        // Without a header it is of no track at all.
+        let known = track == self.track || self.tracks.contains(&track);
+        self.strange += u32::from(!known);
         Ok(())
     }
 
