@@ -123,7 +123,8 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
         );
     }
     let steps = timeline::steps(&track.samples, &track.edits, track.timescale, movie_timescale, fragmented)?;
-    if fragmented {
+    // A damaged size can hide every fragment.
+    if fragmented || !defaults.is_empty() {
         warnings.extend(not_understood(file, &top, file_len));
     }
     warnings.extend(timeline::hidden(&steps, &track.edits));
@@ -140,6 +141,13 @@ const TOP: [&[u8; 4]; 20] = [
 /// What follows the last box that is known: after a damaged size everything is read as what it is not. Zeros are padding.
 fn not_understood(file: &mut File, top: &[TopBox], file_len: u64) -> Option<String> {
     let odd = top.iter().find(|b| !TOP.contains(&&b.name)).map(|b| b.start);
+    if let (None, Some(last)) = (odd, top.last().filter(|b| b.end > file_len)) {
+        let name = String::from_utf8_lossy(&last.name);
+        let missing = last.end - file_len;
+        return Some(format!(
+            "its last '{name}' box claims {missing} bytes more than there are: frames in it or behind it are lost"
+        ));
+    }
     let from = odd.or_else(|| top.last().map(|b| b.end))?;
     let mut bytes = vec![0; usize::try_from(file_len.checked_sub(from)?).ok()?.min(1 << 16)];
     let read = file.seek(SeekFrom::Start(from)).and_then(|_| file.read_exact(&mut bytes));
