@@ -250,7 +250,7 @@ fn damaged_configurations_and_scenes_are_survived() {
     });
     let seed = Seed::new(1);
     // The second has a radar.
-    for name in ["ds2", "d1-fusion"] {
+    for name in ["ds2", "imager-radar"] {
         let scene = toml::to_string(&named(name, seed).unwrap()).unwrap();
         torture(&format!("{name}.toml"), scene.as_bytes(), |p| {
             let text = String::from_utf8_lossy(&std::fs::read(p).unwrap()).into_owned();
