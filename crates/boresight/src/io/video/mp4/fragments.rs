@@ -53,6 +53,8 @@ pub(super) struct Reader {
     /// Tracks that the file has, and whether a fragment's table names another one.
     tracks: Vec<u32>,
     strange: u32,
+    /// Tables with more rows than they count.
+    longer: u32,
     /// Number of the newest fragment, and how often the next one is not its successor.
     sequence: Option<u32>,
     skips: u32,
@@ -75,6 +77,7 @@ impl Reader {
             first_offset: None,
             tracks,
             strange: 0,
+            longer: 0,
             sequence: None,
             skips: 0,
             claimed_by_all: 0,
@@ -92,6 +95,9 @@ impl Reader {
         }
         if self.strange > 0 {
             signs.push(format!("{} tables are of a track that the file does not have", self.strange));
+        }
+        if self.longer > 0 {
+            signs.push(format!("{} tables hold more rows than they count", self.longer));
         }
         if unclaimed > 16 {
             signs.push(format!("{unclaimed} of {media} bytes of pictures and sound stand in no table"));
@@ -183,6 +189,7 @@ impl Reader {
         if (count as usize).checked_mul(row_len).is_none_or(|need| need > rows.len()) {
             return Err(cut("trun"));
         }
+        self.longer += u32::from(rows.len() >= (count as usize + 1) * row_len && row_len > 0);
         for i in 0..count as usize {
             let row = rows.get(i * row_len..(i + 1) * row_len).unwrap_or_default();
             let bytes = if size > 0 { be32(row, dur) } else { d.size };

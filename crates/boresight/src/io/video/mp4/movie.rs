@@ -44,6 +44,7 @@ struct Track {
     codec: Option<Codec>,
     samples: Vec<Sample>,
     reordered: bool,
+    odd: Vec<String>,
     edits: Vec<timeline::Edit>,
 }
 
@@ -127,6 +128,9 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
     if fragmented || !defaults.is_empty() {
         warnings.extend(not_understood(file, &top, file_len));
     }
+    let odd =
+        track.odd.iter().map(|o| format!("its tables are damaged, times and frames may be wrong or missing: {o}"));
+    warnings.extend(odd);
     warnings.extend(timeline::hidden(&steps, &track.edits));
     let Track { samples, timescale, reordered, .. } = track;
     Ok(Movie { codec, samples, steps, timescale, reordered, file_len, warnings })
@@ -226,6 +230,7 @@ fn read_track(mut trak: Cursor<'_>, file_len: u64) -> Result<Option<Track>> {
             track.codec = table.codec;
             track.samples = table.samples;
             track.reordered = table.reordered;
+            track.odd = table.odd;
         }
     }
     Ok(Some(track))

@@ -14,15 +14,26 @@ pub(super) struct Table {
     pub samples: Vec<Sample>,
     /// Whether composition and decoding times differ by more than a constant.
     pub reordered: bool,
+    /// What does not add up: damage by which times or frames may be wrong or missing.
+    pub odd: Vec<String>,
 }
+
+/// Other tables that may stand beside those that are read.
+const OTHERS: [&[u8; 4]; 15] = [
+    b"cslg", b"stsh", b"stz2", b"sdtp", b"stdp", b"padb", b"subs", b"sbgp", b"sgpd", b"saiz", b"saio", b"stps",
+    b"free", b"skip", b"uuid",
+];
 
 /// Reads `stbl`.
 pub(super) fn read(mut stbl: Cursor<'_>, file_len: u64) -> Result<Table> {
+    let mut odd = Vec::new();
     let mut found: [Option<Cursor<'_>>; 8] = [None; 8];
     const NAMES: [&[u8; 4]; 8] = [b"stsd", b"stts", b"ctts", b"stss", b"stsc", b"stsz", b"stco", b"co64"];
     while let Some((name, body)) = stbl.next_box() {
         if let Some(i) = NAMES.iter().position(|n| **n == name) {
             found[i].get_or_insert(body);
+        } else if !OTHERS.contains(&&name) {
+            odd.push(format!("'{}' is no table of a video", String::from_utf8_lossy(&name).escape_default()));
         }
     }
     let [stsd, stts, ctts, stss, stsc, stsz, stco, co64] = found;
@@ -33,13 +44,14 @@ pub(super) fn read(mut stbl: Cursor<'_>, file_len: u64) -> Result<Table> {
         .map(|size| Sample { offset: 0, size, cts: 0, dts: 0, duration: 0, sync: true, description: 0 })
         .collect();
     if samples.is_empty() {
-        return Ok(Table { codec, ..Table::default() });
+        return Ok(Table { codec, odd, ..Table::default() });
     }
     let stts = stts.ok_or_else(|| damaged("its 'stts' box, the frames' times, is missing"))?;
     fill_times(&mut samples, stts).ok_or_else(|| cut("stts"))?;
     let mut reordered = false;
     if let Some(ctts) = ctts {
         reordered = fill_composition(&mut samples, ctts).ok_or_else(|| cut("ctts"))?;
+        odd.extend(odd_composition(&samples, ctts));
     }
     if let Some(stss) = stss {
         fill_sync(&mut samples, stss).ok_or_else(|| cut("stss"))?;
@@ -55,7 +67,7 @@ pub(super) fn read(mut stbl: Cursor<'_>, file_len: u64) -> Result<Table> {
     if placed < samples.len() {
         return Err(damaged(format!("its tables place {placed} of {} frames", samples.len())));
     }
-    Ok(Table { codec, samples, reordered })
+    Ok(Table { codec, samples, reordered, odd })
 }
 
 /// Codec of each sample description; they must all be of one kind.
@@ -131,6 +143,23 @@ fn fill_composition(samples: &mut [Sample], mut ctts: Cursor<'_>) -> Option<bool
         }
     }
     Some(reordered)
+}
+
+/// What does not add up in the table of composition offsets: rows that count other frames than there are, two pictures at one time, a
+/// picture shown later than any order of decoding explains (16 pictures can wait, ITU-T H.264, A.3.1).
+fn odd_composition(samples: &[Sample], mut ctts: Cursor<'_>) -> Option<String> {
+    ctts.version_flags()?;
+    let count = ctts.u32()?;
+    let n: u64 = ctts.rows(count, 8)?.map(|r| u64::from(be32(r, 0))).sum();
+    if n != samples.len() as u64 {
+        return Some(format!("'ctts', the order of the pictures, counts {n} of {} frames", samples.len()));
+    }
+    let mut times: Vec<i64> = samples.iter().map(|s| s.cts).collect();
+    times.sort_unstable();
+    let longest = samples.iter().map(|s| i64::from(s.duration)).max()?;
+    let offset = || samples.iter().map(|s| s.cts - s.dts);
+    let odd = times.windows(2).any(|w| w[0] == w[1]) || offset().max()? - offset().min()? > 17 * longest;
+    odd.then(|| "'ctts', the order of the pictures, contradicts itself".to_string())
 }
 
 fn fill_sync(samples: &mut [Sample], mut stss: Cursor<'_>) -> Option<()> {
