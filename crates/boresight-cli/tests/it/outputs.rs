@@ -97,14 +97,16 @@ fn a_kill_at_any_moment_leaves_whole_files() {
             command.current_dir(dir.path()).args(line.split_whitespace()).stdout(Stdio::null()).stderr(Stdio::null());
             command
         };
+        let started = std::time::Instant::now();
         assert!(run().status().unwrap().success(), "{line}");
+        let took = started.elapsed();
         let whole = files(&out);
         std::fs::remove_dir_all(&out).unwrap();
         std::fs::create_dir(&out).unwrap();
         for step in 0..2 {
             let mut child = run().spawn().unwrap();
-            // Fixed moments; where they fall in a run differs from machine to machine and from time to time.
-            std::thread::sleep(Duration::from_micros(2000 + 3700 * (k as u64 * 2 + step)));
+            // Spread over nine tenths of what the run took: where they fall differs from time to time.
+            std::thread::sleep(took.mul_f64(0.9 * f64::from((2 * k as u32 + step) % 20) / 19.0));
             child.kill().unwrap();
             n_killed += u32::from(!child.wait().unwrap().success());
             for (path, content) in files(&out) {

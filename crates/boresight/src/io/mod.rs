@@ -2,6 +2,7 @@
 
 mod atomic;
 mod atomic_folder;
+#[cfg(feature = "images")]
 mod budget;
 #[cfg(feature = "images")]
 mod folder;
@@ -34,6 +35,7 @@ pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 
 pub use atomic::{AtomicFile, Output, write_whole};
 pub use atomic_folder::{AtomicFolder, remove_folder};
+#[cfg(feature = "images")]
 pub use budget::set_memory_budget;
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
