@@ -30,13 +30,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.distance > 0.0 && args.distance.is_finite()) {
         bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
     }
-    refuse_inputs(&args)?;
+    let named = [&args.truth, &args.result].into_iter().chain(&args.compare).chain(&args.detections);
+    named.into_iter().try_for_each(|input| refuse(&args, input))?;
     if images::are_frames(&args.truth) {
         return images::run(&args);
     }
     let mut results = Vec::with_capacity(1 + args.compare.len());
     for result in std::iter::once(&args.result).chain(&args.compare) {
         let found = sequences::find(&args.truth, result)?;
+        found.iter().flat_map(|s| [Some(&s.truth), s.result.as_ref()]).flatten().try_for_each(|i| refuse(&args, i))?;
         let read: Vec<_> = found.par_iter().map(|s| read::judge(&args, s)).collect::<boresight::Result<_>>()?;
         let (sequences, notes): (Vec<_>, Vec<Vec<String>>) = read.into_iter().unzip();
         let evaluation = ResultEvaluation::new(result, sequences);
@@ -64,11 +66,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     met(&args.require, &results[0].evaluation.values())
 }
 
-/// Refuses files of scores in the place of what is judged.
-fn refuse_inputs(args: &Args) -> boresight::Result<()> {
-    let outputs: Vec<&Path> = [&args.csv, &args.json, &args.html].into_iter().flatten().map(PathBuf::as_path).collect();
-    let inputs = [&args.truth, &args.result].into_iter().chain(&args.compare).chain(&args.detections);
-    inputs.into_iter().try_for_each(|i| boresight::io::refuse_to_overwrite(i, outputs.iter().copied()))
+/// Refuses files of scores in the place of an input.
+fn refuse(args: &Args, input: impl AsRef<Path>) -> boresight::Result<()> {
+    let outputs = [&args.csv, &args.json, &args.html].into_iter().flatten();
+    boresight::io::refuse_to_overwrite(input, outputs.map(PathBuf::as_path))
 }
 
 /// The notes of all sequences, with the sequence's name where there are several.

@@ -159,6 +159,9 @@ fn an_output_that_is_the_input_is_refused_whatever_it_is_called() {
     let made = boresight().current_dir(dir.path()).args(["simulate", "ds2", "--frames", "5", "-o", "png"]).output();
     assert!(made.unwrap().status.success());
     std::fs::write(at("t.toml"), "[[radars]]\nname = \"t\"\n").unwrap();
+    std::fs::create_dir(at("sets")).unwrap();
+    std::fs::copy(at("sim/gt.txt"), at("sets/a.txt")).unwrap();
+    std::fs::copy(at("sim/gt.txt"), at("sets/b.txt")).unwrap();
     let before = files(dir.path());
     for line in [
         "track in/detections.csv -o in",
@@ -177,6 +180,7 @@ fn an_output_that_is_the_input_is_refused_whatever_it_is_called() {
         "fuse run/tracks.csv t.csv -o run/config.toml --config run/config.toml",
         "evaluate sim/gt.txt t.csv --csv hard.csv",
         "evaluate sim/gt.txt t.csv --compare run/tracks.csv --json run/tracks.csv",
+        "evaluate sets sets --csv sets/a.txt",
         "evaluate sim/frames.y4m annotated.mp4 --csv annotated.mp4",
         "simulate sim/scene.toml -o sim",
         "simulate t.csv --radars t.toml -o .",
