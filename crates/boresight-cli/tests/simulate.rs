@@ -65,7 +65,7 @@ fn the_commands_of_the_chapter_simulate_work_and_find_the_targets() {
     let read = |p: &str| std::fs::read_to_string(dir.path().join(p)).unwrap();
     assert_eq!(read("out/tracks.csv"), read("piped/tracks.csv"));
     let own = of("evaluate own/truth.csv");
-    // Behind the blind time the truth counts the scene's frames and the tracks those of the folder.
+    // Behind the blind time too: frames have the numbers of their names.
     assert!(score(own, "Recall") > 0.8 && score(own, "Precision") > 0.9, "{own}");
     assert!(read("radar-only/far.csv").lines().count() > 10);
     assert!(read("own/radar-plots.csv").starts_with("frame,time_s,arrival_s,range_px,azimuth_rad"));

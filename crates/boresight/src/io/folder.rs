@@ -94,12 +94,12 @@ impl ImageFiles {
         Ok(source)
     }
 
-    /// Where the names' numbers have holes, times follow the numbers.
+    /// Where the names' numbers have holes, frames and times follow the numbers.
     fn note_holes(&mut self) {
         if let Some(found) = numbered::holes(&self.files) {
             let (before, behind) = found.first_hole;
             self.warnings.push(format!(
-                "{}: {} numbers are missing in the names, the first between {} and {}: times follow the numbers.",
+                "{}: {} numbers are missing in the names, the first between {} and {}: frames and times follow the numbers.",
                 self.info.label,
                 found.n_missing,
                 self.files[before].display(),
@@ -200,7 +200,7 @@ impl FrameSource for ImageFiles {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        let index = FrameIndex(self.n_given);
+        let n_given = self.n_given;
         let (at, pixels) = match self.first.take() {
             Some(first) => (0, first),
             None => match self.read_pixels() {
@@ -244,12 +244,12 @@ impl FrameSource for ImageFiles {
         };
         self.n_given += 1;
         // A name's number is that of a frame only as long as every file gave one.
-        let own = self.numbering.as_ref().filter(|_| at as u64 == index.0).and_then(|n| n.place(index.0));
-        if index.0 > 0 {
+        let own = self.numbering.as_ref().filter(|_| at as u64 == n_given).and_then(|n| n.place(n_given));
+        if n_given > 0 {
             self.place = own.unwrap_or(0).max(self.place + 1);
         }
         let time = Timestamp::from_secs_f64(self.place as f64 / self.options.rate_hz);
-        Ok(Some(Frame { index, time, pixels }))
+        Ok(Some(Frame { index: FrameIndex(self.place), time, pixels }))
     }
 
     fn warnings(&self) -> &[String] {

@@ -1,4 +1,4 @@
-//! Numbers in the names of a sequence's files: where frames are missing, the times behind the hole are later.
+//! Numbers in the names of a sequence's files: where frames are missing, the frames behind the hole have later numbers and times.
 //!
 //! Source: our own. Names that differ in one number only, which rises by the same step nearly everywhere, are numbered frames;
 //! a rise by several steps is a hole. Names of any other form, or with more holes than frames, say nothing.
