@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<()> {
     for input in &inputs {
         let base = Config::default();
         let started = std::time::Instant::now();
-        let (_, choice) = auto::open_and_choose(input, &base)?;
+        let (_, choice) = auto::open_and_choose(input, &base, &auto::Request::default())?;
         let elapsed = started.elapsed().as_secs_f64();
         let short: Vec<&str> = input.rsplit('/').take(2).collect();
         println!(

@@ -90,6 +90,7 @@ pub mod track;
 mod tracks;
 mod union_find;
 mod validate;
+pub mod verdict;
 mod view;
 pub mod vision;
 

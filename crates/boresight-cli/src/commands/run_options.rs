@@ -22,6 +22,9 @@ pub struct InputArgs {
     /// Configuration file; without it everything is chosen by looking at the first frames.
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Detector, instead of the one chosen, with the tracker and the rates that fit it: isolated, cfar (small and faint), moving (fixed camera), spot (particles), local (cells), colour.
+    #[arg(long, value_name = "NAME")]
+    pub detector: Option<auto::DetectorKind>,
     /// Change one key of the configuration, chosen or given: `tracker.coast-s=1`. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
@@ -91,6 +94,28 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
     }
     let given = args.config.as_deref().map(Config::from_file).transpose()?;
+    if let Some(kind) = args.detector {
+        let why = match (&given, boresight::io::is_table(&args.input)) {
+            (Some(_), _) => "with --config the detector stands in the configuration",
+            (None, true) => "a table of detections needs no detector",
+            (None, false) => "",
+        };
+        if !why.is_empty() {
+            return Err(Error::new(ErrorKind::Config, why)
+                .at(format!("--detector {kind}"))
+                .hint("leave one of the two out")
+                .into());
+        }
+    }
+    if let (Some(_), Some(rate)) = (&given, tracker.false_tracks_per_hour) {
+        return Err(Error::new(
+            ErrorKind::Config,
+            "with --config nothing is learnt, so the rate cannot be turned into a probability",
+        )
+        .at(format!("--false-tracks-per-hour {rate}"))
+        .hint("leave one of the two out, or set tracker.confirmation.existence.confirm-probability")
+        .into());
+    }
     let mut base = given.clone().unwrap_or_default();
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
@@ -112,11 +137,12 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         let input = Input::Frames(source, detector);
         return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None });
     }
-    let (mut source, mut choice) = auto::open_and_choose(&args.input, &base)?;
+    let request = auto::Request { detector: args.detector, false_tracks_per_hour: tracker.false_tracks_per_hour };
+    let (mut source, mut choice) = auto::open_and_choose(&args.input, &base, &request)?;
     let info = source.info().clone();
     // What the user sets holds for the first pass as well, and is not overruled by what it learns.
     choice.config = changed(choice.config, args, tracker)?;
-    let detector = auto::learn(&mut source, &mut choice, tracker.false_tracks_per_hour)?;
+    let detector = auto::learn(&mut source, &mut choice, &request)?;
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();

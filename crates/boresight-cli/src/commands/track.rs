@@ -8,6 +8,7 @@ use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
+use boresight::verdict::Observed;
 use boresight::{Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,11 +68,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
+    let mut observed = Observed::default();
     let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
+    sinks.push(Box::new(observed.sink()));
     let mut notes = notes(&args, &plan)?;
+    let settings = plan.config.clone();
     let config = folder.begin_config(&plan, input)?;
     let quiet = args.input.quiet;
     if !quiet {
@@ -85,9 +89,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         stop.go_on()
     });
     bar.finish_and_clear();
+    let verdict = observed.verdict(&settings);
+    let next = verdict.next.filter(|options| can_be_added(&args, options));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
+        notes.verdict = Some((verdict.sentence.clone(), verdict.is_doubtful));
+        notes.next = next.clone();
         add_outcome(&mut notes, &done);
         if let Some(report) = report {
             done.unwritten.extend(report.write(&notes).err());
@@ -104,8 +112,37 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     warnings.iter().for_each(|w| say!("warning: {w}"));
     if !quiet && done.summary.frames > 0 {
         say!("results: {}", folder.dir().display());
+        say!("verdict: {}{}", if verdict.is_doubtful { "doubtful: " } else { "" }, verdict.sentence);
+        if let Some(next) = next {
+            say!("try next: {}", command_with(&next));
+        }
     }
     run_options::outcome(input, done)
+}
+
+/// Whether these options may stand beside those given.
+fn can_be_added(args: &Args, options: &str) -> bool {
+    let of_choice = args.input.config.is_none();
+    if options.starts_with("--detector") {
+        of_choice && args.input.detector.is_none() && !boresight::io::is_table(&args.input.input)
+    } else if options.starts_with("--false-tracks-per-hour") {
+        of_choice && args.tracker.false_tracks_per_hour.is_none()
+    } else {
+        true
+    }
+}
+
+/// The command that was given with more options, as a shell takes it.
+fn command_with(options: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
+    let mut command = String::from("boresight");
+    for word in std::env::args_os().skip(1) {
+        let word = word.to_string_lossy();
+        let is_plain = !word.is_empty() && word.chars().all(plain);
+        command.push(' ');
+        command.push_str(&if is_plain { word.into_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) });
+    }
+    format!("{command} {options}")
 }
 
 /// The files that a run with frames makes.

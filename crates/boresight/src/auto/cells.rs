@@ -23,6 +23,8 @@ const COMPACT_SHARE: f64 = 0.75;
 const CUT_OUT: [f64; 2] = [0.005, 0.4];
 /// Largest ratio of the upper to the lower quartile of the areas.
 const MOST_SPREAD: f64 = 3.0;
+/// Area of a cell where none was seen, px.
+const ASSUMED_AREA_PX: f64 = 400.0;
 
 /// What was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +62,14 @@ fn is_compact(d: &Detection) -> bool {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Cells>> {
+    let (seen, fits) = count(frames, info)?;
+    Ok(fits.then_some(seen))
+}
+
+/// The compact pieces in the frames, and whether they are cells.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Cells, bool)> {
     let pixels = (info.width * info.height) as f64;
     // A thing of less than 10 px across is a spot, not a cell.
     let specks = 60;
@@ -86,7 +96,8 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Cells>> {
         && (CUT_OUT[0]..=CUT_OUT[1]).contains(&share)
         && compact >= COMPACT_SHARE * all
         && at(0.75) <= MOST_SPREAD * at(0.25);
-    Ok(fits.then(|| Cells { per_frame, area_px: at(0.5) }))
+    let area_px = if areas.is_empty() { ASSUMED_AREA_PX } else { at(0.5) };
+    Ok((Cells { per_frame, area_px }, fits))
 }
 
 /// Writes detector and tracker.

@@ -3,7 +3,9 @@
 //! Source: our own. Tried in this order, the first that fits: a target told by its colour, things that move before a fixed camera, particles,
 //! cells, isolated targets.
 
+use super::asked;
 use super::interval::interval_s;
+use super::request::DetectorKind;
 use super::scene::{self, Scene};
 use super::{cells, colour, faint, moving, particles, spots};
 use crate::io::Colour;
@@ -25,7 +27,7 @@ pub struct Choice {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
-    choose_seen(frames, scene::look(frames, info)?, &[], info, base)
+    choose_seen(frames, scene::look(frames, info)?, &[], info, base, None)
 }
 
 /// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
@@ -35,6 +37,7 @@ pub(super) fn choose_seen(
     second: &[Frame],
     info: &SourceInfo,
     base: &Config,
+    asked: Option<DetectorKind>,
 ) -> Result<Choice> {
     let mut reasons = Vec::new();
     let mut config = base.clone();
@@ -59,7 +62,11 @@ pub(super) fn choose_seen(
     }
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
-    if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
+    if let Some(kind) = asked {
+        let mut choice = Choice { config, reasons };
+        asked::configure(kind, frames, second, &scene, interval_s, info, &mut choice)?;
+        Choice { config, reasons } = choice;
+    } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
         colour::configure(&reference, &scene, info, &mut config, &mut reasons);
     } else if moving::fits(&scene, info) {
         moving::configure(&scene, info, &mut config, &mut reasons);

@@ -9,11 +9,12 @@
 //! Limits: one density for the whole field; a target that is never confirmed counts as false detections.
 
 use super::digits::round;
+use super::first_scans::{Shares, first};
 use crate::track::{ClutterConfig, ConfirmationConfig, ExistenceConfig};
 use crate::{Config, Result, Scan, TrackStatus};
 use std::collections::BTreeMap;
 
-/// The tracker runs this often; the first run only has the assumed rule, the last changes the numbers by some per cent.
+/// The tracker runs this often: the first time under the assumed rule, the second under the one learnt from it.
 const PASSES: usize = 2;
 /// False tracks that are allowed where nobody says how many: one an hour, or one for a hundred targets that come if that is more.
 const FALSE_PER_HOUR: f64 = 1.0;
@@ -36,6 +37,10 @@ const LEAST_LIFE_S: f64 = 2.0;
 const MOST_FALSE_MOTION: f64 = 0.01;
 /// Fewer scans than this tell nothing.
 const LEAST_SCANS: usize = 8;
+
+/// What is said where a rate of false tracks was asked for and cannot be given.
+pub const RATE_WITHOUT_EFFECT: &str = "--false-tracks-per-hour has no effect here: pieces of regions and boxes of an object detector are no independent false detections, so tracks are \
+    confirmed by the number of their hits (tracker.confirmation).";
 
 /// What was found, in the last of the passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,6 +80,7 @@ pub fn learn(
     reasons: &mut Vec<String>,
 ) -> Result<Found> {
     let mut found = Found::default();
+    let scans = first(scans);
     let n_scans = scans.len();
     let (Some(first), Some(last)) = (scans.first(), scans.last()) else { return Ok(found) };
     let over_s = last.time.seconds_since(first.time);
@@ -152,12 +158,10 @@ fn share(yes: usize, no: usize, prior: [f64; 2]) -> f64 {
 fn run(scans: &[Scan], config: &Config) -> Result<BTreeMap<u64, Seen>> {
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Seen> = BTreeMap::new();
-    let mut taken = Vec::new();
+    let mut shares = Shares::default();
     for (k, scan) in scans.iter().enumerate() {
         let states = tracker.step(scan)?;
-        taken.clear();
-        taken.resize(scan.detections.len(), 0u8);
-        states.iter().filter_map(|s| s.detection).for_each(|j| taken[j as usize] = taken[j as usize].saturating_add(1));
+        shares.count(scan.detections.len(), states);
         for s in states {
             let t = tracks.entry(s.id.0).or_insert(Seen { first: k, ..Seen::default() });
             t.confirmed |= s.status != TrackStatus::Tentative;
@@ -169,7 +173,7 @@ fn run(scans: &[Scan], config: &Config) -> Result<BTreeMap<u64, Seen>> {
             }
             t.last = k;
             t.hits += 1;
-            t.own += usize::from(taken[j as usize] == 1);
+            t.own += usize::from(shares.is_one(j));
         }
     }
     Ok(tracks)

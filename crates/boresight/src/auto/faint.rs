@@ -34,34 +34,59 @@ fn detector(polarity: Polarity) -> DetectorConfig {
     DetectorConfig { threshold: ThresholdConfig::Cfar(cfar), max_detections: Some(5000), ..DetectorConfig::default() }
 }
 
-/// Looks for faint targets in the frames; the polarity of which there are more, if there are more than false alarms.
+/// Counts the detections at that rate in the frames: those of the polarity of which there are more, and the frames looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Faint>> {
-    let mut best: Option<Faint> = None;
+pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Faint, f64)> {
+    let mut best = Faint { polarity: Polarity::Bright, per_frame: 0.0 };
+    let mut looks = 0.0;
     for polarity in [Polarity::Bright, Polarity::Dark] {
         let mut detector = crate::vision::build(&detector(polarity), info)?;
-        let (mut scan, mut n, mut looks) = (Scan::default(), 0.0, 0.0);
+        let (mut scan, mut n) = (Scan::default(), 0.0);
+        looks = 0.0;
         for frame in spread(frames, LOOKS) {
             detector.detect(frame, &mut scan)?;
             n += scan.detections.len() as f64;
             looks += 1.0;
         }
-        let expected: f64 = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * looks;
         let per_frame = n / f64::max(looks, 1.0);
-        if n > expected + SURE_STDS * expected.sqrt() && best.is_none_or(|b| per_frame > b.per_frame) {
-            best = Some(Faint { polarity, per_frame });
+        if per_frame > best.per_frame {
+            best = Faint { polarity, per_frame };
         }
     }
-    Ok(best)
+    Ok((best, looks))
+}
+
+/// Faint targets, if there are more detections than false alarms.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Faint>> {
+    let (seen, looks) = count(frames, info)?;
+    let expected: f64 = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * looks;
+    Ok((seen.per_frame * looks > expected + SURE_STDS * expected.sqrt()).then_some(seen))
 }
 
 /// Puts the detector for faint targets in the place of that for isolated ones; scores are now -log10 of a number of false alarms.
-pub fn configure(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
+fn replace(faint: &Faint, config: &mut Config) {
     let camera = config.detector.camera;
     config.detector = detector(faint.polarity);
     config.detector.camera = camera;
     config.tracker.min_initiation_score = 0.0;
+}
+
+/// Writes the detector where it was asked for.
+pub fn configure_asked(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
+    replace(faint, config);
+    reasons.push(format!(
+        "{:.1} {} things a frame are found at {FALSE_ALARMS_PER_FRAME} false alarm a frame (detector.threshold.cfar.false-alarms-per-frame).",
+        faint.per_frame,
+        if faint.polarity == Polarity::Dark { "dark" } else { "bright" },
+    ));
+}
+
+/// Writes the detector where isolated targets are not found.
+pub fn configure(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
+    replace(faint, config);
     reasons.push(format!(
         "But {:.1} {} things a frame exceed the one false alarm a frame that is allowed: so faint targets are looked for \
          (detector.threshold.cfar).",

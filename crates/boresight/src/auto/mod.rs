@@ -4,6 +4,7 @@
 //! the same configuration given back gives the identical result. [`open_and_choose`] is the whole way from an input's name to its frames
 //! and configuration.
 
+mod asked;
 mod cells;
 mod choose;
 mod colour;
@@ -12,12 +13,14 @@ mod detections;
 mod digits;
 mod faint;
 mod first_pass;
+mod first_scans;
 mod interval;
 mod moving;
 mod noise;
 mod open;
 mod particles;
 mod replay;
+mod request;
 mod scene;
 mod second_look;
 mod spots;
@@ -27,4 +30,5 @@ pub use choose::{Choice, choose};
 pub use detections::for_detections;
 pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose};
 pub use replay::Replay;
+pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

@@ -7,12 +7,13 @@
 //! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
 use super::choose::{Choice, choose_seen};
-use super::detection_statistics::Found;
+use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
 use super::first_pass::{FirstPass, frames_ahead};
 use super::replay::Replay;
+use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
-use super::{detection_statistics, noise};
+use super::{first_scans, noise};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
@@ -46,20 +47,21 @@ opaque_debug!(Opened);
 /// Opens an input and proposes its configuration; the source hands out every frame from the first on.
 /// # Errors
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
-pub fn open_and_choose(input: &str, base: &Config) -> Result<(Replay, Choice)> {
+pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
     let read = |config: &Config| -> Result<Replay> {
         let source = crate::io::open(input, &config.input.open_options())?;
         // A stream waits for nothing longer than the choice needs.
-        let most = if second_look::can_be_opened_twice(input) { noise::MOST_SCANS } else { PROBE_FRAMES };
+        let most = if second_look::can_be_opened_twice(input) { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, LEARN_BYTES);
         Ok(Replay::new(source, n))
     };
     let mut frames = read(base)?;
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
-    let look_again = scene.camera == Camera::Fixed && second_look::can_be_opened_twice(input);
+    let look_again = (scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour))
+        && second_look::can_be_opened_twice(input);
     let second = if look_again { second_look::frames(input, base, PROBE_FRAMES) } else { Vec::new() };
-    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base)?;
+    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)?;
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
     }
@@ -75,23 +77,20 @@ fn probed(ahead: &[Frame]) -> &[Frame] {
 /// where they end, so no frame is detected twice.
 /// # Errors
 /// A parameter out of its range.
-pub fn learn(
-    frames: &mut Replay,
-    choice: &mut Choice,
-    false_tracks_per_hour: Option<f64>,
-) -> Result<Box<dyn Detector>> {
+pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Box<dyn Detector>> {
+    let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let detector = crate::vision::build(&choice.config.detector, &info)?;
     let mut pass = FirstPass::over(frames.ahead(), detector);
     let area_px2 = (info.width * info.height).max(1) as f64;
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
-    if choice.config.tracker.report == Report::Moving && found.n_targets == 0 {
+    if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
         // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them.
         let mut still = assumed;
         still.config.tracker.report = Report::All;
         let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut still)?;
-        if things.n_targets > 0 && things.per_scan <= FEW_STILL {
+        if let Some(things) = things.filter(|f| f.n_targets > 0 && f.per_scan <= FEW_STILL) {
             still.reasons.push(format!(
                 "Nothing moves by itself, but {:.1} things a frame stand there: they are reported.",
                 things.per_scan
@@ -102,15 +101,22 @@ pub fn learn(
     Ok(Box::new(pass))
 }
 
-/// Learns noise and motion, and of points what the detections are made of.
-fn statistics(scans: &[Scan], area_px2: f64, false_tracks_per_hour: Option<f64>, choice: &mut Choice) -> Result<Found> {
+/// Learns noise and motion, and of points what the detections are made of; of regions this is not known, and their rule stays.
+fn statistics(
+    scans: &[Scan],
+    area_px2: f64,
+    false_tracks_per_hour: Option<f64>,
+    choice: &mut Choice,
+) -> Result<Option<Found>> {
     noise::learn(scans, area_px2, &mut choice.config, &mut choice.reasons)?;
     if !is_of_points(&choice.config.detector.threshold) {
-        // Their rule stays, and nobody asks what it found.
-        return Ok(Found { n_targets: 1, per_scan: 0.0 });
+        if false_tracks_per_hour.is_some() {
+            choice.reasons.push(RATE_WITHOUT_EFFECT.to_string());
+        }
+        return Ok(None);
     }
     let Choice { config, reasons } = choice;
-    detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons)
+    detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons).map(Some)
 }
 
 /// Whether what is detected is a point or a blob that stands alone: one detection a target, false ones anywhere. Regions come in pieces, which lie where
@@ -142,8 +148,8 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
 /// # Errors
 /// An input that cannot be read; a parameter out of its range.
 pub fn open(input: &str, base: &Config) -> Result<Opened> {
-    let (mut frames, mut choice) = open_and_choose(input, base)?;
-    let detector = learn(&mut frames, &mut choice, None)?;
+    let (mut frames, mut choice) = open_and_choose(input, base, &Request::default())?;
+    let detector = learn(&mut frames, &mut choice, &Request::default())?;
     Ok(Opened {
         frames: Box::new(frames),
         detector,
@@ -151,4 +157,80 @@ pub fn open(input: &str, base: &Config) -> Result<Opened> {
         config: choice.config,
         reasons: choice.reasons,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::DetectorConfig;
+    use crate::vision::isolated::IsolatedConfig;
+    use crate::{FrameIndex, Image, PixelKind, Pixels, SourceInfo, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const SIZE: [usize; 2] = [160, 120];
+
+    struct Memory(std::vec::IntoIter<Frame>, SourceInfo);
+
+    impl FrameSource for Memory {
+        fn info(&self) -> &SourceInfo {
+            &self.1
+        }
+
+        fn next_frame(&mut self) -> Result<Option<Frame>> {
+            Ok(self.0.next())
+        }
+    }
+
+    /// What is reported of 100 frames of noise with bright squares of 4 px at these places and speeds, px a frame.
+    fn reported(squares: &[([f64; 2], f64)]) -> (Report, Vec<String>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let frames: Vec<Frame> = (0..100u64)
+            .map(|k| {
+                let noise = (0..SIZE[0] * SIZE[1]).map(|_| 60 + rng.random_range(0..6u8)).collect();
+                let mut image = Image::from_vec(SIZE[0], SIZE[1], noise).unwrap();
+                for ([x, y], speed) in squares {
+                    let x = (x + speed * k as f64) as usize;
+                    (0..4).for_each(|dy| image.row_mut(*y as usize + dy)[x..x + 4].fill(200));
+                }
+                Frame {
+                    index: FrameIndex(k),
+                    time: Timestamp::from_secs_f64(0.04 * k as f64),
+                    pixels: Pixels::Gray8(image),
+                }
+            })
+            .collect();
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: SIZE[0],
+            height: SIZE[1],
+            kind: PixelKind::Gray8,
+            n_frames: Some(100),
+            rate_hz: Some(25.0),
+            true_times: true,
+        };
+        let mut config = Config::default();
+        config.detector = DetectorConfig {
+            threshold: ThresholdConfig::Isolated(IsolatedConfig::default()),
+            ..DetectorConfig::default()
+        };
+        config.tracker.report = Report::Moving;
+        let mut choice = Choice { config, reasons: Vec::new() };
+        let mut frames = Replay::new(Box::new(Memory(frames.into_iter(), info)), 100);
+        learn(&mut frames, &mut choice, &Request::default()).unwrap();
+        (choice.config.tracker.report, choice.reasons)
+    }
+
+    #[test]
+    fn what_stands_is_reported_where_nothing_moves_and_only_there() {
+        let still = ([40.0, 40.0], 0.0);
+        let (report, reasons) = reported(&[still]);
+        assert_eq!(report, Report::All, "{reasons:?}");
+        assert!(reasons.iter().any(|r| r.contains("Nothing moves by itself")));
+        assert_eq!(reported(&[still, ([20.0, 80.0], 1.0)]).0, Report::Moving);
+        let many: Vec<([f64; 2], f64)> =
+            (0..8).map(|i| ([20.0 + 30.0 * f64::from(i % 4), 30.0 + 40.0 * f64::from(i / 4)], 0.0)).collect();
+        assert_eq!(reported(&many).0, Report::Moving, "eight things are a landscape");
+    }
 }

@@ -7,6 +7,10 @@ pub struct Notes {
     pub title: String,
     /// Name of the input.
     pub input: String,
+    /// What is thought of the run, a sentence, and whether it is doubted; the page begins with it.
+    pub verdict: Option<(String, bool)>,
+    /// Options of the same command to try next.
+    pub next: Option<String>,
     /// Further lines of the summary: name and value.
     pub facts: Vec<(String, String)>,
     /// The settings chosen, each with its reason, one line each.

@@ -36,6 +36,7 @@ pub(super) fn page(notes: &Notes, seen: &Collected) -> String {
             body {
                 main {
                     h1 { (title) }
+                    (verdict(notes))
                     (warnings(notes))
                     div class="two" {
                         (summary(notes, seen))
@@ -54,6 +55,16 @@ pub(super) fn page(notes: &Notes, seen: &Collected) -> String {
         }
     };
     page.into_string() + "\n"
+}
+
+fn verdict(notes: &Notes) -> Markup {
+    let Some((sentence, doubtful)) = &notes.verdict else { return Markup::default() };
+    html! {
+        section class=(if *doubtful { "verdict doubtful" } else { "verdict" }) aria-label="Verdict" {
+            p { strong { @if *doubtful { "Doubtful: " } } (printable(sentence)) }
+            @if let Some(next) = &notes.next { p { "Try next the same command with " code { (printable(next)) } } }
+        }
+    }
 }
 
 fn warnings(notes: &Notes) -> Markup {

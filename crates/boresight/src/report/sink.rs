@@ -136,6 +136,8 @@ mod tests {
         let notes = Notes {
             title: evil.into(),
             input: evil.into(),
+            verdict: Some((evil.into(), true)),
+            next: Some(evil.into()),
             facts: vec![(evil.into(), evil.into())],
             settings: vec![evil.into()],
             configuration: Some(evil.into()),

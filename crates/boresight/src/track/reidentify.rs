@@ -174,7 +174,8 @@ fn log_ratio(
     gap_s: f64,
     field: &Field,
 ) -> Option<f64> {
-    let c = (before.cov + now.cov).cholesky()?;
+    let cov = before.cov + now.cov;
+    let c = cov.cholesky()?;
     let difference = now.mean - before.mean;
     let log_det = 2.0 * c.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let straight = -0.5 * (difference.dot(&c.solve(&difference)) + log_det) - 2.0 * std::f64::consts::TAU.ln();
@@ -183,11 +184,10 @@ fn log_ratio(
     // Of a velocity that says nothing of the one before.
     let any_velocity = -(std::f64::consts::TAU * speed_var).ln() - 0.5 * speed2(now) / speed_var;
     let reach2 = 0.5 * (speed2(before) + speed2(now)) * gap_s * gap_s;
-    let (dx, dy) = (difference[0], difference[2]);
-    let cov = before.cov + now.cov;
+    let apart = Vector2::new(difference[0], difference[2]);
     let s = Matrix2::new(cov[(0, 0)] + reach2, cov[(0, 2)], cov[(0, 2)], cov[(2, 2)] + reach2);
     let turned = TURNED.ln()
-        - 0.5 * (s.try_inverse()? * Vector2::new(dx, dy)).dot(&Vector2::new(dx, dy))
+        - 0.5 * apart.dot(&s.cholesky()?.solve(&apart))
         - (std::f64::consts::TAU * s.determinant().sqrt()).ln()
         + any_velocity;
     let grown = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
@@ -226,6 +226,32 @@ mod tests {
             seen = tracker.step(&scan).unwrap().to_vec();
         }
         seen.iter().filter(|s| s.status == TrackStatus::Confirmed).map(|s| s.id.0).collect()
+    }
+
+    #[test]
+    fn a_target_that_turns_back_out_of_sight_keeps_its_id_and_another_place_does_not() {
+        // Seen to x = 160 px at 2 s at 30 px/s, then from 0.6 s later on flying back at 30 px/s from where it would have been after 0.3 s.
+        let back = |from_px: f64| {
+            let config = TrackerConfig {
+                reidentification: ReidentificationConfig { max_gap_s: 2.0 },
+                field_px: Some([640.0, 512.0]),
+                ..TrackerConfig::default()
+            };
+            let mut tracker = Tracker::new(&config).unwrap();
+            let mut seen = Vec::new();
+            for k in 0..120u64 {
+                let t = k as f64 * 0.04;
+                let x = if t <= 2.0 { 100.0 + 30.0 * t } else { from_px - 30.0 * (t - 2.6) };
+                let at = Vector2::new(x, 200.0);
+                let d = Detection::at(at, Matrix2::identity() * 0.1).with_extent(Extent::around(at, 5.0, 5.0));
+                let d = if t > 2.0 && t < 2.6 { vec![] } else { vec![d] };
+                let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(t)).with_detections(d);
+                seen = tracker.step(&scan).unwrap().to_vec();
+            }
+            seen.iter().filter(|s| s.status == TrackStatus::Confirmed).map(|s| s.id.0).collect::<Vec<_>>()
+        };
+        assert_eq!(back(160.0), [1], "it turned at 169 px");
+        assert_eq!(back(350.0), [2], "nothing of 30 px/s gets there");
     }
 
     #[test]

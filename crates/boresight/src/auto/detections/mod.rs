@@ -8,8 +8,9 @@ mod links;
 mod scores;
 
 use super::choose::REIDENTIFY_S;
+use super::detection_statistics::{self, RATE_WITHOUT_EFFECT};
 use super::digits::round;
-use super::{detection_statistics, noise};
+use super::noise;
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
     OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
@@ -40,7 +41,11 @@ pub fn for_detections(
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
     let _ = noise::learn(scans, area_px2, config, reasons);
-    if !of_boxes {
+    if of_boxes {
+        if false_tracks_per_hour.is_some() {
+            reasons.push(RATE_WITHOUT_EFFECT.to_string());
+        }
+    } else {
         let _ = detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons);
     }
 }

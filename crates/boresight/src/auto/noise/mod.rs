@@ -7,6 +7,7 @@
 mod fit;
 
 use super::digits::round;
+use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
@@ -19,9 +20,6 @@ const LEAST_STEPS: usize = 60;
 const GATE_PROBABILITY: f64 = 0.9999;
 /// How long targets are one detection when they pass each other, s.
 const MERGED_S: f64 = 1.0;
-/// Most scans and detections of the first pass: half a minute of most videos, or of a table; a guard of time and memory.
-pub const MOST_SCANS: usize = 1000;
-const MOST_DETECTIONS: usize = 2_000_000;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
 
@@ -46,24 +44,18 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
-    let mut taken = Vec::new();
-    let mut n_seen = 0usize;
-    for scan in scans.iter().take(MOST_SCANS) {
-        n_seen += scan.detections.len();
-        if n_seen > MOST_DETECTIONS {
-            break;
-        }
+    let mut shares = Shares::default();
+    let scans = first(scans);
+    for scan in scans {
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
         ground.scan_on_ground(scan, &mut on_ground);
-        taken.clear();
-        taken.resize(scan.detections.len(), 0u8);
-        states.iter().filter_map(|s| s.detection).for_each(|j| taken[j as usize] = taken[j as usize].saturating_add(1));
+        shares.count(scan.detections.len(), states);
         for s in states {
             let of = tracks.entry(s.id.0).or_default();
             of.confirmed |= s.status != TrackStatus::Tentative;
             let Some(j) = s.detection else { continue };
-            if taken[j as usize] != 1 {
+            if !shares.is_one(j) {
                 continue;
             }
             let d = &on_ground.detections[j as usize];
@@ -106,7 +98,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
         "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} px and {:.4} of a box height beyond them, acceleration density \
          {:.3} px²/s³ and {:.4} heights²/s³.",
         series.len(),
-        scans.len().min(MOST_SCANS),
+        scans.len(),
         t.detection_covariance_scale,
         t.extra_noise_px,
         t.extra_noise_per_height,

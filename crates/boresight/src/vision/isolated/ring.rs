@@ -69,7 +69,7 @@ impl Ring {
         {
             // Of a whole ring the plane's height in the middle is the mean. The rest of the judgement only lowers the score.
             let n = (x1 - x0 + 1) * (y1 - y0 + 1) - (inner.2 - inner.0 + 1) * (inner.3 - inner.1 + 1);
-            let most = sign * (mean - (all - middle) / n as f64);
+            let most = sign * (mean - (all - middle) / n as f64) + 2.0 * sums.error() / n as f64;
             if most < min_score * least_unit * (1.0 - 1e-9) {
                 return None;
             }
@@ -158,4 +158,55 @@ fn fit(samples: &[(f64, f64, f64)]) -> Option<Vector3<f64>> {
     let a = Matrix3::new(samples.len() as f64, sx, sy, sx, sxx, sxy, sy, sxy, syy);
     let b = Vector3::new(sv, sxv, syv);
     a.cholesky().map(|c| c.solve(&b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The scores of random blobs in noise about `level`, with the quick bound and without it.
+    fn scores<T: Pixel>(level: f64, amplitude: f64, pixel: impl Fn(f64) -> T) -> [Vec<Option<f64>>; 2] {
+        const SIDE: usize = 64;
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let noise: Vec<T> = (0..SIDE * SIDE).map(|_| pixel(level + amplitude * (rng.random::<f64>() - 0.5))).collect();
+        let mut out = [Vec::new(), Vec::new()];
+        for n in 0..400u32 {
+            let mut image = Image::from_vec(SIDE, SIDE, noise.clone()).unwrap();
+            let (left, top) = (8 + rng.random_range(0..40u32), 8 + rng.random_range(0..40u32));
+            let (right, bottom) = (left + rng.random_range(0..6u32), top + rng.random_range(0..6u32));
+            // From invisible to far above the noise.
+            let height = amplitude * (0.5 + f64::from(n % 20) / 4.0);
+            for y in top..=bottom {
+                for x in left..=right {
+                    image.row_mut(y as usize)[x as usize] = pixel(level + height);
+                }
+            }
+            let blob = Blob::of_box([left, top, right, bottom]);
+            let mut known = Sums::default();
+            known.read(&image);
+            for (sums, out) in [known, Sums::default()].iter().zip(&mut out) {
+                let cut = level + 0.45 * height;
+                let found = Ring::default().judge(&image, sums, Side::Bright, cut, &blob, 0.3 * amplitude, 4.0);
+                out.push(found.map(|c| c.score).filter(|s| *s >= 4.0));
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn the_quick_bound_loses_no_blob() {
+        let same = |[quick, slow]: [Vec<Option<f64>>; 2]| {
+            assert_eq!(quick, slow);
+            let n = slow.iter().flatten().count();
+            assert!((40..360).contains(&n), "{n} of 400 reach the score: both answers must occur");
+        };
+        same(scores(100.0, 20.0, |v| v as u8));
+        same(scores(3000.0, 500.0, |v| v as u16));
+        same(scores(0.5, 0.1, |v| v as f32));
+        // Far from zero: sums of a frame round by more than the blobs are high.
+        same(scores(1e9, 2e4, |v| v as f32));
+        same(scores(1e16, 3e10, |v| v as f32));
+    }
 }

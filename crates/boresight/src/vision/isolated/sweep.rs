@@ -22,6 +22,13 @@ pub struct Blob {
 }
 
 impl Blob {
+    /// A blob that fills its box.
+    #[cfg(test)]
+    pub fn of_box([left, top, right, bottom]: [u32; 4]) -> Self {
+        let area = (right - left + 1) * (bottom - top + 1);
+        Self { parent: 0, area, left, right, top, bottom, seed: left }
+    }
+
     /// Whether the two boxes hold each other's middles: nested clusters of one thing.
     pub fn overlaps(&self, other: &Self) -> bool {
         let holds_middle = |a: &Self, b: &Self| {

@@ -1,0 +1,90 @@
+//! What a user asks of the automatic choice; everything else it decides by what it sees.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A detector asked for by its word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DetectorKind {
+    /// Targets of any size that stand clear of their surroundings.
+    Isolated,
+    /// Small and faint targets at a stated rate of false alarms.
+    Cfar,
+    /// What moves before a fixed camera.
+    Moving,
+    /// Many small spots: particles, seeds, stars.
+    Spot,
+    /// Bright compact pieces on an even dark ground: cells, nuclei.
+    Local,
+    /// A moving thing told by its colour, before a fixed camera.
+    Colour,
+}
+
+impl DetectorKind {
+    /// All of them, in the order in which they are listed.
+    pub const ALL: [Self; 6] = [Self::Isolated, Self::Cfar, Self::Moving, Self::Spot, Self::Local, Self::Colour];
+
+    /// Its word: the key below `detector.threshold`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Isolated => "isolated",
+            Self::Cfar => "cfar",
+            Self::Moving => "moving",
+            Self::Spot => "spot",
+            Self::Local => "local",
+            Self::Colour => "colour",
+        }
+    }
+
+    /// What it is for, a few words.
+    pub const fn purpose(self) -> &'static str {
+        match self {
+            Self::Isolated => "targets of any size that stand clear of their surroundings",
+            Self::Cfar => "small and faint targets at a stated rate of false alarms",
+            Self::Moving => "what moves before a fixed camera",
+            Self::Spot => "many small spots: particles, seeds, stars",
+            Self::Local => "bright compact pieces on an even dark ground: cells",
+            Self::Colour => "one moving thing of a colour of its own before a fixed camera",
+        }
+    }
+}
+
+impl fmt::Display for DetectorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for DetectorKind {
+    type Err = crate::Error;
+
+    fn from_str(word: &str) -> crate::Result<Self> {
+        Self::ALL.into_iter().find(|k| k.name() == word).ok_or_else(|| {
+            let all = Self::ALL.map(|k| format!("{} ({})", k.name(), k.purpose())).join(", ");
+            crate::Error::new(crate::ErrorKind::Config, "there is no such detector to choose").at(word).hint(all)
+        })
+    }
+}
+
+/// What is asked of the choice; nothing by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Request {
+    /// Detector, where it is not to be chosen.
+    pub detector: Option<DetectorKind>,
+    /// False tracks an hour that are allowed.
+    pub false_tracks_per_hour: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_means_its_detector_and_another_is_refused_with_the_list() {
+        for kind in DetectorKind::ALL {
+            assert_eq!(kind.name().parse::<DetectorKind>().unwrap(), kind);
+        }
+        let error = "movng".parse::<DetectorKind>().unwrap_err().to_string();
+        assert!(error.contains("movng") && error.contains("moving (what moves"), "{error}");
+    }
+}

@@ -1,0 +1,343 @@
+//! The verdict on a run: one sentence that says what was found and whether its own statistics believe it, and what to try where they do not.
+//!
+//! Source: our own. A sink counts while the run goes on; the first of these that holds is said:
+//! nothing was detected; nothing was tracked; only things at rest were tracked; the boxes are as large as a ground; tracks last for moments; the innovations
+//! are not as large as the filter says. Otherwise the tracks are believed.
+//! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
+
+use crate::track::{ConfirmationConfig, Report};
+use crate::vision::threshold::ThresholdConfig;
+use crate::{Config, Result, Sink, TrackStatus, View};
+use std::collections::BTreeMap;
+
+/// A thing that was followed for so many detections and never reported stands still, or nearly.
+const FOLLOWED_HITS: u32 = 10;
+/// A box of this share of the frame is no target before its surroundings, but the surroundings.
+const LARGE_SHARE: f64 = 0.25;
+/// Tracks that last shorter than this in the mean follow moments, s: a person needs longer to see one.
+const SHORT_S: f64 = 1.0;
+/// They are doubted if there are at least so many, in a run at least so many times as long.
+const SHORT_TRACKS: u64 = 10;
+/// Mean normalised innovations squared (2 expected) from which on the covariances are wrong by more than a factor 2.
+const HONEST_NIS: [f64; 2] = [1.0, 4.0];
+/// Within these they are called right: a fifth off.
+const RIGHT_NIS: [f64; 2] = [1.6, 2.4];
+/// Fewer innovations say nothing.
+const LEAST_NIS: u64 = 50;
+
+/// One track that lives.
+#[derive(Clone, Copy, Debug, Default)]
+struct Life {
+    hits: u32,
+    first_ns: Option<i64>,
+    last_ns: i64,
+    seen_at: u64,
+}
+
+/// What is counted of a run, in memory that does not grow with it.
+#[derive(Clone, Debug, Default)]
+pub struct Observed {
+    frames: u64,
+    frames_with_tracks: u64,
+    detections: u64,
+    first_ns: Option<i64>,
+    last_ns: i64,
+    most_at_once: u64,
+    lives: BTreeMap<u64, Life>,
+    ended: u64,
+    ended_s: f64,
+    followed: u64,
+    rows: u64,
+    large_rows: u64,
+    nis_sum: f64,
+    nis_n: u64,
+}
+
+/// What is thought of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Verdict {
+    /// One sentence.
+    pub sentence: String,
+    /// Whether the run's own statistics speak against its result.
+    pub is_doubtful: bool,
+    /// Options of `boresight track` to try next.
+    pub next: Option<String>,
+}
+
+/// Counts what a verdict needs; writes nothing.
+#[derive(Debug)]
+pub struct ObservedSink<'a>(&'a mut Observed);
+
+impl Observed {
+    /// The sink through which a run is seen.
+    pub fn sink(&mut self) -> ObservedSink<'_> {
+        ObservedSink(self)
+    }
+
+    fn put(&mut self, view: &View<'_>) {
+        let now = view.scan.time.ns;
+        self.frames += 1;
+        self.first_ns.get_or_insert(now);
+        self.last_ns = now;
+        self.detections += view.scan.detections.len() as u64;
+        let frame_px2 = view.frame.map(|f| (f.pixels.width() * f.pixels.height()) as f64);
+        let mut at_once = 0;
+        for t in view.tracks {
+            let life = self.lives.entry(t.id.0).or_default();
+            (life.seen_at, life.hits) = (self.frames, life.hits + u32::from(t.detection.is_some()));
+            if t.status == TrackStatus::Tentative {
+                continue;
+            }
+            at_once += 1;
+            life.first_ns.get_or_insert(now);
+            life.last_ns = now;
+            self.rows += 1;
+            let box_px2 = t.extent.width_px * t.extent.height_px;
+            self.large_rows += u64::from(frame_px2.is_some_and(|area| box_px2 > LARGE_SHARE * area));
+            if let Some(i) = t.innovation.filter(|i| i.nis.is_finite()) {
+                self.nis_sum += i.nis;
+                self.nis_n += 1;
+            }
+        }
+        self.frames_with_tracks += u64::from(at_once > 0);
+        self.most_at_once = self.most_at_once.max(at_once);
+        let seen_at = self.frames;
+        let mut gone = std::mem::take(&mut self.lives);
+        gone.retain(|_, life| {
+            let lives = life.seen_at == seen_at;
+            if !lives {
+                self.end(life);
+            }
+            lives
+        });
+        self.lives = gone;
+    }
+
+    fn end(&mut self, life: &Life) {
+        match life.first_ns {
+            Some(first) => {
+                self.ended += 1;
+                self.ended_s += (life.last_ns - first) as f64 * 1e-9;
+            }
+            None => self.followed += u64::from(life.hits >= FOLLOWED_HITS),
+        }
+    }
+
+    /// The verdict on what was seen of a run with that configuration.
+    pub fn verdict(&self, config: &Config) -> Verdict {
+        let mut all = self.clone();
+        std::mem::take(&mut all.lives).values().for_each(|life| all.end(life));
+        let doubt = |sentence: String, next: Option<String>| Verdict { sentence, is_doubtful: true, next };
+        let over_s = self.first_ns.map_or(0.0, |first| (self.last_ns - first) as f64 * 1e-9);
+        let frames = counted(self.frames, "frame");
+        if self.detections == 0 {
+            return doubt(format!("no track: nothing was detected in {frames}."), more_sensitive(config));
+        }
+        if all.ended == 0 {
+            let per_frame = self.detections as f64 / self.frames.max(1) as f64;
+            if config.tracker.report == Report::Moving && all.followed > 0 {
+                let things = counted(all.followed, "thing");
+                return doubt(
+                    format!(
+                        "no track: {things} could be followed, but none moved farther than a thing at rest seems to."
+                    ),
+                    Some("--set tracker.report=all".to_string()),
+                );
+            }
+            let next = match &config.tracker.confirmation {
+                ConfirmationConfig::Existence(_) => "--false-tracks-per-hour 1000".to_string(),
+                _ => format!("--set tracker.max-speed-px-per-s={}", 2.0 * config.tracker.max_speed_px_per_s),
+            };
+            return doubt(
+                format!("no track: of {per_frame:.2} detections a frame none comes again as one of a target would."),
+                Some(next),
+            );
+        }
+        let mean_s = all.ended_s / all.ended as f64;
+        let nis = (self.nis_n >= LEAST_NIS).then(|| self.nis_sum / self.nis_n as f64);
+        if 2 * self.large_rows > self.rows {
+            return doubt(
+                format!("most boxes cover more than {:.0} % of the frame: ground, not targets.", 100.0 * LARGE_SHARE),
+                another_detector(config),
+            );
+        }
+        if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && over_s > SHORT_S * SHORT_TRACKS as f64 {
+            return doubt(
+                format!(
+                    "{} of {mean_s:.2} s in the mean: moments of clutter, or targets that are lost again and again.",
+                    counted(all.ended, "track")
+                ),
+                another_detector(config),
+            );
+        }
+        if let Some(nis) = nis.filter(|n| !(HONEST_NIS[0]..=HONEST_NIS[1]).contains(n)) {
+            let scale = config.tracker.detection_covariance_scale * nis / 2.0;
+            let words = if nis > 2.0 { "too small" } else { "too large" };
+            return doubt(
+                format!(
+                    "{}, but the stated covariances are {words}: mean NIS {nis:.2}, 2 is honest.",
+                    self.found(mean_s)
+                ),
+                Some(format!("--set tracker.detection-covariance-scale={scale:.3}")),
+            );
+        }
+        let honest = nis.map_or(String::new(), |n| {
+            let words = match n {
+                n if n < RIGHT_NIS[0] => "somewhat too large",
+                n if n > RIGHT_NIS[1] => "somewhat too small",
+                _ => "right",
+            };
+            format!("; the covariances are {words} (mean NIS {n:.2}, 2 is honest)")
+        });
+        Verdict { sentence: format!("{}{honest}.", self.found(mean_s)), is_doubtful: false, next: None }
+    }
+
+    /// What was found, without the opinion.
+    fn found(&self, mean_s: f64) -> String {
+        let share = 100.0 * self.frames_with_tracks as f64 / self.frames.max(1) as f64;
+        format!(
+            "up to {} at once, one or more in {share:.0} % of the frames, followed for {mean_s:.1} s in the mean",
+            counted(self.most_at_once, "target")
+        )
+    }
+}
+
+impl Sink for ObservedSink<'_> {
+    fn put(&mut self, view: &View<'_>) -> Result<()> {
+        self.0.put(view);
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// What finds more than this detector.
+fn more_sensitive(config: &Config) -> Option<String> {
+    Some(match &config.detector.threshold {
+        ThresholdConfig::Cfar(c) => {
+            format!("--set detector.threshold.cfar.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
+        }
+        ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
+            "--detector isolated".to_string()
+        }
+        _ => "--detector cfar".to_string(),
+    })
+}
+
+/// What looks for something else than this detector.
+fn another_detector(config: &Config) -> Option<String> {
+    Some(match &config.detector.threshold {
+        ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
+            "--detector isolated"
+        }
+        ThresholdConfig::Isolated(_) | ThresholdConfig::Cfar(_) => "--detector moving",
+        _ => "--detector cfar",
+    })
+    .map(str::to_string)
+}
+
+/// A number with its thing, in the plural where it is not one.
+fn counted(n: u64, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::isolated::IsolatedConfig;
+    use crate::{
+        Detection, Extent, Frame, FrameIndex, Image, Pixels, Scan, Timestamp, TrackId, TrackInnovation, TrackState,
+    };
+    use boresight_filters::Gaussian;
+    use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+    /// A run of 100 frames of 100 x 80 px at 10 a second: `tracks` tells (id, reported, side of the box in px, NIS) of each.
+    fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, bool, f64, f64)>) -> Verdict {
+        let mut seen = Observed::default();
+        let mut sink = seen.sink();
+        for k in 0..100 {
+            let (index, time) = (FrameIndex(k), Timestamp::from_secs_f64(0.1 * k as f64));
+            let frame = Frame { index, time, pixels: Pixels::Gray8(Image::filled(100, 80, 0)) };
+            let d = Detection::at(Vector2::new(5.0, 5.0), Matrix2::identity());
+            let scan = Scan::at(index, time).with_detections(vec![d; n_detections]);
+            let states: Vec<TrackState> = tracks(k)
+                .into_iter()
+                .map(|(id, reported, side, nis)| TrackState {
+                    id: TrackId(id),
+                    status: if reported { TrackStatus::Confirmed } else { TrackStatus::Tentative },
+                    kinematics: Gaussian { mean: SVector::zeros(), cov: SMatrix::identity() },
+                    extent: Extent::around(Vector2::new(50.0, 40.0), side, side),
+                    detection: Some(0),
+                    innovation: Some(TrackInnovation { innovation: Vector2::zeros(), cov: Matrix2::identity(), nis }),
+                    score: 1.0,
+                })
+                .collect();
+            sink.put(&View { frame: Some(&frame), scan: &scan, tracks: &states }).unwrap();
+        }
+        seen.verdict(config)
+    }
+
+    fn isolated(report: Report) -> Config {
+        let mut config = Config::default();
+        config.detector.threshold = ThresholdConfig::Isolated(IsolatedConfig::default());
+        config.tracker.report = report;
+        config
+    }
+
+    #[test]
+    fn each_way_to_fail_is_told_with_what_to_try() {
+        let doubted = |v: Verdict, word: &str, next: &str| {
+            assert!(v.is_doubtful && v.sentence.contains(word), "{v:?}");
+            assert_eq!(v.next.as_deref(), Some(next), "{v:?}");
+        };
+        let [all, moving] = [Report::All, Report::Moving].map(isolated);
+        doubted(run(&all, 0, |_| vec![]), "nothing was detected in 100 frames", "--detector cfar");
+        doubted(
+            run(&moving, 1, |_| vec![(1, false, 5.0, 2.0)]),
+            "1 thing could be followed",
+            "--set tracker.report=all",
+        );
+        let fast = "--set tracker.max-speed-px-per-s=300";
+        doubted(run(&moving, 3, |k| vec![(k, false, 5.0, 2.0)]), "of 3.00 detections a frame none", fast);
+        doubted(run(&all, 1, |_| vec![(1, true, 60.0, 2.0)]), "cover more than 25 %", "--detector moving");
+        doubted(run(&all, 1, |k| vec![(k / 5, true, 5.0, 2.0)]), "20 tracks of 0.40 s", "--detector moving");
+        let scale = "--set tracker.detection-covariance-scale=14.000";
+        doubted(run(&all, 1, |_| vec![(1, true, 5.0, 28.0)]), "too small: mean NIS 28.00", scale);
+        doubted(
+            run(&all, 1, |_| vec![(1, true, 5.0, 0.5)]),
+            "too large",
+            "--set tracker.detection-covariance-scale=0.250",
+        );
+    }
+
+    #[test]
+    fn what_the_statistics_believe_is_said_in_a_sentence() {
+        let v = run(&isolated(Report::All), 1, |k| if k < 50 { vec![] } else { vec![(1, true, 5.0, 1.9)] });
+        assert_eq!(
+            v.sentence,
+            "up to 1 target at once, one or more in 50 % of the frames, followed for 4.9 s in the mean; the covariances are right (mean NIS 1.90, 2 is honest)."
+        );
+        assert!(!v.is_doubtful && v.next.is_none());
+    }
+
+    #[test]
+    fn what_is_kept_does_not_grow_with_the_run() {
+        let mut seen = Observed::default();
+        let state = |id| TrackState {
+            id: TrackId(id),
+            status: TrackStatus::Confirmed,
+            kinematics: Gaussian { mean: SVector::zeros(), cov: SMatrix::identity() },
+            extent: Extent::default(),
+            detection: None,
+            innovation: None,
+            score: 1.0,
+        };
+        for k in 0..10_000 {
+            seen.put(&View { frame: None, scan: &Scan::default(), tracks: &[state(k)] });
+        }
+        assert_eq!((seen.lives.len(), seen.ended), (1, 9999));
+    }
+}
