@@ -56,6 +56,7 @@ impl Detection {
     /// use boresight::boresight_filters::nalgebra::{Matrix2, Vector2};
     /// use boresight::{Detection, Extent};
     ///
+    /// assert_eq!(Detection::point(20.5, 7.25, 0.2), Detection::at(Vector2::new(20.5, 7.25), Matrix2::identity() * (0.2 * 0.2)));
     /// let position = Vector2::new(20.5, 7.25);
     /// let d = Detection::at(position, Matrix2::identity() * 0.04).with_extent(Extent::around(position, 5.0, 3.0)).with_score(0.9);
     /// assert_eq!((d.extent.left_px, d.area_px), (18.0, 1));
@@ -63,6 +64,11 @@ impl Detection {
     pub fn at(position: Vector2<f64>, cov: Matrix2<f64>) -> Self {
         let extent = Extent::around(position, 0.0, 0.0);
         Self { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None }
+    }
+
+    /// A point at (x, y), px, known to `std_px` along both axes; else as [`Detection::at`].
+    pub fn point(x_px: f64, y_px: f64, std_px: f64) -> Self {
+        Self::at(Vector2::new(x_px, y_px), Matrix2::identity() * (std_px * std_px))
     }
 
     /// With this bounding box.

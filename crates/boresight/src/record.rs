@@ -51,6 +51,24 @@ pub struct TrackState {
     pub score: f32,
 }
 
+impl TrackState {
+    /// Position (x, y), px.
+    pub fn position(&self) -> Vector2<f64> {
+        Vector2::new(self.kinematics.mean[0], self.kinematics.mean[2])
+    }
+
+    /// Velocity (x, y), px/s.
+    pub fn velocity(&self) -> Vector2<f64> {
+        Vector2::new(self.kinematics.mean[1], self.kinematics.mean[3])
+    }
+
+    /// Covariance of the position, px².
+    pub fn position_cov(&self) -> Matrix2<f64> {
+        let p = &self.kinematics.cov;
+        Matrix2::new(p[(0, 0)], p[(0, 2)], p[(2, 0)], p[(2, 2)])
+    }
+}
+
 /// All tracks of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackFrame {

@@ -194,8 +194,64 @@ fn quiet_prints_nothing_and_loud_says_what_was_chosen() {
     let out = run(args(true));
     assert!(out.status.success() && out.stdout.is_empty() && out.stderr.is_empty(), "{}", stderr(&out));
     let text = stderr(&run(args(false)));
-    for part in ["320 x 256", "bright", "302 frames", "confirmed tracks", "frames/s", "results: "] {
+    for part in
+        ["320 x 256", "bright", "302 frames", "confirmed tracks", "frames/s", "results: ", "\nverdict: up to 1 "]
+    {
         assert!(text.contains(part), "{part} in {text}");
     }
     assert!(!text.contains('\r') && !text.contains('\u{1b}'), "no progress bar where there is no terminal");
+}
+
+#[test]
+fn a_run_that_finds_nothing_says_so_and_names_the_next_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("it's here");
+    let out = boresight()
+        .args(["track", "--no-video", "--set", "tracker.min-initiation-score=1e9", "-o"])
+        .arg(&folder)
+        .arg(clip())
+        .output()
+        .unwrap();
+    let said = stderr(&out);
+    assert!(out.status.success() && said.contains("\nverdict: doubtful: no track: "), "{said}");
+    let next = said.lines().find_map(|l| l.strip_prefix("try next: boresight ")).expect(&said);
+    assert!(next.ends_with(" --false-tracks-per-hour 1000") && next.contains("it'\\''s here'"), "{next}");
+    let report = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(report.contains("Doubtful: ") && report.contains("--false-tracks-per-hour 1000"));
+    // What it names is a command that runs.
+    let again = boresight()
+        .args(["track", "--no-video", "--no-report", "--false-tracks-per-hour", "1000", "-o"])
+        .arg(&folder)
+        .arg(clip())
+        .output()
+        .unwrap();
+    assert!(again.status.success(), "{}", stderr(&again));
+}
+
+#[test]
+fn a_detector_is_asked_for_by_one_word() {
+    let dir = tempfile::tempdir().unwrap();
+    let track = |more: &[&str]| {
+        boresight()
+            .args(["track", "--no-video", "--no-report", "-o"])
+            .arg(dir.path().join("out"))
+            .args(more)
+            .output()
+            .unwrap()
+    };
+    let clip = clip().display().to_string();
+    let out = track(&[&clip, "--detector", "cfar"]);
+    assert!(out.status.success() && stderr(&out).contains("the one asked for: cfar"), "{}", stderr(&out));
+    let config = dir.path().join("out/config.toml");
+    assert!(std::fs::read_to_string(&config).unwrap().contains("[detector.threshold.cfar]"));
+    let refused = |more: &[&str], words: &str| {
+        let out = track(more);
+        assert!(out.status.code() == Some(2) && stderr(&out).contains(words), "{:?} {}", out.status, stderr(&out));
+    };
+    refused(&[&clip, "--detector", "movng"], "moving (what moves before a fixed camera)");
+    let config = config.display().to_string();
+    refused(&[&clip, "--detector", "cfar", "--config", &config], "stands in the configuration");
+    refused(&[&clip, "--false-tracks-per-hour", "2", "--config", &config], "nothing is learnt");
+    let table = dir.path().join("out/detections.csv").display().to_string();
+    refused(&[&table, "--detector", "cfar"], "needs no detector");
 }

@@ -45,7 +45,7 @@ pub fn configure(
                 .at("--detector colour")
                 .hint("give the colour in a configuration: detector.threshold.colour.reference = [red, green, blue]"));
             };
-            colour::configure(&reference, scene, info, config, reasons);
+            colour::configure(&reference, info, config, reasons);
         }
     }
     Ok(())

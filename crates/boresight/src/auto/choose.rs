@@ -67,7 +67,7 @@ pub(super) fn choose_seen(
         asked::configure(kind, frames, second, &scene, interval_s, info, &mut choice)?;
         Choice { config, reasons } = choice;
     } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
-        colour::configure(&reference, &scene, info, &mut config, &mut reasons);
+        colour::configure(&reference, info, &mut config, &mut reasons);
     } else if moving::fits(&scene, info) {
         moving::configure(&scene, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, &scene, info)? {

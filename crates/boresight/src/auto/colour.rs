@@ -34,19 +34,13 @@ pub fn look(frames: &[Frame], scene: &Scene) -> Option<Reference> {
 }
 
 /// Writes detector and tracker.
-pub fn configure(
-    reference: &Reference,
-    scene: &Scene,
-    info: &SourceInfo,
-    config: &mut Config,
-    reasons: &mut Vec<String>,
-) {
+pub fn configure(reference: &Reference, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let [r, g, b] = reference.rgb;
     let side = reference.area_px.sqrt();
     reasons.push(format!(
         "Fixed camera, and one moving piece of a colour of its own: red {r}, green {g}, blue {b} (hue {:.0} degrees), about {side:.0} px across, in {} \
-         of {} frames with motion. So pixels of this colour are detected (input.colour = rgb).",
-        reference.hsi.hue_deg, reference.n_frames, scene.n_moving
+         of the frames looked at. So pixels of this colour are detected (input.colour = rgb).",
+        reference.hsi.hue_deg, reference.n_frames
     ));
     config.input.colour = Colour::Rgb;
     let colour = ColourMatchConfig { reference: reference.rgb, ..ColourMatchConfig::default() };

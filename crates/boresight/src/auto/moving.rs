@@ -21,8 +21,8 @@ const LEAST_AREA: f64 = 0.0004;
 const LEAST_NOVELTY: f64 = 0.12;
 /// More regions than this are noise, water, leaves or particles.
 const MOST_REGIONS: f64 = 40.0;
-/// Isolated blobs that explain this share of what moves are found better as such.
-const MOST_EXPLAINED: f64 = 0.2;
+/// Where isolated blobs explain most of what moves, it is found as such, standing still as well.
+const MOST_EXPLAINED: f64 = 0.5;
 /// Fewer frames than this show no background.
 const LEAST_FRAMES: usize = 12;
 

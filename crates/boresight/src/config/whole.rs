@@ -183,11 +183,21 @@ impl Config {
         let value = parsed.get("v").cloned().ok_or_else(|| bad("the value is empty"))?;
         let name = format!("--set {assignment}");
         renamed::refuse_in_assignment(key.trim(), &value).map_err(|e| e.at(&name))?;
-        let mut tree = toml::Value::try_from(self).map_err(|e| bad(&e.to_string()))?;
-        set(&mut tree, key.trim(), value).ok_or_else(|| bad("no such table"))?;
-        let text = toml::to_string(&tree).map_err(|e| bad(&e.to_string()))?;
+        let changed = |value: toml::Value| -> Result<std::result::Result<Self, toml::de::Error>> {
+            let mut tree = toml::Value::try_from(self).map_err(|e| bad(&e.to_string()))?;
+            set(&mut tree, key.trim(), value).ok_or_else(|| bad("no such table"))?;
+            Ok(toml::from_str(&toml::to_string(&tree).map_err(|e| bad(&e.to_string()))?))
+        };
+        // A word alone chooses what it names, as it is by default: `detector.filter=gaussian` is `detector.filter.gaussian={}`.
+        let chosen = value.as_str().map(|word| {
+            toml::Value::Table([(word.to_string(), toml::Value::Table(toml::Table::new()))].into_iter().collect())
+        });
+        let config = match (changed(value)?, chosen) {
+            (Err(e), Some(chosen)) => changed(chosen)?.or(Err(e)),
+            (config, _) => config,
+        };
         // The text is ours: its lines would say nothing to a user.
-        let config: Self = toml::from_str(&text).map_err(|e| typo::explain(&e, false).at(&name))?;
+        let config: Self = config.map_err(|e| typo::explain(&e, false).at(&name))?;
         config.validate().map_err(|e| e.at(name))?;
         Ok(config)
     }
@@ -247,6 +257,18 @@ mod tests {
         assert!(config.to_toml().unwrap().contains("[detector.threshold.band]"), "{}", config.to_toml().unwrap());
         let config = config.with("tracker.associator.nearest={}").unwrap();
         assert!(!config.to_toml().unwrap().contains("global-nearest"));
+        let config = config.with("detector.filter=gaussian").unwrap();
+        assert_eq!(config, config.with("detector.filter.gaussian={}").unwrap(), "a word alone is its default");
+        assert!(
+            config
+                .with("detector.threshold=moving")
+                .unwrap()
+                .to_toml()
+                .unwrap()
+                .contains("[detector.threshold.moving]")
+        );
+        let e = config.with("tracker.gate-probability=much").unwrap_err().to_string();
+        assert!(e.contains("expected f64"), "{e}");
         assert!(config.with("tracker.gate-probability=2").is_err());
         assert!(config.with("tracker.nonsense=2").is_err());
         assert!(config.with("nonsense").is_err());

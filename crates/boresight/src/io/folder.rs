@@ -91,6 +91,7 @@ impl ImageFiles {
         };
         source.first = Some(first);
         source.note_holes();
+        source.note_several();
         Ok(source)
     }
 
@@ -106,6 +107,19 @@ impl ImageFiles {
                 self.files[behind].display()
             ));
             self.numbering = Some(found);
+        }
+    }
+
+    /// Two cameras in one folder are hardly one sequence.
+    fn note_several(&mut self) {
+        if let Some(beginnings) = numbered::several(&self.files) {
+            self.warnings.push(format!(
+                "{}: the names are of {} sequences ({}), taken as one behind the other; a pattern in quotes takes one: '{}*'.",
+                self.info.label,
+                beginnings.len(),
+                beginnings.join(", "),
+                self.files[0].with_file_name(&beginnings[0]).display()
+            ));
         }
     }
 

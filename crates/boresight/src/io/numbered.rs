@@ -3,7 +3,11 @@
 //! Source: our own. Names that differ in one number only, which rises by the same step nearly everywhere, are numbered frames;
 //! a rise by several steps is a hole. Names of any other form, or with more holes than frames, say nothing.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// More kinds of names than this are dates or other words, no sequences side by side.
+const MOST_SEQUENCES: usize = 8;
 
 /// What the numbers in the names say.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +50,20 @@ pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
     (n_missing <= places.len() as u64).then_some(Numbering { places, n_missing, first_hole: (at, at + 1) })
 }
 
+/// The beginnings of names that make several numbered sequences, each of two files or more; `None` if all are one, or hardly any.
+pub(crate) fn several(files: &[PathBuf]) -> Option<Vec<String>> {
+    let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for file in files {
+        let name = file.file_stem()?.to_string_lossy().into_owned();
+        let (head, _, tail) = split(&name)?;
+        *counts.entry((head.to_string(), tail.to_string())).or_default() += 1;
+        if counts.len() > MOST_SEQUENCES {
+            return None;
+        }
+    }
+    (counts.len() > 1 && counts.values().all(|n| *n > 1)).then(|| counts.into_keys().map(|(head, _)| head).collect())
+}
+
 /// Splits a name at its last number.
 fn split(name: &str) -> Option<(&str, &str, &str)> {
     let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
@@ -68,6 +86,16 @@ mod tests {
         let found = of(&["é1_t003.png", "é1_t004.png", "é1_t005.png", "é1_t009.png", "é1_t010.png"]).unwrap();
         assert_eq!(found, Numbering { places: vec![0, 1, 2, 6, 7], n_missing: 3, first_hole: (2, 3) });
         assert_eq!(of(&["a/10.png", "a/20.png", "a/40.png"]).unwrap().places, [0, 1, 3]);
+    }
+
+    #[test]
+    fn sequences_side_by_side_are_told_from_one() {
+        let of = |names: &[&str]| several(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let two = ["a/cam1_01.png", "a/cam1_02.png", "a/cam2_01.png", "a/cam2_02.png"];
+        assert_eq!(of(&two).unwrap(), ["cam1_", "cam2_"]);
+        assert_eq!(of(&two[..2]), None);
+        assert_eq!(of(&two[..3]), None, "a file beside a sequence");
+        assert_eq!(of(&["2026-11-01.png", "2026-11-02.png", "2026-12-01.png", "x.png"]), None);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! detection's box shares that detection with the track that took it. Along each axis the outer members are placed by the box's edges
 //! and their own size from before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place
 //! relative to the centre. Sizes do not follow while merged. The member that fits best is primary; the others are secondary and live on
-//! a budget in seconds since they were last alone, so a target that ended inside another does not live for ever.
+//! the time that they were seen alone before (`step/delete.rs`), so a target that ended inside another does not live for ever.
 //! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
 
 use super::appearance::Appearance;
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub struct MergedMeasurementsConfig {
     /// Whether detections are split at all; off: a detection belongs to one track only. On where the table is left out.
     pub enabled: bool,
-    /// Longest time a track is kept on detections that fit another track better, s since it had one of its own, 0 or more.
+    /// Longest time a track is kept on detections that fit another track better, s, 0 or more; and no longer than eight times as long as it was seen alone.
     pub max_secondary_s: f64,
     /// Standard deviation of a box edge, px, 0 or more: noise of the places found from edges.
     pub edge_std_px: f64,

@@ -20,7 +20,7 @@ use super::scan_table::{Predicted, ScanTable};
 use super::single_track::{BATCH, Track};
 use super::step::associate::{Association, associate, gate_confirmed};
 use super::step::context::Context;
-use super::step::delete::{budget_is_over, coast_budget_s, expired_in_gap, is_lasting_duplicate};
+use super::step::delete::{budget_is_over, coast_budget_s, expired_in_gap, is_lasting_duplicate, save_time_alone};
 use super::step::initiate::{NewTracks, Pending, from_initial_tracks, initiate};
 use super::step::predict::predict;
 use super::step::report::report;
@@ -164,8 +164,9 @@ impl Tracker {
             }
             let evidence =
                 Evidence { hit: outcome.hit, merged: outcome.merged, likelihood_ratio: outcome.likelihood_ratio };
+            save_time_alone(&mut t.history, &outcome, now, coast_s, secondary_s);
             let deleted = config.confirmation.decide(&mut t.history, evidence, now.ns) == Decision::Delete
-                || budget_is_over(&t.history, outcome.secondary, now, coast_s, secondary_s)
+                || budget_is_over(&t.history, outcome.secondary, now, coast_s)
                 || (self.is_soft && is_lasting_duplicate(t, owned, &outcome, now, config.duplicate_s));
             if deleted {
                 lost.remember(&config.reidentification, t, now);

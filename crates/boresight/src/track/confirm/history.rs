@@ -20,6 +20,8 @@ pub struct History {
     pub initiated_ns: i64,
     /// Misses in a row.
     pub misses: u32,
+    /// Time seen alone less time in merged measurements, s, as far as it may be saved up (`step/delete.rs`).
+    pub alone_s: f32,
     /// Scans remembered, at most 64.
     pub(super) scans: u8,
     /// Whether the rule holds the track for confirmed. It then chooses its detections before tentative tracks and coasts; whether it

@@ -69,6 +69,7 @@ impl ConfirmationConfig {
             last_hit_ns: now_ns,
             last_merged_ns: now_ns,
             initiated_ns: now_ns,
+            alone_s: 0.0,
         }
     }
 

@@ -79,7 +79,7 @@ fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut
     let evidence = Evidence { hit: false, merged: false, likelihood_ratio: miss };
     let history = &mut missed.track.history;
     if config.confirmation.decide(history, evidence, scan.time.ns) == Decision::Keep
-        && !budget_is_over(history, false, scan.time, growth.coast_budget_s, 0.0)
+        && !budget_is_over(history, false, scan.time, growth.coast_budget_s)
     {
         out.push(missed);
     }
