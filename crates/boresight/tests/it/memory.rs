@@ -1,4 +1,5 @@
 //! Memory in the hot path: a warm detector and a warm tracker take none, whatever they are made of.
+#![allow(unsafe_code)] // An allocator that counts can only be written so.
 
 use super::track::{detection, trackers};
 use super::vision_conformance::{source, thresholds};
