@@ -88,7 +88,7 @@ pub struct Frame {
 pub struct SourceInfo {
     /// Where the frames come from, for messages (a path, an address).
     pub label: String,
-    /// How they are read, for the summary: `H.264 in process`, `PNG folder`, `ffmpeg pipe`.
+    /// How they are read, for the summary: `H.264 in process, fast decoder`, `PNG folder`, `ffmpeg pipe`.
     pub reader: String,
     /// Width, px.
     pub width: usize,
