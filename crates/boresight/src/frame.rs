@@ -116,6 +116,10 @@ pub trait FrameSource: Send {
     fn recycle(&mut self, frame: Frame) {
         drop(frame);
     }
+    /// Whether it reads on a thread of its own already, ahead of the caller.
+    fn reads_ahead(&self) -> bool {
+        false
+    }
     /// Warnings so far (frames lost in a damaged tail, times made up), each a whole sentence.
     fn warnings(&self) -> &[String] {
         &[]

@@ -194,6 +194,10 @@ impl FrameSource for Mp4Source {
         }
     }
 
+    fn reads_ahead(&self) -> bool {
+        true
+    }
+
     fn warnings(&self) -> &[String] {
         &self.warnings
     }
