@@ -1,6 +1,8 @@
 //! Repository chores: `cargo xtask <NAME>`.
 
+mod bench_clips;
 mod bench_metrics;
+mod bench_run;
 mod bench_track;
 mod choices;
 mod clutter_table;
@@ -30,6 +32,8 @@ struct Cli {
 enum Chore {
     /// Measure the speed of the evaluation from files, beside other tools.
     BenchMetrics(bench_metrics::Args),
+    /// What a whole run costs beside decoding alone: the table of docs/speed.md.
+    BenchRun(bench_run::Args),
     /// Write the parameter reference and the JSON schema to docs/.
     Docs(docs::Args),
     /// Scale: scans per second from 10 to 100 000 targets, with GOSPA.
@@ -59,6 +63,7 @@ enum Chore {
 fn main() -> anyhow::Result<()> {
     match Cli::parse().chore {
         Chore::BenchMetrics(args) => bench_metrics::run(&args),
+        Chore::BenchRun(args) => bench_run::run(&args),
         Chore::Docs(args) => docs::run(&args),
         Chore::BenchTrack(args) => bench_track::run(&args),
         Chore::Choices(args) => choices::run(&args),

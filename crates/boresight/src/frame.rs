@@ -88,7 +88,7 @@ pub struct Frame {
 pub struct SourceInfo {
     /// Where the frames come from, for messages (a path, an address).
     pub label: String,
-    /// How they are read, for the summary: `H.264 in process`, `PNG folder`, `ffmpeg pipe`.
+    /// How they are read, for the summary: `H.264 in process, fast decoder`, `PNG folder`, `ffmpeg pipe`.
     pub reader: String,
     /// Width, px.
     pub width: usize,
@@ -115,6 +115,10 @@ pub trait FrameSource: Send {
     /// Takes a frame back so that its memory can be used again; optional.
     fn recycle(&mut self, frame: Frame) {
         drop(frame);
+    }
+    /// Whether it reads on a thread of its own already, ahead of the caller.
+    fn reads_ahead(&self) -> bool {
+        false
     }
     /// Warnings so far (frames lost in a damaged tail, times made up), each a whole sentence.
     fn warnings(&self) -> &[String] {

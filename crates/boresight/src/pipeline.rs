@@ -4,7 +4,14 @@
 //! be written is abandoned, and the others go on. A scan that the tracker refuses (a value that is not finite, a time that runs back)
 //! costs itself: a warning counts such scans, and if they are most of them, the run counts as broken. A run that did not get one frame finishes no sink: what stood under their names
 //! stays. The caller is asked after every frame whether to go on.
+//!
+//! Reading, detecting and the rest run on threads of their own, with short queues between them ([`scans`]); the results are the same bytes for
+//! any number of threads.
 
+mod read_ahead;
+mod scans;
+
+use self::scans::Scans;
 use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Error, FrameSource, Result, Scan, Sink, TrackStatus, View};
@@ -81,10 +88,21 @@ impl Outcome {
     }
 }
 
-/// Runs to the end of the input, or until `go_on` breaks, or until no output is left of several.
+/// Runs to the end of the input, or until `go_on` breaks, or until no output is left of several, on as many threads as the machine has.
 ///
 /// `tracking` may be `None`: detections only.
 pub fn run(
+    input: Input,
+    tracking: Option<Box<dyn Tracking>>,
+    sinks: Vec<Box<dyn Sink + '_>>,
+    go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
+) -> Outcome {
+    run_on(std::thread::available_parallelism().map_or(1, usize::from), input, tracking, sinks, go_on)
+}
+
+/// As [`run`], on at most `n_threads` threads (video is decoded and encoded on one more each).
+pub fn run_on(
+    n_threads: usize,
     input: Input,
     mut tracking: Option<Box<dyn Tracking>>,
     sinks: Vec<Box<dyn Sink + '_>>,
@@ -93,7 +111,7 @@ pub fn run(
     let mut summary = Summary::default();
     let mut counts = Counts::default();
     let mut outputs = Outputs { sinks, unwritten: Vec::new() };
-    let mut broken = drive(input, &mut tracking, &mut outputs, go_on, &mut summary, &mut counts).err();
+    let mut broken = drive(n_threads, input, &mut tracking, &mut outputs, go_on, &mut summary, &mut counts).err();
     if let Some((n, first)) = counts.refused.take() {
         if n > summary.frames {
             broken.get_or_insert(first);
@@ -166,6 +184,7 @@ enum Next {
 }
 
 fn drive(
+    n_threads: usize,
     input: Input,
     tracking: &mut Option<Box<dyn Tracking>>,
     outputs: &mut Outputs<'_>,
@@ -221,26 +240,21 @@ fn drive(
             }
             Ok(())
         }
-        Input::Frames(mut source, mut detector) => {
-            let mut scan = Scan::default();
+        Input::Frames(source, detector) => {
+            let mut scans = Scans::of(source, detector, n_threads);
             let outcome = loop {
-                let started = Instant::now();
-                let frame = match source.next_frame() {
-                    Ok(Some(frame)) => frame,
+                let made = match scans.next() {
+                    Ok(Some(made)) => made,
                     Ok(None) => break Ok(()),
                     Err(e) => break Err(e),
                 };
-                let read = Instant::now();
-                summary.times.read += read - started;
-                if let Err(e) = detector.detect(&frame, &mut scan) {
-                    break Err(e);
+                summary.times.read += made.read;
+                summary.times.detect += made.detect;
+                if let Some(warnings) = &made.warnings {
+                    summary.warnings.clone_from(warnings);
                 }
-                summary.times.detect += read.elapsed();
-                if source.warnings().len() > summary.warnings.len() {
-                    summary.warnings = source.warnings().to_vec();
-                }
-                match one(Some(&frame), &scan, summary) {
-                    Ok(Next::GoOn) => source.recycle(frame),
+                match one(Some(&made.frame), &made.scan, summary) {
+                    Ok(Next::GoOn) => scans.recycle(made),
                     Ok(next) => {
                         summary.interrupted = next == Next::Stop;
                         break Ok(());
@@ -248,7 +262,9 @@ fn drive(
                     Err(e) => break Err(e),
                 }
             };
-            summary.warnings = source.warnings().to_vec();
+            if let Some(warnings) = scans.last_warnings() {
+                summary.warnings = warnings;
+            }
             outcome
         }
     }

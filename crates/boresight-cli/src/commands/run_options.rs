@@ -40,9 +40,19 @@ pub struct InputArgs {
     /// Memory that reading one picture may take, MB; half of the machine's if absent.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
     pub max_memory: Option<u64>,
+    /// Threads to read, detect and write on; all the machine has if absent. The results are the same for any number.
+    #[arg(long, value_name = "N")]
+    pub threads: Option<std::num::NonZeroUsize>,
     /// Print nothing but errors, and what is lost of the input.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+impl InputArgs {
+    /// Number of threads to run on.
+    pub fn n_threads(&self) -> usize {
+        self.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, usize::from)
+    }
 }
 
 /// How tracks are made; short for keys of the configuration.
@@ -299,6 +309,7 @@ mod tests {
             columns: None,
             skip_bad_rows: false,
             max_memory: None,
+            threads: None,
             quiet: true,
         };
         let associator = |name: &str| TrackerArgs { associator: Some(name.into()), ..TrackerArgs::default() };

@@ -84,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(plan.total(), "frames");
     let started = std::time::Instant::now();
     stop.run_begins();
-    let mut done = pipeline::run(plan.input, Some(tracking), sinks, &mut |so_far| {
+    let mut done = pipeline::run_on(args.input.n_threads(), plan.input, Some(tracking), sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
         stop.go_on()
     });

@@ -63,6 +63,10 @@ impl FrameSource for Replay {
         self.rest.recycle(frame);
     }
 
+    fn reads_ahead(&self) -> bool {
+        self.rest.reads_ahead()
+    }
+
     fn warnings(&self) -> &[String] {
         self.rest.warnings()
     }

@@ -1,7 +1,7 @@
 //! The frame behind the trajectories: grey, stretched between its 0.5 % and 99.5 % levels, at most 1024 px wide, as PNG.
 
 use super::text::base64;
-use crate::{Frame, Pixels};
+use crate::{Frame, Image, Pixels};
 
 /// Wider frames are averaged down.
 const MAX_WIDTH: usize = 1024;
@@ -25,35 +25,20 @@ impl Picture {
         // At least as coarse as needed for the height too, so that no picture grows without bound.
         let block = width.div_ceil(MAX_WIDTH).max(height.div_ceil(MAX_WIDTH)).max(1);
         let (small_width, small_height) = (width.div_ceil(block), height.div_ceil(block));
-        let value: Box<dyn Fn(usize, usize) -> f32> = match &frame.pixels {
-            Pixels::Gray8(i) => Box::new(move |x, y| f32::from(i.row(y)[x])),
-            Pixels::Gray16(i) => Box::new(move |x, y| f32::from(i.row(y)[x])),
-            Pixels::GrayF32(i) => Box::new(move |x, y| i.row(y)[x]),
-            Pixels::Rgb8(i) => Box::new(move |x, y| {
-                let [r, g, b] = i.row(y)[x].map(f32::from);
+        let means = match &frame.pixels {
+            Pixels::Gray8(i) => means(i, block, |v| f32::from(*v)),
+            Pixels::Gray16(i) => means(i, block, |v| f32::from(*v)),
+            Pixels::GrayF32(i) => means(i, block, |v| *v),
+            Pixels::Rgb8(i) => means(i, block, |p| {
+                let [r, g, b] = p.map(f32::from);
                 0.299 * r + 0.587 * g + 0.114 * b // BT.601
             }),
         };
-        let mut means = Vec::with_capacity(small_width * small_height);
-        for by in 0..small_height {
-            for bx in 0..small_width {
-                let (mut sum, mut n) = (0.0f64, 0u32);
-                for y in by * block..((by + 1) * block).min(height) {
-                    for x in bx * block..((bx + 1) * block).min(width) {
-                        let v = value(x, y);
-                        if v.is_finite() {
-                            sum += f64::from(v);
-                            n += 1;
-                        }
-                    }
-                }
-                means.push(if n > 0 { (sum / f64::from(n)) as f32 } else { f32::NAN });
-            }
-        }
-        let mut sorted: Vec<f32> = means.iter().copied().filter(|v| v.is_finite()).collect();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let level =
-            |share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
+        let mut finite: Vec<f32> = means.iter().copied().filter(|v| v.is_finite()).collect();
+        let mut level = |share: f64| {
+            let at = ((finite.len() as f64 - 1.0) * share).round() as usize;
+            if finite.is_empty() { 0.0 } else { *finite.select_nth_unstable_by(at, f32::total_cmp).1 }
+        };
         let (low, high) = (level(0.005), level(0.995));
         let scale = if high > low { 255.0 / (high - low) } else { 0.0 };
         // A flat picture is drawn in mid grey; `as` saturates and turns NaN into 0.
@@ -79,10 +64,30 @@ impl Picture {
     }
 }
 
+/// Means of blocks of `block` x `block` pixels, without those that are not finite; NaN where none is.
+fn means<T: Copy>(image: &Image<T>, block: usize, value: impl Fn(&T) -> f32) -> Vec<f32> {
+    let across = image.width().div_ceil(block);
+    let mut means = Vec::with_capacity(across * image.height().div_ceil(block));
+    let mut sums = vec![(0.0f64, 0u32); across];
+    for y in 0..image.height() {
+        for (pixels, (sum, n)) in image.row(y).chunks(block).zip(&mut sums) {
+            for v in pixels.iter().map(&value).filter(|v| v.is_finite()) {
+                *sum += f64::from(v);
+                *n += 1;
+            }
+        }
+        if (y + 1) % block == 0 || y + 1 == image.height() {
+            means.extend(sums.iter().map(|(sum, n)| if *n > 0 { (sum / f64::from(*n)) as f32 } else { f32::NAN }));
+            sums.fill((0.0, 0));
+        }
+    }
+    means
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrameIndex, Image, Timestamp};
+    use crate::{FrameIndex, Timestamp};
 
     #[test]
     fn wide_frames_are_averaged_and_stretched() {

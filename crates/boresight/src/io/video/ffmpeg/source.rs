@@ -267,6 +267,10 @@ impl FrameSource for FfmpegSource {
         let _ = self.spare.send(frame.pixels);
     }
 
+    fn reads_ahead(&self) -> bool {
+        true
+    }
+
     fn warnings(&self) -> &[String] {
         &self.warnings
     }

@@ -1,29 +1,19 @@
-//! Access units to pictures: feeds `rust_h264` one MP4 sample at a time and says which sample each picture is of.
+//! The complete decoder: feeds `rust_h264` one MP4 sample at a time and says which sample each picture is of.
 //!
-//! The decoder is young, so it runs behind three fences: sizes are checked in every parameter set before it may take
-//! memory, broken unit lengths are found before it sees them, and a panic inside it is an error of that one sample.
+//! It takes every kind of H.264 but 4:4:4 and lossless, and costs twice what [`super::progressive`] does.
+//! It is young, so it runs behind three fences: sizes are checked in every parameter set before it may take memory, broken unit lengths are found before it sees them, and a panic inside it is an error of that one sample.
 //! Limits (ITU-T H.264 A.3.1, level 6.2): 139 264 macroblocks a picture, 696 320 in all reference pictures. Wrong bits
 //! inside a slice that still parses are not seen: the decoder (0.6) keeps the part of the picture decoded before them.
 
-use crate::{Error, ErrorKind, Result};
-use rust_h264::decoder::{Decoder, Frame};
+use super::picture::{Picture, PictureDecoder, Refusal, guarded, parts};
+use rust_h264::decoder::{ChromaFormat, Decoder, Frame};
 use rust_h264::error::DecodeError;
 use rust_h264::nal::{NalUnit, NalUnitType, SpsInfo, parse_avcc, parse_avcc_config, parse_sps_info};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// MaxFS of level 6.2, macroblocks.
 const MAX_PICTURE_MBS: u64 = 139_264;
 /// MaxDpbMbs of level 6.2, macroblocks.
 const MAX_REFERENCE_MBS: u64 = 696_320;
-
-/// Why a sample gave no picture.
-#[derive(Debug)]
-pub(super) enum Refusal {
-    /// A kind of H.264 that is not decoded here.
-    Unsupported(String),
-    /// Broken data.
-    Damaged(String),
-}
 
 impl From<DecodeError> for Refusal {
     fn from(e: DecodeError) -> Self {
@@ -32,15 +22,6 @@ impl From<DecodeError> for Refusal {
             other => Self::Damaged(other.to_string()),
         }
     }
-}
-
-/// A decoded picture and the step it belongs to.
-pub(super) struct Picture {
-    pub frame: Frame,
-    /// Number of the step (in decoding order) it was decoded from.
-    pub step: usize,
-    /// Counts the instantaneous refreshes; picture order counts compare within one period only.
-    pub period: u32,
 }
 
 /// A decoder for the samples of one track.
@@ -87,25 +68,34 @@ impl AccessUnits {
         Ok(())
     }
 
+    /// Takes parameter sets that came in samples before.
+    pub fn feed<'a>(&mut self, sets: impl Iterator<Item = &'a [u8]>) -> Result<(), Refusal> {
+        for set in sets {
+            let nal = as_nal(set);
+            guarded(|| Ok::<_, Refusal>(parse_avcc(&nal, 4)))?.iter().try_for_each(|nal| self.feed_parameters(nal))?;
+        }
+        Ok(())
+    }
+
     fn feed_parameters(&mut self, nal: &NalUnit<'_>) -> Result<(), Refusal> {
         if nal.nal_unit_type == NalUnitType::Sps {
-            let info = guarded(|| parse_sps_info(nal).map_err(Refusal::from))?;
-            check_size(&info, self.max_pixels)?;
-            self.info = Some(info);
+            self.info = Some(checked(nal, self.max_pixels)?);
         }
         guarded(|| self.decoder.decode_nal(nal).map_err(Refusal::from)).map(|_| ())
     }
 
-    /// Decodes one sample; gives the pictures that are whole now (none or one, more never for sound data).
-    pub fn decode(
-        &mut self,
-        data: &[u8],
-        description: u16,
-        step: usize,
-        out: &mut Vec<Picture>,
-    ) -> Result<(), Refusal> {
+    fn hand_out(&mut self, frame: Option<Frame>, out: &mut Vec<Picture>) {
+        if let (Some(frame), Some((step, period))) = (frame, self.held) {
+            out.push(picture(frame, step, period));
+            self.held = None;
+        }
+    }
+}
+
+impl PictureDecoder for AccessUnits {
+    fn decode(&mut self, data: &[u8], description: u16, step: usize, out: &mut Vec<Picture>) -> Result<(), Refusal> {
         self.configure(description)?;
-        if !lengths_fit(data, self.length_size) {
+        if parts(data, self.length_size).is_none() {
             return Err(Refusal::Damaged("the lengths of its parts do not add up".into()));
         }
         let nals = guarded(|| Ok::<_, Refusal>(parse_avcc(data, self.length_size)))?;
@@ -145,22 +135,13 @@ impl AccessUnits {
         Ok(())
     }
 
-    fn hand_out(&mut self, frame: Option<Frame>, out: &mut Vec<Picture>) {
-        if let (Some(frame), Some((step, period))) = (frame, self.held) {
-            out.push(Picture { frame, step, period });
-            self.held = None;
-        }
-    }
-
-    /// Ends the stream: gives the picture still held.
-    pub fn finish(&mut self, out: &mut Vec<Picture>) {
+    fn finish(&mut self, out: &mut Vec<Picture>) {
         if let Ok(done) = guarded(|| Ok::<_, Refusal>(self.decoder.flush())) {
             self.hand_out(done, out);
         }
     }
 
-    /// Forgets all pictures after damage; the next sync sample starts anew.
-    pub fn reset(&mut self) {
+    fn reset(&mut self) {
         self.decoder = Decoder::new();
         self.active = None;
         self.held = None;
@@ -168,9 +149,39 @@ impl AccessUnits {
     }
 }
 
-/// Runs third-party code; a panic in it is damage of the data at hand.
-fn guarded<T>(f: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
-    catch_unwind(AssertUnwindSafe(f)).unwrap_or_else(|_| Err(Refusal::Damaged("the decoder gave up on it".into())))
+fn picture(frame: Frame, step: usize, period: u32) -> Picture {
+    Picture {
+        width: frame.width as usize,
+        height: frame.height as usize,
+        chroma_row_shift: u32::from(frame.chroma_format == ChromaFormat::Yuv420),
+        bits: u32::from(frame.bit_depth),
+        order_count: frame.pic_order_cnt,
+        y: frame.y,
+        u: frame.u,
+        v: frame.v,
+        step,
+        period,
+    }
+}
+
+/// A part with its length before it, four bytes.
+fn as_nal(part: &[u8]) -> Vec<u8> {
+    let len = u32::try_from(part.len()).unwrap_or(u32::MAX);
+    [&len.to_be_bytes(), part].concat()
+}
+
+/// What a sequence parameter set (a part of a sample) says, if it claims no more than is accepted.
+pub(super) fn sequence(part: &[u8], max_pixels: u64) -> Result<SpsInfo, Refusal> {
+    let bytes = as_nal(part);
+    let nals = guarded(|| Ok::<_, Refusal>(parse_avcc(&bytes, 4)))?;
+    nals.first()
+        .map_or_else(|| Err(Refusal::Damaged("a parameter set is empty".into())), |nal| checked(nal, max_pixels))
+}
+
+fn checked(nal: &NalUnit<'_>, max_pixels: u64) -> Result<SpsInfo, Refusal> {
+    let info = guarded(|| parse_sps_info(nal).map_err(Refusal::from))?;
+    check_size(&info, max_pixels)?;
+    Ok(info)
 }
 
 fn check_size(info: &SpsInfo, max_pixels: u64) -> Result<(), Refusal> {
@@ -189,46 +200,4 @@ fn check_size(info: &SpsInfo, max_pixels: u64) -> Result<(), Refusal> {
         return Err(Refusal::Damaged(format!("its header claims {n} reference pictures of {w} x {h} pixels")));
     }
     Ok(())
-}
-
-/// Whether the length-prefixed parts fill the sample exactly (a few bytes of padding are forgiven).
-fn lengths_fit(data: &[u8], length_size: usize) -> bool {
-    let mut rest = data;
-    while let Some((head, tail)) = rest.split_at_checked(length_size).filter(|(h, _)| !h.is_empty()) {
-        let len = head.iter().fold(0usize, |len, b| len << 8 | usize::from(*b));
-        match tail.get(len..) {
-            Some(next) => rest = next,
-            None => return false,
-        }
-    }
-    rest.iter().all(|b| *b == 0)
-}
-
-/// Turns a refusal of the stream's very start into an error.
-pub(super) fn start_error(refusal: Refusal) -> Error {
-    match refusal {
-        Refusal::Unsupported(what) => {
-            Error::new(ErrorKind::Unsupported, format!("this kind of H.264 is not decoded in process ({what})"))
-        }
-        Refusal::Damaged(what) => Error::new(ErrorKind::Damaged, format!("its first picture is damaged: {what}")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lengths_that_run_over_the_end_are_found() {
-        assert!(lengths_fit(&[0, 0, 0, 2, 9, 9, 0, 0, 0, 1, 7], 4));
-        assert!(!lengths_fit(&[0, 0, 0, 3, 9, 9], 4));
-        assert!(!lengths_fit(&[255, 255, 255, 255, 1], 4));
-        assert!(lengths_fit(&[0, 0, 0, 1, 7, 0, 0], 4));
-    }
-
-    #[test]
-    fn a_panic_becomes_damage() {
-        let r: Result<(), Refusal> = guarded(|| std::panic::resume_unwind(Box::new("x")));
-        assert!(matches!(r, Err(Refusal::Damaged(_))));
-    }
 }

@@ -5,8 +5,9 @@
 //! Damage: a picture that cannot be decoded is lost, and so are those that depend on it, up to the next sync sample;
 //! frame numbers and times stay true, so that lost frames leave a gap, and a warning counts them.
 
-use super::h264::{AccessUnits, Picture, Refusal, start_error};
+use super::decoders::Decoders;
 use super::movie::{Movie, read_movie};
+use super::picture::{Picture, Refusal, start_error};
 use super::reorder::{Order, Reorder};
 use super::sample::{Codec, Sample};
 use super::timeline::Step;
@@ -15,7 +16,6 @@ use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
-use rust_h264::decoder::ChromaFormat;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -28,8 +28,8 @@ const MAX_SAMPLE_BYTES: u32 = 1 << 28;
 
 /// What the decoding thread reports.
 enum Message {
-    /// A frame in presentation order.
-    Frame(Frame),
+    /// A frame in presentation order, and what it was read with.
+    Frame(Frame, &'static str),
     /// Frames that could not be decoded: how many of them at the end, how many before, and the first reason.
     End { lost_before: u64, lost_tail: u64, reason: Option<String> },
     /// The stream cannot be decoded at all.
@@ -77,15 +77,15 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
     let rate_hz = rate(&movie);
     let (frame_in, frame_out) = sync_channel(AHEAD);
     let (spare_in, spare_out) = channel();
-    let units = AccessUnits::new(configurations, options.max_pixels);
+    let units = Decoders::new(configurations, options.max_pixels);
     let worker =
         Worker { file, movie, ranks, units, colour: options.colour, out: frame_in, spare: spare_out, n_frames };
     std::thread::Builder::new()
         .name("boresight-h264".into())
         .spawn(move || worker.run())
         .map_err(|e| Error::new(ErrorKind::NotFound, "no thread for decoding can be started").because(e))?;
-    let first = match frame_out.recv() {
-        Ok(Message::Frame(frame)) => frame,
+    let (first, reader) = match frame_out.recv() {
+        Ok(Message::Frame(frame, reader)) => (frame, reader),
         Ok(Message::Refused(refusal @ Refusal::Unsupported(_))) => {
             return Ok(Opened::Other(start_error(refusal).at(path.display())));
         }
@@ -102,7 +102,7 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
     }
     let info = SourceInfo {
         label: path.display().to_string(),
-        reader: "H.264 in process".into(),
+        reader: reader.into(),
         width: first.pixels.width(),
         height: first.pixels.height(),
         kind: first.pixels.kind(),
@@ -150,7 +150,7 @@ impl FrameSource for Mp4Source {
         }
         let Some(frames) = &self.frames else { return Ok(None) };
         match frames.recv() {
-            Ok(Message::Frame(frame)) => {
+            Ok(Message::Frame(frame, _)) => {
                 let (w, h, kind) = (frame.pixels.width(), frame.pixels.height(), frame.pixels.kind());
                 let i = &self.info;
                 if (w, h, kind) != (i.width, i.height, i.kind) {
@@ -194,6 +194,10 @@ impl FrameSource for Mp4Source {
         }
     }
 
+    fn reads_ahead(&self) -> bool {
+        true
+    }
+
     fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -203,7 +207,7 @@ struct Worker {
     file: File,
     movie: Movie,
     ranks: Vec<Option<u64>>,
-    units: AccessUnits,
+    units: Decoders,
     colour: Colour,
     out: SyncSender<Message>,
     spare: Receiver<Pixels>,
@@ -220,7 +224,11 @@ impl Worker {
             let _ = self.out.send(Message::Refused(refusal));
             return;
         }
-        let mut reorder = Reorder::new(self.order());
+        let order = self.order();
+        if order == Order::Rank {
+            self.units.allow_fast();
+        }
+        let mut reorder = Reorder::new(order);
         match self.decode_all(&mut reorder, &mut tally) {
             Ok(None) => {
                 let lost_tail = self.n_frames - tally.next_rank.min(self.n_frames);
@@ -235,7 +243,7 @@ impl Worker {
     }
 
     fn order(&self) -> Order {
-        let info = self.units.info;
+        let info = self.units.info();
         let never_reorders = info.is_some_and(|i| i.profile == 66 || i.max_reorder_frames == Some(0));
         if self.movie.reordered || never_reorders {
             return Order::Rank;
@@ -260,8 +268,16 @@ impl Worker {
                 Err(Refusal::Damaged("it depends on a damaged picture".into()))
             } else {
                 wait_for_sync = false;
-                read_sample(&mut self.file, &sample, self.movie.file_len, &mut data)
-                    .and_then(|()| self.units.decode(&data, sample.description, step, &mut pictures))
+                let (file, movie) = (&mut self.file, &self.movie);
+                let mut read = |step: usize, data: &mut Vec<u8>| {
+                    let sample = *movie.samples.get(movie.steps.get(step)?.sample as usize)?;
+                    Some(read_sample(file, &sample, movie.file_len, data).map(|()| sample))
+                };
+                match read(step, &mut data) {
+                    Some(Ok(sample)) => self.units.decode((&data, &sample, step), &mut read, &mut pictures),
+                    Some(Err(refusal)) => Err(refusal),
+                    None => continue,
+                }
             };
             if let Err(refusal) = result {
                 if let (Refusal::Unsupported(_), 0, true) = (&refusal, tally.sent, pictures.is_empty()) {
@@ -290,7 +306,7 @@ impl Worker {
     fn place(&mut self, pictures: &mut Vec<Picture>, reorder: &mut Reorder<Pixels>, due: &mut Vec<(u64, Pixels)>) {
         for picture in pictures.drain(..) {
             let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
-            let (period, count) = (picture.period, picture.frame.pic_order_cnt);
+            let (period, count) = (picture.period, picture.order_count);
             match self.pixels(picture) {
                 Some(pixels) => reorder.push(period, count, rank, pixels, due),
                 None => reorder.lose(rank, due),
@@ -312,31 +328,30 @@ impl Worker {
             tally.next_rank = rank + 1;
             tally.sent += 1;
             let frame = Frame { index: FrameIndex(rank), time, pixels };
-            self.out.send(Message::Frame(frame)).map_err(|_| Gone)?;
+            self.out.send(Message::Frame(frame, self.units.reader())).map_err(|_| Gone)?;
         }
         Ok(())
     }
 
     fn pixels(&mut self, picture: Picture) -> Option<Pixels> {
-        let f = picture.frame;
-        let (width, height) = (f.width as usize, f.height as usize);
+        let f = picture;
+        let (width, height) = (f.width, f.height);
         let spare = self.spare.try_recv().ok();
-        if self.colour == Colour::Rgb && self.units.info.is_some_and(|i| i.chroma_format != 0) {
+        if self.colour == Colour::Rgb && self.units.info().is_some_and(|i| i.chroma_format != 0) {
             let mut rgb = match spare {
                 Some(Pixels::Rgb8(image)) => image.into_vec(),
                 _ => Vec::new(),
             };
-            let info = self.units.info;
+            let info = self.units.info();
             let matrix = Matrix::new(info.map_or(2, |i| i.matrix), info.is_some_and(|i| i.full_range), height);
-            let rows = u32::from(f.chroma_format == ChromaFormat::Yuv420);
-            let bits = u32::from(f.bit_depth);
-            let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift: (1, rows), bits };
+            let shift = (1, f.chroma_row_shift);
+            let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
             if !to_rgb(&planes, &matrix, &mut rgb) {
                 return None;
             }
             return Image::from_vec(width, height, rgb).map(Pixels::Rgb8);
         }
-        if f.bit_depth > 8 {
+        if f.bits > 8 {
             let mut gray = match spare {
                 Some(Pixels::Gray16(image)) => image.into_vec(),
                 _ => Vec::new(),

@@ -1,0 +1,115 @@
+//! Which decoder decodes: the fast one where it is exact, the complete one for everything else, without a picture lost between them.
+//!
+//! The fast decoder refuses what it does not do, and whatever looks damaged. Then the complete one decodes again from the last refresh,
+//! throws away what has been handed out, and its word on the sample is the last one. The next refresh is the fast one's again, unless it
+//! refused too often.
+//! Limits: a sample is decoded at most twice by the complete decoder's side, so a stream costs at most three times the slower way.
+
+use super::h264::AccessUnits;
+use super::picture::{Picture, PictureDecoder, Refusal};
+use super::progressive::Progressive;
+use super::sample::Sample;
+use rust_h264::nal::SpsInfo;
+
+/// Refusals after which the fast decoder is not asked again.
+const MAX_REFUSALS: u32 = 3;
+
+/// Both decoders of one track.
+pub(super) struct Decoders {
+    fast: Progressive,
+    complete: AccessUnits,
+    /// Whether the fast one may be asked.
+    may_be_fast: bool,
+    /// Step from which the fast one decodes: the last refresh, or the first sample after a reset. `None`: the complete one decodes.
+    since: Option<usize>,
+    refusals: u32,
+    /// After a reset both begin anew.
+    is_new: bool,
+}
+
+impl Decoders {
+    pub fn new(configurations: Vec<Vec<u8>>, max_pixels: u64) -> Self {
+        Self {
+            fast: Progressive::new(configurations.clone(), max_pixels),
+            complete: AccessUnits::new(configurations, max_pixels),
+            may_be_fast: false,
+            since: None,
+            refusals: 0,
+            is_new: true,
+        }
+    }
+
+    /// Reads the parameter sets of a sample description, so that the size is known.
+    pub fn configure(&mut self, description: u16) -> Result<(), Refusal> {
+        self.complete.configure(description)
+    }
+
+    /// Says that pictures are ordered by the file's times, so that the fast decoder's order counts do not matter.
+    pub fn allow_fast(&mut self) {
+        self.may_be_fast = true;
+    }
+
+    /// The newest sequence parameter set.
+    pub fn info(&self) -> Option<SpsInfo> {
+        self.since.and(self.fast.info).or(self.complete.info)
+    }
+
+    /// What the frames are read with, for the summary.
+    pub fn reader(&self) -> &'static str {
+        if self.since.is_some() { "H.264 in process, fast decoder" } else { "H.264 in process, complete decoder" }
+    }
+
+    /// Decodes the sample of a step; `read` reads the sample of an earlier one again.
+    pub fn decode(
+        &mut self,
+        (data, sample, step): (&[u8], &Sample, usize),
+        read: &mut dyn FnMut(usize, &mut Vec<u8>) -> Option<Result<Sample, Refusal>>,
+        out: &mut Vec<Picture>,
+    ) -> Result<(), Refusal> {
+        let ask_fast = self.may_be_fast && self.refusals < MAX_REFUSALS && !self.fast.unfit;
+        if ask_fast && (self.is_new || self.fast.refreshes(data)) {
+            if self.since.is_none() {
+                self.fast.reset();
+            }
+            self.since = Some(step);
+        }
+        self.is_new = false;
+        let Some(since) = self.since else {
+            return self.complete.decode(data, sample.description, step, out);
+        };
+        if self.fast.decode(data, sample.description, step, out).is_ok() {
+            return Ok(());
+        }
+        self.refusals += 1;
+        self.since = None;
+        self.complete.reset();
+        let mut earlier = Vec::new();
+        let mut again = Vec::new();
+        for k in since..step {
+            let Some(sample) = read(k, &mut earlier) else { continue };
+            let sample = sample?;
+            if k == since {
+                self.complete.configure(sample.description)?;
+                self.complete.feed(self.fast.sets())?;
+            }
+            self.complete.decode(&earlier, sample.description, k, &mut again)?;
+            again.clear();
+        }
+        self.complete.decode(data, sample.description, step, out)
+    }
+
+    /// Ends the stream: gives the picture still held.
+    pub fn finish(&mut self, out: &mut Vec<Picture>) {
+        if self.since.is_none() {
+            self.complete.finish(out);
+        }
+    }
+
+    /// Forgets all pictures after damage; the next sync sample starts anew.
+    pub fn reset(&mut self) {
+        self.fast.reset();
+        self.complete.reset();
+        self.since = None;
+        self.is_new = true;
+    }
+}
