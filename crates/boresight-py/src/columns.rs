@@ -5,7 +5,9 @@
 
 use boresight::boresight_filters::Gaussian;
 use boresight::{Detection, Extent, Frame, FrameIndex, Scan, Sink, Timestamp, TrackId, TrackInnovation};
-use boresight::{PixelOrigin, Result, RowState, TrackRow, TrackState, TrackStatus, TrackTable, TrackTableBuilder, View};
+use boresight::{
+    PixelOrigin, Result, RowState, TrackRow, TrackState, TrackStatus, TrackTable, TrackTableBuilder, View,
+};
 use nalgebra::{Matrix2, SMatrix, Vector2, Vector4};
 
 /// Number of the columns that are floats of 64 bits: state, covariance, size.

@@ -96,7 +96,11 @@ impl Given<'_> {
             (Some(p), _) => rows::<2>(p, "positions")?.into_iter().map(Vector2::from).collect(),
             (None, Some(extents)) => extents.iter().map(centre).collect(),
             (None, None) => {
-                return Err(refused("there are neither positions nor boxes", "detections", "give an N x 2 array, or boxes="));
+                return Err(refused(
+                    "there are neither positions nor boxes",
+                    "detections",
+                    "give an N x 2 array, or boxes=",
+                ));
             }
         };
         let n = positions.len();
@@ -144,8 +148,9 @@ pub fn corners_of(e: &Extent) -> [f64; 4] {
     [l, t, l + e.width_px, t + e.height_px]
 }
 
-/// The detections in what a detector in Python returns: an array, a dictionary of arrays, `supervision.Detections`.
-pub fn detections_of(found: &Bound<'_, PyAny>) -> PyResult<Vec<Detection>> {
+/// The detections in what a detector in Python returns: an array, a dictionary of arrays, `supervision.Detections`;
+/// `std` holds for positions without covariance: px, and a share of the box's side.
+pub fn detections_of(found: &Bound<'_, PyAny>, std: (f64, f64)) -> PyResult<Vec<Detection>> {
     let py = found.py();
     let parts = py.import("boresight._detections")?.call_method1("parts", (found,))?;
     let parts = parts.cast::<PyDict>().map_err(PyErr::from)?;
@@ -156,8 +161,8 @@ pub fn detections_of(found: &Bound<'_, PyAny>) -> PyResult<Vec<Detection>> {
         boxes: part("boxes")?,
         scores: part("scores")?,
         classes: part("classes")?,
-        std_px: part("std_px")?.map_or(Ok(1.0), |v| v.extract())?,
-        std_per_side: part("std_per_side")?.map_or(Ok(0.0), |v| v.extract())?,
+        std_px: part("std_px")?.map_or(Ok(std.0), |v| v.extract())?,
+        std_per_side: part("std_per_side")?.map_or(Ok(std.1), |v| v.extract())?,
     };
     given.detections()
 }

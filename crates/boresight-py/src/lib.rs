@@ -10,13 +10,19 @@
 mod arrow;
 mod columns;
 mod config;
+mod detect;
 mod detections;
 mod errors;
+mod evaluate;
+mod filters;
 mod pixels;
 mod plan;
 mod python_detector;
 mod run;
+mod simulate;
 mod source;
+mod states;
+mod tracker;
 mod tracks;
 
 use pyo3::prelude::*;
@@ -28,7 +34,19 @@ mod _boresight {
     #[pymodule_export]
     use super::config::PyConfig;
     #[pymodule_export]
-    use super::run::{choose_for_arrays, choose_for_path, track_arrays, track_path};
+    use super::evaluate::{Table, evaluate};
+    #[pymodule_export]
+    use super::filters::{Batch, Filter};
+    #[pymodule_export]
+    use super::run::{
+        choose_for_arrays, choose_for_path, detect_arrays, detect_path, track_arrays, track_columns, track_path,
+    };
+    #[pymodule_export]
+    use super::simulate::{scenes, simulate};
+    #[pymodule_export]
+    use super::states::{State, States};
+    #[pymodule_export]
+    use super::tracker::Tracker;
     #[pymodule_export]
     use super::tracks::Tracks;
 

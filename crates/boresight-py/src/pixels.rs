@@ -71,7 +71,11 @@ fn colour(array: &Bound<'_, PyArray3<u8>>) -> PyResult<Option<Image<[u8; 3]>>> {
 
 fn check_size(width: usize, height: usize) -> PyResult<()> {
     if width == 0 || height == 0 {
-        return Err(refused(format!("the image has {width} x {height} pixels"), "frame", "expected at least one pixel"));
+        return Err(refused(
+            format!("the image has {width} x {height} pixels"),
+            "frame",
+            "expected at least one pixel",
+        ));
     }
     Ok(())
 }

@@ -92,6 +92,9 @@ impl Wishes {
     fn for_source(mut self, source: Box<dyn FrameSource>, base: Config) -> Result<Plan> {
         let info = source.info().clone();
         let reasons = vec!["Configuration as given.".to_string()];
+        if let Some(detector) = &mut self.detector {
+            detector.std = (base.input.table.std_px, base.input.table.std_per_side);
+        }
         match (self.detector.take(), self.config.is_some()) {
             (Some(detector), true) => {
                 let config = changed(base, &self.sets)?;
@@ -151,10 +154,7 @@ fn unused(config: &Config) -> Option<String> {
 }
 
 /// Every frame's detections: the tracker's configuration is learnt from all of them.
-fn all_scans(
-    mut source: Box<dyn FrameSource>,
-    mut detector: PythonDetector,
-) -> Result<(Vec<Scan>, Vec<String>)> {
+fn all_scans(mut source: Box<dyn FrameSource>, mut detector: PythonDetector) -> Result<(Vec<Scan>, Vec<String>)> {
     let mut scans = Vec::new();
     while let Some(frame) = source.next_frame()? {
         let mut scan = Scan::default();

@@ -13,6 +13,8 @@ pub struct PythonDetector {
     pub function: Py<PyAny>,
     /// Where its exceptions are kept.
     pub raised: Raised,
+    /// Standard deviation of positions without covariance, px, and as a share of the box's side.
+    pub std: (f64, f64),
 }
 
 impl Detector for PythonDetector {
@@ -21,7 +23,7 @@ impl Detector for PythonDetector {
             // A loop in Rust does not look at signals by itself.
             py.check_signals()?;
             let pixels = array_of(py, &frame.pixels)?;
-            detections_of(&self.function.bind(py).call1((pixels,))?)
+            detections_of(&self.function.bind(py).call1((pixels,))?, self.std)
         });
         let detections = found.map_err(|e| self.raised.keep(e))?;
         *scan = Scan::at(frame.index, frame.time).with_detections(detections);

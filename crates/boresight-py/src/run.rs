@@ -2,6 +2,7 @@
 
 use crate::columns::{Columns, Recorder};
 use crate::config::PyConfig;
+use crate::detect::{Found, FoundSink, scans_of};
 use crate::errors::{OrRaise, raised, refused};
 use crate::plan::{Plan, Wishes};
 use crate::python_detector::PythonDetector;
@@ -9,9 +10,12 @@ use crate::source::{ArrayFrames, Raised, Times};
 use crate::tracks::Tracks;
 use boresight::draw::{AnnotatedVideo, DrawOptions};
 use boresight::io::video::Mp4Options;
-use boresight::pipeline::{self, Outcome};
+use boresight::pipeline::{self, Input, Outcome};
+use boresight::track::Tracking;
 use boresight::{Error, ErrorKind, Sink, track};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -43,7 +47,11 @@ impl Request {
             sets: self.sets.clone(),
             rate_hz: self.rate_hz,
             false_tracks_per_hour: self.false_tracks_per_hour,
-            detector: detector.map(|f| PythonDetector { function: f.clone_ref(py), raised: raised.clone() }),
+            detector: detector.map(|f| PythonDetector {
+                function: f.clone_ref(py),
+                raised: raised.clone(),
+                std: (1.0, 0.0),
+            }),
         }
     }
 }
@@ -84,7 +92,7 @@ pub fn track_path(py: Python<'_>, path: String, request: Request) -> PyResult<Tr
     } else {
         patiently(py, move || wishes.for_path(&path))?
     };
-    run(py, settled(py, plan, &kept)?, &request, kept, label)
+    run(py, settled(py, plan, &kept)?, &request, &kept, label)
 }
 
 /// Tracks an iterable of arrays.
@@ -100,7 +108,7 @@ pub fn track_arrays(
 ) -> PyResult<Tracks> {
     let kept = Raised::default();
     let plan = plan_arrays(py, frames, n_frames, times, twice, &request, &kept)?;
-    run(py, plan, &request, kept, "arrays".into())
+    run(py, plan, &request, &kept, "arrays".into())
 }
 
 /// The configuration that the automatic choice takes for an iterable of arrays.
@@ -129,7 +137,11 @@ fn plan_arrays(
 ) -> PyResult<Plan> {
     let rate = request.rate_hz.unwrap_or(boresight::ASSUMED_RATE_HZ);
     if !(1e-6..=1e9).contains(&rate) {
-        return Err(refused("expected a rate from 1e-6 to 1e9 frames/s", format!("rate_hz = {rate}"), "25.0 is that of video"));
+        return Err(refused(
+            "expected a rate from 1e-6 to 1e9 frames/s",
+            format!("rate_hz = {rate}"),
+            "25.0 is that of video",
+        ));
     }
     let times = times.map_or(Times::Rate(rate), |t| Times::Each(Arc::new(t)));
     let Some(source) = ArrayFrames::start(frames, n_frames, times.clone(), kept.clone())? else {
@@ -157,16 +169,16 @@ fn settled(py: Python<'_>, plan: boresight::Result<Plan>, kept: &Raised) -> PyRe
     }
 }
 
-fn run(py: Python<'_>, plan: Plan, request: &Request, kept: Raised, label: String) -> PyResult<Tracks> {
-    let tracking = track::build(&plan.config.tracker).or_raise(py)?;
-    let mut columns = Columns::default();
-    let mut sinks: Vec<Box<dyn Sink + '_>> = Vec::new();
-    if let Some(path) = &request.annotate {
-        let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default());
-        sinks.push(Box::new(video.or_raise(py)?));
-    }
-    sinks.push(Box::new(Recorder(&mut columns)));
-    let Plan { input, config, reasons, lost, total, reader } = plan;
+/// Runs a plan's input to its end; between frames signals are looked at, and progress is told.
+fn drive(
+    py: Python<'_>,
+    input: Input,
+    tracking: Option<Box<dyn Tracking>>,
+    sinks: Vec<Box<dyn Sink + '_>>,
+    request: &Request,
+    kept: &Raised,
+    total: Option<u64>,
+) -> PyResult<Outcome> {
     let (mut looked, mut told) = (Instant::now(), Instant::now());
     let mut go_on = |so_far: &pipeline::Summary| -> ControlFlow<()> {
         let now = Instant::now();
@@ -193,17 +205,35 @@ fn run(py: Python<'_>, plan: Plan, request: &Request, kept: Raised, label: Strin
             }
         }
     };
-    let outcome: Outcome = py.detach(|| pipeline::run(input, Some(tracking), sinks, &mut go_on));
+    let outcome = py.detach(|| pipeline::run(input, tracking, sinks, &mut go_on));
     if let Some(e) = kept.take() {
         return Err(e);
     }
     if let Some(f) = &request.progress {
         f.call1(py, (outcome.summary.frames, Some(outcome.summary.frames)))?;
     }
+    Ok(outcome)
+}
+
+/// What a run without a frame is.
+fn empty(label: &str) -> Error {
+    Error::new(ErrorKind::Damaged, "holds no frames").at(label)
+}
+
+fn run(py: Python<'_>, plan: Plan, request: &Request, kept: &Raised, label: String) -> PyResult<Tracks> {
+    let tracking = track::build(&plan.config.tracker).or_raise(py)?;
+    let mut columns = Columns::default();
+    let mut sinks: Vec<Box<dyn Sink + '_>> = Vec::new();
+    if let Some(path) = &request.annotate {
+        let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default());
+        sinks.push(Box::new(video.or_raise(py)?));
+    }
+    sinks.push(Box::new(Recorder(&mut columns)));
+    let Plan { input, config, reasons, lost, total, reader } = plan;
+    let outcome = drive(py, input, Some(tracking), sinks, request, kept, total)?;
     let (summary, broken) = outcome.all_written().or_raise(py)?;
     if summary.frames == 0 {
-        let empty = || Error::new(ErrorKind::Damaged, "holds no frames").at(&label);
-        return Err(raised(py, &broken.unwrap_or_else(empty)));
+        return Err(raised(py, &broken.unwrap_or_else(|| empty(&label))));
     }
     let warnings = lost.into_iter().chain(summary.warnings.iter().cloned()).collect();
     let tracks = Tracks::new(columns, config, reasons, warnings, summary, label, reader);
@@ -215,4 +245,66 @@ fn run(py: Python<'_>, plan: Plan, request: &Request, kept: Raised, label: Strin
             Err(error)
         }
     }
+}
+
+/// Detections of a plan's frames, and its configuration.
+fn detect<'py>(py: Python<'py>, plan: Plan, request: &Request, kept: &Raised, label: &str) -> PyResult<Detected<'py>> {
+    let mut found = Found::default();
+    let sinks: Vec<Box<dyn Sink + '_>> = vec![Box::new(FoundSink(&mut found))];
+    let outcome = drive(py, plan.input, None, sinks, request, kept, plan.total)?;
+    let (summary, broken) = outcome.all_written().or_raise(py)?;
+    match broken {
+        Some(e) => Err(raised(py, &e)),
+        None if summary.frames == 0 => Err(raised(py, &empty(label))),
+        None => Ok((found.arrays(py)?, PyConfig { config: plan.config, reasons: plan.reasons })),
+    }
+}
+
+/// Columns of detections, and the configuration.
+type Detected<'py> = (Bound<'py, PyDict>, PyConfig);
+
+/// Detects in a path.
+#[pyfunction]
+pub fn detect_path<'py>(py: Python<'py>, path: String, request: Request) -> PyResult<Detected<'py>> {
+    let kept = Raised::default();
+    let (wishes, label) = (request.wishes(py, &kept), path.clone());
+    let plan = settled(py, patiently(py, move || wishes.for_path(&path))?, &kept)?;
+    detect(py, plan, &request, &kept, &label)
+}
+
+/// Detects in an iterable of arrays.
+#[pyfunction]
+pub fn detect_arrays<'py>(
+    py: Python<'py>,
+    frames: &Bound<'py, PyAny>,
+    n_frames: Option<u64>,
+    times: Option<Vec<f64>>,
+    twice: bool,
+    request: Request,
+) -> PyResult<Detected<'py>> {
+    let kept = Raised::default();
+    let plan = plan_arrays(py, frames, n_frames, times, twice, &request, &kept)?;
+    detect(py, plan, &request, &kept, "arrays")
+}
+
+/// Tracks detections that are there as columns, sorted by frame.
+#[pyfunction]
+pub fn track_columns(
+    py: Python<'_>,
+    frames: PyReadonlyArray1<'_, i64>,
+    positions: PyReadonlyArray2<'_, f64>,
+    covariances: PyReadonlyArray2<'_, f64>,
+    sizes: PyReadonlyArray2<'_, f64>,
+    request: Request,
+) -> PyResult<Tracks> {
+    let kept = Raised::default();
+    let rate = request.rate_hz.unwrap_or(boresight::ASSUMED_RATE_HZ);
+    let scans = scans_of(&frames, &positions, &covariances, &sizes, rate)?;
+    let wishes = request.wishes(py, &kept);
+    let plan = py.detach(|| {
+        let base = wishes.config.clone().unwrap_or_default();
+        wishes.for_scans(scans, rate, base, "columns".into())
+    });
+    let plan = settled(py, plan, &kept)?;
+    run(py, plan, &request, &kept, "columns".into())
 }

@@ -50,6 +50,11 @@ impl Tracks {
         &self.columns
     }
 
+    /// The input's name.
+    pub fn name(&self) -> &str {
+        &self.label
+    }
+
     fn notes(&self, py: Python<'_>) -> PyResult<Notes> {
         Ok(Notes {
             input: self.label.clone(),

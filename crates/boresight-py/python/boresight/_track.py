@@ -57,9 +57,9 @@ def track(
         rows = _rows(
             source,
             times,
-            _request(
-                config=settled(config),
-                sets=assignments(sets, filter, associator),
+            request(
+                config,
+                {"filter": filter, "associator": associator, **sets},
                 rate_hz=rate_hz,
                 false_tracks_per_hour=false_tracks_per_hour,
                 detector=detector,
@@ -73,24 +73,44 @@ def track(
     return tracks
 
 
-def _request(*, config: Config | None, **others: Any) -> dict[str, Any]:
-    return {"config": None if config is None else config._native, **others}
+def request(
+    config: Any,
+    sets: dict[str, Any],
+    *,
+    rate_hz: float | None = None,
+    false_tracks_per_hour: float | None = None,
+    detector: Any = None,
+    annotate: str | os.PathLike[str] | None = None,
+    progress: Any = None,
+) -> dict[str, Any]:
+    """What the native functions are asked for; `filter` and `associator` among the keys are the short ones."""
+    whole = settled(config)
+    keys = dict(sets)
+    return {
+        "config": None if whole is None else whole._native,
+        "sets": assignments(keys, keys.pop("filter", None), keys.pop("associator", None)),
+        "rate_hz": rate_hz,
+        "false_tracks_per_hour": false_tracks_per_hour,
+        "detector": detector,
+        "annotate": annotate,
+        "progress": progress,
+    }
 
 
-def _rows(source: Any, times: Any, request: dict[str, Any]) -> _boresight.Rows:
+def _rows(source: Any, times: Any, asked: dict[str, Any]) -> _boresight.Rows:
     try:
         if isinstance(source, str | os.PathLike):
             if times is not None:
                 raise BoresightError("times are for arrays", where="times", hint="a file has its own; rate_hz= says another rate")
-            return _boresight.track_path(os.fspath(source), request)
-        return _boresight.track_arrays(*_frames(source, times), request)
+            return _boresight.track_path(os.fspath(source), asked)
+        return _boresight.track_arrays(*frames_of(source, times), asked)
     except BoresightError as e:
         if isinstance(e.partial, _boresight.Rows):
             e.partial = Tracks(e.partial)
         raise
 
 
-def _frames(source: Any, times: Any) -> tuple[Any, int | None, list[float] | None, bool]:
+def frames_of(source: Any, times: Any) -> tuple[Any, int | None, list[float] | None, bool]:
     """The iterable, its length, the times, and whether it can be gone through twice."""
     if isinstance(source, np.ndarray) and source.ndim not in (3, 4):
         raise BoresightError(
@@ -116,17 +136,10 @@ def _frames(source: Any, times: Any) -> tuple[Any, int | None, list[float] | Non
 
 def plan(source: Any, *, rate_hz: float | None, times: Any, **sets: Any) -> Config:
     """What the automatic choice takes for a source; nothing is tracked."""
-    request = _request(
-        config=None,
-        sets=assignments(sets, sets.pop("filter", None), sets.pop("associator", None)),
-        rate_hz=rate_hz,
-        false_tracks_per_hour=sets.pop("false_tracks_per_hour", None),
-        detector=None,
-        annotate=None,
-        progress=None,
-    )
+    allowed = sets.pop("false_tracks_per_hour", None)
+    asked = request(None, sets, rate_hz=rate_hz, false_tracks_per_hour=allowed)
     if isinstance(source, str | os.PathLike):
-        return Config._of(_boresight.choose_for_path(os.fspath(source), request))
-    return Config._of(_boresight.choose_for_arrays(*_frames(source, times), request))
+        return Config._of(_boresight.choose_for_path(os.fspath(source), asked))
+    return Config._of(_boresight.choose_for_arrays(*frames_of(source, times), asked))
 
 
