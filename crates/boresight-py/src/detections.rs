@@ -45,8 +45,8 @@ fn numbers(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Numbers> {
     };
     let view = array.try_readonly()?;
     let values = match view.as_slice() {
-        Ok(slice) => slice.to_vec(),
-        Err(_) => view.as_array().iter().copied().collect(),
+        Ok(slice) if array.is_c_contiguous() => slice.to_vec(),
+        _ => view.as_array().iter().copied().collect(),
     };
     Ok(Numbers { shape: array.shape().to_vec(), values })
 }

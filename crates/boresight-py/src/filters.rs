@@ -7,7 +7,7 @@ use boresight_filters::{
     FilterError, Gaussian, GaussianFilter, Information, Kf, Measurement, SquareRoot, Srif, Start, Ud,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// A filter whose number of states is known at run time.
@@ -213,7 +213,8 @@ impl Batch {
         r: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<usize> {
         let shapes = (z.as_array().shape().to_vec(), r.as_array().shape().to_vec());
-        let (Ok(z), Ok(r)) = (z.as_slice(), r.as_slice()) else {
+        let rows = z.is_c_contiguous() && r.is_c_contiguous();
+        let (true, Ok(z), Ok(r)) = (rows, z.as_slice(), r.as_slice()) else {
             return Err(refused("expected contiguous arrays", "step", "numpy.ascontiguousarray makes one"));
         };
         let (z, r) = (z.as_chunks::<2>().0, r.as_chunks::<2>().0);

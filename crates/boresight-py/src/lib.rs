@@ -21,6 +21,7 @@ mod python_detector;
 mod run;
 mod simulate;
 mod source;
+mod speed;
 mod states;
 mod tracker;
 mod tracks;
@@ -43,6 +44,8 @@ mod _boresight {
     };
     #[pymodule_export]
     use super::simulate::{scenes, simulate};
+    #[pymodule_export]
+    use super::speed::time_of_updates;
     #[pymodule_export]
     use super::states::{State, States};
     #[pymodule_export]

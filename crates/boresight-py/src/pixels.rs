@@ -47,8 +47,9 @@ fn grey<T: Element + Copy>(array: &Bound<'_, PyArray2<T>>) -> PyResult<Option<Im
     let view = array.try_readonly()?;
     let (height, width) = (array.shape()[0], array.shape()[1]);
     let data = match view.as_slice() {
-        Ok(slice) => slice.to_vec(),
-        Err(_) => view.as_array().iter().copied().collect(),
+        // A slice column by column is none of ours.
+        Ok(slice) if array.is_c_contiguous() => slice.to_vec(),
+        _ => view.as_array().iter().copied().collect(),
     };
     check_size(width, height)?;
     Ok(Image::from_vec(width, height, data))
@@ -59,8 +60,8 @@ fn colour(array: &Bound<'_, PyArray3<u8>>) -> PyResult<Option<Image<[u8; 3]>>> {
     let view = array.try_readonly()?;
     check_size(width, height)?;
     let data: Vec<[u8; 3]> = match view.as_slice() {
-        Ok(slice) => slice.as_chunks::<3>().0.to_vec(),
-        Err(_) => {
+        Ok(slice) if array.is_c_contiguous() => slice.as_chunks::<3>().0.to_vec(),
+        _ => {
             let a = view.as_array();
             let pixel = |(y, x)| [a[(y, x, 0)], a[(y, x, 1)], a[(y, x, 2)]];
             (0..height).flat_map(|y| (0..width).map(move |x| (y, x))).map(pixel).collect()

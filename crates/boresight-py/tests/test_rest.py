@@ -37,7 +37,7 @@ def test_points_with_the_names_of_trackpy_are_evaluated():
         ({"frame": [0], "id": [0], "x": [np.nan], "y": [1.0]}, "finite"),
         ({"frame": ["a"], "id": [0], "x": [1.0], "y": [1.0]}, "numbers"),
         (7, "a int"),
-        ("no_such.csv", ""),
+        ("no_such.csv", "no_such"),
     ],
 )
 def test_a_table_that_is_none_is_told(table, words):

@@ -170,7 +170,8 @@ def test_every_layout_and_type_of_the_same_frames_gives_the_same_tracks(ds2, ban
     plain = bs.track(ds2.frames, rate_hz=1.0, config=band).to_dict()
     other = bs.track([form(f) for f in ds2.frames], rate_hz=1.0, config=band).to_dict()
     np.testing.assert_array_equal(plain["track_id"], other["track_id"])
-    np.testing.assert_allclose(plain["x_px"], other["x_px"], atol=1e-4)
+    # Floats have no quantisation noise in their covariance.
+    np.testing.assert_allclose(plain["x_px"], other["x_px"], atol=2e-3)
 
 
 def _read_only(f):
@@ -181,8 +182,7 @@ def _read_only(f):
 
 def _unaligned(f):
     room = np.zeros(f.nbytes + 1, np.uint8)
-    out = room[1:].view(np.uint16).reshape(f.shape) if False else np.frombuffer(room.data, np.uint16, f.size, offset=1)
-    out = out.reshape(f.shape)
+    out = np.frombuffer(room.data, np.uint16, f.size, offset=1).reshape(f.shape)
     out[...] = f
     assert not out.flags.aligned
     return out
@@ -354,14 +354,10 @@ def test_the_annotated_video_is_written(ds2, band, tmp_path):
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_what_is_made_up_is_a_python_warning(clip, tmp_path):
-    cut = tmp_path / "cut.mp4"
-    whole = Path(clip).read_bytes()
-    cut.write_bytes(whole[: len(whole) - 200])
-    try:
-        with pytest.warns(bs.BoresightWarning):
-            tracks = bs.track(cut, config="small-infrared-targets")
-        assert tracks.warnings
-    except bs.BoresightError as e:
-        # Where the index stood at the end of the file nothing can be read; that is told as well.
-        assert e.kind == "damaged" and e.where
+def test_what_is_lost_is_a_python_warning(ds2, band, tmp_path):
+    h, w = ds2.frames.shape[1:]
+    frames = b"".join(b"FRAME\n" + f.tobytes() for f in ds2.frames)
+    (tmp_path / "cut.y4m").write_bytes(f"YUV4MPEG2 W{w} H{h} F1:1 Cmono\n".encode() + frames[:-100])
+    with pytest.warns(bs.BoresightWarning, match="cut.y4m|frame"):
+        tracks = bs.track(tmp_path / "cut.y4m", config=band)
+    assert tracks.warnings and tracks.summary["n_frames"] == 49

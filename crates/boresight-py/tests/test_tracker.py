@@ -85,7 +85,7 @@ def test_a_scan_that_is_refused_leaves_the_tracks(config):
         ({"detections": np.full((1, 2), np.nan), "time_s": 5.0}, "finite"),
         ({"detections": z, "time_s": float("nan")}, "finite"),
         ({"detections": z, "covariances": np.eye(3), "time_s": 5.0}, "2 x 2"),
-        ({"detections": z, "covariances": -np.eye(2), "time_s": 5.0}, ""),
+        ({"detections": z, "covariances": -np.eye(2), "time_s": 5.0}, "positive"),
         ({"detections": z, "scores": [1.0], "time_s": 5.0}, "scores"),
         ({"boxes": np.zeros((2, 3)), "time_s": 5.0}, "N x 4"),
         ({"time_s": 5.0}, "neither positions nor boxes"),

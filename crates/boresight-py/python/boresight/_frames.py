@@ -59,7 +59,7 @@ def normalise(value: Any) -> np.ndarray[Any, Any]:
         a = a.astype(np.float32) @ _GREY
     keep = (a.dtype.kind, a.dtype.itemsize) in {("u", 1), ("u", 2), ("f", 4)}
     kind = a.dtype.newbyteorder("=") if keep else np.dtype(np.float32)
-    return np.ascontiguousarray(a, dtype=kind)
+    return np.require(a, dtype=kind, requirements=["C", "A"])
 
 
 def numbers(value: Any, name: str) -> np.ndarray[Any, Any]:
