@@ -27,7 +27,7 @@ pub fn changed(mut config: Config, sets: &[String]) -> boresight::Result<Config>
 }
 
 /// A configuration.
-#[pyclass(name = "Config", module = "boresight._boresight", subclass, frozen, eq, from_py_object)]
+#[pyclass(name = "Config", module = "boresight._boresight", frozen, eq, from_py_object)]
 #[derive(Clone, PartialEq)]
 pub struct PyConfig {
     /// What it says.

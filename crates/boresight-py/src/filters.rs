@@ -7,7 +7,7 @@ use boresight_filters::{
     FilterError, Gaussian, GaussianFilter, Information, Kf, Measurement, SquareRoot, Srif, Start, Ud,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// A filter whose number of states is known at run time.

@@ -6,6 +6,7 @@ use boresight::{Scan, TrackState, TrackStatus};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::types::{PyIterator, PyList};
 use std::sync::Arc;
 
 /// One track after one scan.
@@ -159,6 +160,11 @@ impl States {
         let at = at.filter(|at| *at < n);
         let index = at.ok_or_else(|| PyIndexError::new_err(format!("track {index} of {n}")))?;
         Ok(State { all: Arc::clone(&self.all), index })
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        let states = (0..self.all.len()).map(|index| State { all: Arc::clone(&self.all), index });
+        PyList::new(py, states.collect::<Vec<_>>())?.try_iter()
     }
 
     #[getter]

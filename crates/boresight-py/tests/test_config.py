@@ -5,9 +5,8 @@ from __future__ import annotations
 import copy
 import pickle
 
-import pytest
-
 import boresight as bs
+import pytest
 
 
 def test_keys_are_set_by_keyword_and_read_back():

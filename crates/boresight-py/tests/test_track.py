@@ -12,13 +12,12 @@ import threading
 import time
 from pathlib import Path
 
+import boresight as bs
 import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-
-import boresight as bs
 
 
 @pytest.fixture(scope="module")
@@ -231,7 +230,7 @@ def test_a_wrong_key_value_or_time_is_told(ds2, band):
     with pytest.raises(bs.BoresightError, match="gate-probability") as e:
         bs.track(ds2.frames, config=band, tracker__gate_probability=1.2)
     assert e.value.kind == "config" and "0.99" in e.value.hint
-    with pytest.raises(bs.BoresightError, match="two underlines|there is no such argument"):
+    with pytest.raises(bs.BoresightError, match="there is no such argument"):
         bs.track(ds2.frames, coast_s=1)
     with pytest.raises(bs.BoresightError, match="3 times for 50 frames"):
         bs.track(ds2.frames, times=[0, 1, 2])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import threading
 
+import boresight as bs
 import numpy as np
 import pytest
-
-import boresight as bs
 
 
 def test_step_gives_what_track_gives(ds2, band):
@@ -16,9 +15,7 @@ def test_step_gives_what_track_gives(ds2, band):
     for frame, t in zip(ds2.frames, ds2.times_s, strict=True):
         states = tracker.step(frame, time_s=t)
         rows += [(states.frame, s.id, *s.state[[0, 2]]) for s in states]
-    np.testing.assert_array_equal(
-        np.array(rows), np.stack([tracks["frame"], tracks["track_id"], tracks["x_px"], tracks["y_px"]], axis=1)
-    )
+    np.testing.assert_array_equal(np.array(rows), np.stack([tracks["frame"], tracks["track_id"], tracks["x_px"], tracks["y_px"]], axis=1))
 
 
 def two_targets(n=30, dt=0.1):
@@ -31,15 +28,13 @@ def two_targets(n=30, dt=0.1):
 
 @pytest.fixture
 def config():
-    return bs.Config(
-        tracker__acceleration_density_px2_per_s3=1.0, tracker__max_speed_px_per_s=100.0, tracker__confirmation={"m-of-n": {}}
-    )
+    return bs.Config(tracker__acceleration_density_px2_per_s3=1.0, tracker__max_speed_px_per_s=100.0, tracker__confirmation={"m-of-n": {}})
 
 
 def test_positions_with_covariances_are_tracked(config):
     tracker = bs.Tracker(config)
-    for t, truth, z in two_targets():
-        states = tracker.update(z, covariances=0.25 * np.eye(2), time_s=t)
+    for t, where, z in two_targets():
+        states, truth = tracker.update(z, covariances=0.25 * np.eye(2), time_s=t), where
     found = states.confirmed
     assert len(found) == 2 and sorted(found.ids) == sorted(s.id for s in found)
     for s in found:
@@ -115,10 +110,7 @@ class Detections:
 
 @pytest.mark.parametrize("real", [False, True])
 def test_supervision_in_and_out(config, real):
-    if real:
-        make = pytest.importorskip("supervision").Detections
-    else:
-        make = Detections
+    make = pytest.importorskip("supervision").Detections if real else Detections
     tracker = bs.Tracker(config)
     for t, _, z in two_targets():
         boxes = np.concatenate([z - 5, z + 5], axis=1).astype(np.float32)
@@ -142,8 +134,10 @@ def test_threads_may_call_one_tracker_at_once(ds2, band):
                 failures.append(e)
 
     threads = [threading.Thread(target=work) for _ in range(4)]
-    [t.start() for t in threads]
-    [t.join() for t in threads]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
     assert not failures and tracker.step(ds2.frames[0]).frame == 80
 
 

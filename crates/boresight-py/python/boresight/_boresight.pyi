@@ -6,11 +6,36 @@ from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import Self, disjoint_base
+
+__all__ = [
+    "Batch",
+    "Config",
+    "Filter",
+    "Rows",
+    "States",
+    "Table",
+    "TrackState",
+    "Tracker",
+    "__version__",
+    "choose_for_arrays",
+    "choose_for_path",
+    "detect_arrays",
+    "detect_path",
+    "evaluate",
+    "scenes",
+    "simulate",
+    "time_of_updates",
+    "track_arrays",
+    "track_columns",
+    "track_path",
+]
 
 __version__: str
 
+@final
 class Config:
-    def __new__(cls, sets: list[str] = ...) -> Config: ...
+    def __new__(cls, sets: list[str] = ...) -> Self: ...
     @staticmethod
     def from_toml(text: str, name: str) -> Config: ...
     @staticmethod
@@ -128,8 +153,9 @@ class States:
     def tracks_of_detections(self) -> NDArray[np.int64]:
         """For each detection of the scan the place of the confirmed track that took it, -1 for none."""
 
+@disjoint_base
 class Tracker:
-    def __new__(cls, config: Config) -> Tracker: ...
+    def __new__(cls, config: Config) -> Self: ...
     @property
     def native_config(self) -> Config: ...
     def step(self, frame: Any, time_s: float | None = None) -> States:
@@ -148,10 +174,9 @@ class Tracker:
     def reset(self) -> None:
         """Forgets all tracks; ids begin at 1 again."""
 
+@disjoint_base
 class Filter:
-    def __new__(
-        cls, form: str, model: str, parameters: list[float], x: NDArray[np.float64], p: NDArray[np.float64]
-    ) -> Filter: ...
+    def __new__(cls, form: str, model: str, parameters: list[float], x: NDArray[np.float64], p: NDArray[np.float64]) -> Self: ...
     def predict(self, dt_s: float) -> None:
         """Moves the belief `dt_s` seconds ahead."""
     def correct_native(self, z: NDArray[np.float64], r: NDArray[np.float64]) -> None: ...
@@ -169,8 +194,9 @@ class Filter:
     def covariance(self) -> NDArray[np.float64]:
         """Of the position, 2 x 2, px²."""
 
+@disjoint_base
 class Batch:
-    def __new__(cls, q: float, x: NDArray[np.float64], p: NDArray[np.float64]) -> Batch: ...
+    def __new__(cls, q: float, x: NDArray[np.float64], p: NDArray[np.float64]) -> Self: ...
     def __len__(self, /) -> int: ...
     def step_native(self, dt_s: float, z: NDArray[np.float64], r: NDArray[np.float64]) -> int: ...
     @property
@@ -198,9 +224,7 @@ class Table:
     ) -> Table: ...
 
 def track_path(path: str, request: dict[str, Any]) -> Rows: ...
-def track_arrays(
-    frames: Any, n_frames: int | None, times: list[float] | None, twice: bool, request: dict[str, Any]
-) -> Rows: ...
+def track_arrays(frames: Any, n_frames: int | None, times: list[float] | None, twice: bool, request: dict[str, Any]) -> Rows: ...
 def track_columns(
     frames: NDArray[np.int64],
     positions: NDArray[np.float64],
@@ -209,9 +233,7 @@ def track_columns(
     request: dict[str, Any],
 ) -> Rows: ...
 def choose_for_path(path: str, request: dict[str, Any]) -> Config: ...
-def choose_for_arrays(
-    frames: Any, n_frames: int | None, times: list[float] | None, twice: bool, request: dict[str, Any]
-) -> Config: ...
+def choose_for_arrays(frames: Any, n_frames: int | None, times: list[float] | None, twice: bool, request: dict[str, Any]) -> Config: ...
 def detect_path(path: str, request: dict[str, Any]) -> tuple[dict[str, NDArray[Any]], Config]: ...
 def detect_arrays(
     frames: Any, n_frames: int | None, times: list[float] | None, twice: bool, request: dict[str, Any]

@@ -18,9 +18,7 @@ class BoresightError(Exception):
         partial: the tracks of the frames before an input broke off, or `None`.
     """
 
-    def __init__(
-        self, message: str = "", *, kind: str = "config", where: str | None = None, hint: str | None = None
-    ) -> None:
+    def __init__(self, message: str = "", *, kind: str = "config", where: str | None = None, hint: str | None = None) -> None:
         super().__init__(message)
         self.kind = kind
         self.where = where

@@ -49,9 +49,7 @@ class Evaluation(Mapping[str, float]):
         return "\n".join(lines + [f"note: {n}" for n in self.notes])
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{html.escape(k)}</td><td>{v:.4f}</td><td>{html.escape(self.units[k])}</td></tr>" for k, v in self.items()
-        )
+        rows = "".join(f"<tr><td>{html.escape(k)}</td><td>{v:.4f}</td><td>{html.escape(self.units[k])}</td></tr>" for k, v in self.items())
         notes = "".join(f"<p>{html.escape(n)}</p>" for n in self.notes)
         return f"<table><tr><th>measure</th><th>value</th><th>unit</th></tr>{rows}</table>{notes}"
 

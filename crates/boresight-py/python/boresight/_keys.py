@@ -32,9 +32,7 @@ def toml(value: Any, key: str) -> str:
     )
 
 
-def assignments(
-    sets: Mapping[str, Any], filter: str | Mapping[str, Any] | None = None, associator: str | None = None
-) -> list[str]:
+def assignments(sets: Mapping[str, Any], filter: str | Mapping[str, Any] | None = None, associator: str | None = None) -> list[str]:
     """What the library calls `--set`: `key=value`, in the order given; `filter` and `associator` are short for theirs."""
     out = []
     if filter is not None:

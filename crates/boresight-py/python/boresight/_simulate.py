@@ -36,9 +36,7 @@ def scenes() -> dict[str, str]:
     return dict(_boresight.scenes())
 
 
-def simulate(
-    scene: str | os.PathLike[str] = "ds2", *, seed: int = 1, run: int = 0, n_frames: int | None = None
-) -> Simulation:
+def simulate(scene: str | os.PathLike[str] = "ds2", *, seed: int = 1, run: int = 0, n_frames: int | None = None) -> Simulation:
     """Makes the frames of a scene: by name (`scenes()`), from a TOML file, or from TOML text. The same seed gives the same bits.
 
     Raises:

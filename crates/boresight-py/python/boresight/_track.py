@@ -141,5 +141,3 @@ def plan(source: Any, *, rate_hz: float | None, times: Any, **sets: Any) -> Conf
     if isinstance(source, str | os.PathLike):
         return Config._of(_boresight.choose_for_path(os.fspath(source), asked))
     return Config._of(_boresight.choose_for_arrays(*frames_of(source, times), asked))
-
-

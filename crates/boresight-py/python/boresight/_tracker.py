@@ -73,9 +73,7 @@ class Tracker(_boresight.Tracker):
                     found["boxes"] = boxes
                 std = {"std_px": std_px, "std_per_side": std_per_side}
                 return self.update_native(**{**std, **found, **given}, time_s=time_s)
-        return self.update_native(
-            detections, boxes, covariances, scores, classes, std_px, std_per_side, time_s
-        )
+        return self.update_native(detections, boxes, covariances, scores, classes, std_px, std_per_side, time_s)
 
     def update_supervision(self, detections: Any, *, time_s: float | None = None) -> Any:
         """`supervision.Detections` in and out, in the same order.

@@ -173,8 +173,7 @@ class Tracks:
                 points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(px[::step], py[::step], strict=True))
                 colour = f"hsl({137 * k % 360} 70% 45%)"
                 lines.append(
-                    f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5" '
-                    'vector-effect="non-scaling-stroke"/>'
+                    f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5" vector-effect="non-scaling-stroke"/>'
                 )
             drawn = (
                 f'<svg viewBox="{left:.1f} {top:.1f} {width:.1f} {height:.1f}" style="max-width:32em;max-height:24em;'

@@ -27,9 +27,7 @@ class _Filter(_boresight.Filter):
 
     def __new__(cls, model: Model, x: Any, P: Any) -> _Filter:
         mean = np.atleast_1d(numbers(x, "x"))
-        return super().__new__(
-            cls, cls._form, model._name, model._parameters(), mean, np.atleast_2d(_covariance(P, len(mean), "P"))
-        )
+        return super().__new__(cls, cls._form, model._name, model._parameters(), mean, np.atleast_2d(_covariance(P, len(mean), "P")))
 
     def correct(self, z: Any, R: Any) -> None:
         """Corrects the belief by a measured position `z` (x, y) with covariance `R`: 2 x 2, or one variance for both axes (px²)."""
@@ -97,7 +95,9 @@ class Batch(_boresight.Batch):
 
         Args:
             z: N x 2, px; a row with NaN is a missed scan.
-            r: variance of the positions, px²: one, one for each axis (2), or N x 2. A pack in which a value is not finite is left as it was.
+            r: variance of the positions, px²: one, one for each axis (2), or N x 2.
+
+        A pack in which a value is not finite is left as it was.
         """
         if not (isinstance(z, np.ndarray) and z.dtype == np.float64 and z.flags.c_contiguous):
             z = numbers(z, "z")
