@@ -6,7 +6,7 @@
 use crate::errors::refused;
 use boresight::{ClassId, Detection, Extent};
 use nalgebra::{Matrix2, Vector2};
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -36,19 +36,31 @@ struct Numbers {
 }
 
 fn numbers(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Numbers> {
-    let array = match object.cast::<PyArrayDyn<f64>>() {
-        Ok(array) if (array.data() as usize).is_multiple_of(align_of::<f64>()) => array.clone(),
-        _ => {
-            let converted = object.py().import("boresight._frames")?.call_method1("numbers", (object, name))?;
-            converted.cast_into::<PyArrayDyn<f64>>().map_err(PyErr::from)?
-        }
-    };
+    if let Some(found) = plain::<f64>(object)? {
+        return Ok(found);
+    }
+    if let Some(found) = plain::<f32>(object)? {
+        return Ok(found);
+    }
+    let converted = object.py().import("boresight._frames")?.call_method1("numbers", (object, name))?;
+    plain::<f64>(&converted)?.ok_or_else(|| refused("expected an array of numbers", name, "numpy.asarray makes one"))
+}
+
+/// The numbers of an array of this type, if it is one and its elements lie where they may.
+fn plain<T: Element + Copy + Into<f64>>(object: &Bound<'_, PyAny>) -> PyResult<Option<Numbers>> {
+    let Ok(array) = object.cast::<PyArrayDyn<T>>() else { return Ok(None) };
+    let align = align_of::<T>();
+    let strided = array.strides().iter().all(|s| s.unsigned_abs().is_multiple_of(align));
+    if !((array.data() as usize).is_multiple_of(align) && strided) {
+        return Ok(None);
+    }
     let view = array.try_readonly()?;
     let values = match view.as_slice() {
-        Ok(slice) if array.is_c_contiguous() => slice.to_vec(),
-        _ => view.as_array().iter().copied().collect(),
+        // A slice column by column is none of ours.
+        Ok(slice) if array.is_c_contiguous() => slice.iter().map(|v| (*v).into()).collect(),
+        _ => view.as_array().iter().map(|v| (*v).into()).collect(),
     };
-    Ok(Numbers { shape: array.shape().to_vec(), values })
+    Ok(Some(Numbers { shape: array.shape().to_vec(), values }))
 }
 
 fn wrong_shape(name: &str, found: &[usize], expected: &str) -> PyErr {
@@ -119,15 +131,18 @@ impl Given<'_> {
                 let (w, h) = extent.map_or((0.0, 0.0), |e| (e.width_px, e.height_px));
                 Matrix2::new(side(w).powi(2), 0.0, 0.0, side(h).powi(2))
             });
+            // Field by field: each `with_` would move the whole detection once more.
             let mut d = Detection::at(positions[k], cov);
             if let Some(e) = extent {
-                d = d.with_extent(e).with_area_px((e.width_px * e.height_px).max(1.0) as u32);
+                d.extent = e;
+                d.area_px = (e.width_px * e.height_px).max(1.0) as u32;
             }
             if let Some(s) = &scores {
-                d = d.with_score(s[k] as f32);
+                d.score = s[k] as f32;
             }
             let class = classes.as_ref().map(|c| c[k]).filter(|c| (0.0..4e9).contains(c));
-            d.with_class(class.map(|c| ClassId(c as u32)))
+            d.class = class.map(|c| ClassId(c as u32));
+            d
         };
         Ok((0..n).map(one).collect())
     }
