@@ -40,7 +40,8 @@ mod _boresight {
     use super::filters::{Batch, Filter};
     #[pymodule_export]
     use super::run::{
-        choose_for_arrays, choose_for_path, detect_arrays, detect_path, track_arrays, track_columns, track_path,
+        choose_for_arrays, choose_for_path, choose_for_scans, detect_arrays, detect_path, track_arrays, track_columns,
+        track_path,
     };
     #[pymodule_export]
     use super::simulate::{scenes, simulate};

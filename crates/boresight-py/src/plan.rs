@@ -40,7 +40,8 @@ pub struct Plan {
 }
 
 impl Wishes {
-    fn base(&self) -> Result<Config> {
+    /// The configuration to start from: how the input is read is settled in it.
+    pub fn base(&self) -> Result<Config> {
         let mut base = self.config.clone().unwrap_or_default();
         if let Some(rate) = self.rate_hz {
             base = base.with(&format!("input.rate-hz={rate}")).map_err(|e| e.at("rate_hz"))?;

@@ -3,6 +3,7 @@
 use crate::columns::{Columns, Recorder};
 use crate::config::PyConfig;
 use crate::detect::{Found, FoundSink, scans_of};
+use crate::detections::detections_of;
 use crate::errors::{OrRaise, raised, refused};
 use crate::plan::{Plan, Wishes};
 use crate::python_detector::PythonDetector;
@@ -12,7 +13,7 @@ use boresight::draw::{AnnotatedVideo, DrawOptions};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome};
 use boresight::track::Tracking;
-use boresight::{Error, ErrorKind, Sink, track};
+use boresight::{Error, ErrorKind, FrameIndex, Scan, Sink, track};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -158,6 +159,29 @@ pub fn choose_for_path(py: Python<'_>, path: String, request: Request) -> PyResu
     let kept = Raised::default();
     let wishes = request.wishes(py, &kept);
     let plan = settled(py, patiently(py, move || wishes.for_path(&path))?, &kept)?;
+    Ok(PyConfig { config: plan.config, reasons: plan.reasons })
+}
+
+/// The configuration that the automatic choice takes for detections made elsewhere, one entry a scan.
+#[pyfunction]
+pub fn choose_for_scans(
+    py: Python<'_>,
+    scans: Vec<Bound<'_, PyAny>>,
+    times: Option<Vec<f64>>,
+    request: Request,
+) -> PyResult<PyConfig> {
+    let kept = Raised::default();
+    let wishes = request.wishes(py, &kept);
+    let base = wishes.base().or_raise(py)?;
+    let std = (base.input.table.std_px, base.input.table.std_per_side);
+    let times = times.map_or(Times::Rate(base.input.rate_hz), |t| Times::Each(Arc::new(t)));
+    let mut made = Vec::with_capacity(scans.len());
+    for (k, found) in scans.iter().enumerate() {
+        let scan = Scan::at(FrameIndex(k as u64), times.of(k as u64).or_raise(py)?);
+        made.push(scan.with_detections(detections_of(found, std)?));
+    }
+    let rate = times.rate_hz().unwrap_or(boresight::ASSUMED_RATE_HZ);
+    let plan = settled(py, py.detach(|| wishes.for_scans(made, rate, base, "detections".into())), &kept)?;
     Ok(PyConfig { config: plan.config, reasons: plan.reasons })
 }
 

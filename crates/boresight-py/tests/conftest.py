@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import boresight as bs
 import pytest
+
+import boresight as bs
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import copy
 import pickle
 
-import boresight as bs
 import pytest
+
+import boresight as bs
 
 
 def test_keys_are_set_by_keyword_and_read_back():

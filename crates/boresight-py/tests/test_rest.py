@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import boresight as bs
 import numpy as np
 import pandas as pd
 import pytest
+
+import boresight as bs
 
 
 def test_evaluation_takes_paths_tracks_and_frames(clip, clip_truth, tmp_path):

@@ -12,12 +12,13 @@ import threading
 import time
 from pathlib import Path
 
-import boresight as bs
 import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
+
+import boresight as bs
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 
-import boresight as bs
 import numpy as np
 import pytest
+
+import boresight as bs
 
 
 def test_step_gives_what_track_gives(ds2, band):
@@ -147,3 +148,15 @@ def test_a_frame_of_another_type_is_refused(ds2, band):
     with pytest.raises(bs.BoresightError, match="Gray16"):
         tracker.step(ds2.frames[1].astype(np.uint16))
     assert tracker.config == band
+
+
+def test_a_configuration_is_learnt_from_recorded_detections():
+    scans = [np.concatenate([z - 5, z + 5, np.full((2, 1), 0.9)], axis=1) for _, _, z in two_targets(60)]
+    config = bs.Config.for_detections(scans, rate_hz=10.0)
+    assert config.reasons
+    tracker = bs.Tracker(config)
+    for k, boxes in enumerate(scans):
+        states = tracker.update(boxes, time_s=0.1 * k)
+    assert len(states.confirmed) == 2
+    with pytest.raises(bs.BoresightError):
+        bs.Config.for_detections([np.zeros((2, 3))])

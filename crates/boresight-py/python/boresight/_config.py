@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import Any
 
 from . import _boresight
@@ -32,6 +33,20 @@ class Config:
         from ._track import plan
 
         return plan(source, rate_hz=rate_hz, times=times, **sets)
+
+    @classmethod
+    def for_detections(cls, scans: Iterable[Any], *, rate_hz: float | None = None, times: Any = None, **sets: Any) -> Config:
+        """What is learnt from recorded detections, for a `Tracker` that gets more of their kind: noise, motion, scores, clutter.
+
+        Args:
+            scans: for each scan what `Tracker.update` takes: positions, boxes with scores, a dictionary, `supervision.Detections`; some
+                hundred scans teach enough.
+            rate_hz, times: scans/s, or the time of each, s.
+        """
+        from ._track import request
+
+        seconds = None if times is None else [float(t) for t in times]
+        return cls._of(_boresight.choose_for_scans(list(scans), seconds, request(None, sets, rate_hz=rate_hz)))
 
     @classmethod
     def preset(cls, name: str, **sets: Any) -> Config:
