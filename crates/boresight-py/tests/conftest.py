@@ -18,6 +18,12 @@ def clip() -> str:
 
 
 @pytest.fixture(scope="session")
+def drone(clip: str) -> bs.Tracks:
+    """The clip's tracks, nothing chosen."""
+    return bs.track(clip, progress=False)
+
+
+@pytest.fixture(scope="session")
 def clip_truth() -> str:
     return str(ROOT / "samples/ir_drone/IR_DRONE_046.gt.txt")
 

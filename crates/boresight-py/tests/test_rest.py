@@ -9,8 +9,8 @@ import pytest
 import boresight as bs
 
 
-def test_evaluation_takes_paths_tracks_and_frames(clip, clip_truth, tmp_path):
-    tracks = bs.track(clip, progress=False)
+def test_evaluation_takes_paths_tracks_and_frames(drone, clip_truth, tmp_path):
+    tracks = drone
     scores = bs.evaluate(clip_truth, tracks, distance_px=10)
     assert scores["MOTA"] > 0.94 and scores["IDF1"] > 0.95 and scores["RMSE"] < 1.3
     tracks.write(tmp_path / "t.csv")

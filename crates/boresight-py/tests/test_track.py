@@ -21,11 +21,6 @@ import pytest
 import boresight as bs
 
 
-@pytest.fixture(scope="module")
-def drone(clip):
-    return bs.track(clip, progress=False)
-
-
 def test_a_clip_gives_the_drone_and_its_columns(drone):
     assert drone.summary["n_frames"] == 302 and drone.n_tracks >= 1
     d = drone.to_dict()
@@ -304,12 +299,12 @@ def test_progress_is_told_and_a_function_of_the_users_can_end_the_run(clip):
         bs.track(clip, config="small-infrared-targets", progress=enough)
 
 
-def test_the_interpreter_is_free_while_a_run_goes_on(clip):
+def test_the_interpreter_is_free_while_a_run_goes_on(clip, drone):
     ticks = 0
     done = threading.Event()
 
     def work():
-        bs.track(clip, progress=False)
+        bs.track(clip, config=drone.config, progress=False)
         done.set()
 
     thread = threading.Thread(target=work)
