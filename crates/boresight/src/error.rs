@@ -80,6 +80,16 @@ impl Error {
         self
     }
 
+    /// The place: file, line, key, frame.
+    pub fn place(&self) -> Option<&str> {
+        self.inner.place.as_deref()
+    }
+
+    /// How to mend it, a line each.
+    pub fn hints(&self) -> &[String] {
+        &self.inner.hints
+    }
+
     /// What sort of failure it is.
     pub fn kind(&self) -> ErrorKind {
         self.inner.kind

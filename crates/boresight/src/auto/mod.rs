@@ -28,7 +28,7 @@ mod spread;
 
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
-pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose};
+pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose};
 pub use replay::Replay;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

@@ -68,6 +68,24 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
     Ok((frames, choice))
 }
 
+/// As [`open_and_choose`], for frames that the caller has: `again` hands out the same frames anew, if they can be had a second time.
+/// # Errors
+/// First frames that cannot be read, or that differ in size or pixel type.
+pub fn read_and_choose(
+    source: Box<dyn FrameSource>,
+    again: Option<&mut dyn FrameSource>,
+    base: &Config,
+) -> Result<(Replay, Choice)> {
+    let info = source.info().clone();
+    let most = if info.n_frames.is_some() || again.is_some() { noise::MOST_SCANS } else { PROBE_FRAMES };
+    let mut frames = Replay::new(source, frames_ahead(&info, most, LEARN_BYTES));
+    let scene = scene::look(probed(frames.ahead()), &info)?;
+    let again = again.filter(|_| scene.camera == Camera::Fixed);
+    let second = again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
+    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base)?;
+    Ok((frames, choice))
+}
+
 /// The frames that are looked at for the choice.
 fn probed(ahead: &[Frame]) -> &[Frame] {
     &ahead[..ahead.len().min(PROBE_FRAMES)]

@@ -3,7 +3,7 @@
 //! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither.
 
 use crate::io::{Colour, OpenOptions};
-use crate::{Config, Frame};
+use crate::{Config, Frame, FrameSource};
 use std::path::Path;
 
 /// Frames of a file that are looked through when its camera stands still.
@@ -20,7 +20,14 @@ pub(super) fn can_be_opened_twice(input: &str) -> bool {
 /// At most `n_kept` frames spread evenly over the beginning, in colour if the file has it; what cannot be read ends them.
 pub(super) fn frames(input: &str, base: &Config, n_kept: usize) -> Vec<Frame> {
     let options = OpenOptions { colour: Colour::Rgb, ..base.input.open_options() };
-    let Ok(mut source) = crate::io::open(input, &options) else { return Vec::new() };
+    match crate::io::open(input, &options) {
+        Ok(mut source) => spread(source.as_mut(), n_kept),
+        Err(_) => Vec::new(),
+    }
+}
+
+/// At most `n_kept` frames spread evenly over the beginning of a source.
+pub(super) fn spread(source: &mut dyn FrameSource, n_kept: usize) -> Vec<Frame> {
     let info = source.info();
     let bytes = info.width.saturating_mul(info.height).saturating_mul(3).max(1);
     let most = (MAX_BYTES / bytes).clamp(4, n_kept);

@@ -1,0 +1,167 @@
+//! From an input and what the caller gives to what runs: frames and their detector, or scans, and the whole configuration.
+//!
+//! The order is the command's: what the caller sets holds for the first pass as well, and is not overruled by what it learns.
+
+use crate::config::changed;
+use crate::python_detector::PythonDetector;
+use crate::source::ArrayFrames;
+use boresight::pipeline::Input;
+use boresight::{ASSUMED_RATE_HZ, Config, Error, ErrorKind, FrameSource, Result, Scan, auto, io, vision};
+
+/// What the caller gives besides the input.
+#[derive(Default)]
+pub struct Wishes {
+    /// The configuration; chosen by looking at the first frames if absent.
+    pub config: Option<Config>,
+    /// Keys to change in it, `key=value`.
+    pub sets: Vec<String>,
+    /// Rate of inputs without times, frames/s.
+    pub rate_hz: Option<f64>,
+    /// False tracks an hour that are allowed.
+    pub false_tracks_per_hour: Option<f64>,
+    /// A detector of the caller's own.
+    pub detector: Option<PythonDetector>,
+}
+
+/// What is to be run.
+pub struct Plan {
+    /// Frames with their detector, or scans.
+    pub input: Input,
+    /// The configuration.
+    pub config: Config,
+    /// Why it is what it is.
+    pub reasons: Vec<String>,
+    /// What is lost of the input already.
+    pub lost: Vec<String>,
+    /// Frames, if known.
+    pub total: Option<u64>,
+    /// How the input is read.
+    pub reader: String,
+}
+
+impl Wishes {
+    /// The configuration to start from: how the input is read is settled in it.
+    pub fn base(&self) -> Result<Config> {
+        let mut base = self.config.clone().unwrap_or_default();
+        if let Some(rate) = self.rate_hz {
+            base = base.with(&format!("input.rate-hz={rate}")).map_err(|e| e.at("rate_hz"))?;
+        }
+        // How the input is read must be settled before it is opened.
+        let input: Vec<String> = self.sets.iter().filter(|s| s.starts_with("input.")).cloned().collect();
+        changed(base, &input)
+    }
+
+    /// The plan for a path, a glob, a folder, a table of detections.
+    pub fn for_path(mut self, input: &str) -> Result<Plan> {
+        let base = self.base()?;
+        if io::is_table(input) {
+            return self.for_table(input, base);
+        }
+        if self.config.is_some() || self.detector.is_some() {
+            let source = io::open(input, &base.input.open_options())?;
+            return self.for_source(source, base);
+        }
+        let (mut frames, mut choice) = auto::open_and_choose(input, &base)?;
+        choice.config = changed(choice.config, &self.sets)?;
+        let detector = auto::learn(&mut frames, &mut choice, self.false_tracks_per_hour.take())?;
+        self.chosen(frames, choice, detector)
+    }
+
+    /// The plan for arrays; `again` hands them out a second time, if they can be had.
+    pub fn for_arrays(mut self, frames: ArrayFrames, again: Option<ArrayFrames>) -> Result<Plan> {
+        let base = self.base()?;
+        if self.config.is_some() || self.detector.is_some() {
+            return self.for_source(Box::new(frames), base);
+        }
+        let mut again = again;
+        let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
+        let (mut frames, mut choice) = auto::read_and_choose(Box::new(frames), again, &base)?;
+        choice.config = changed(choice.config, &self.sets)?;
+        let detector = auto::learn(&mut frames, &mut choice, self.false_tracks_per_hour.take())?;
+        self.chosen(frames, choice, detector)
+    }
+
+    fn chosen(self, frames: auto::Replay, choice: auto::Choice, detector: Box<dyn vision::Detector>) -> Result<Plan> {
+        let config = changed(choice.config, &self.sets)?;
+        let (total, reader) = (frames.info().n_frames, frames.info().reader.clone());
+        let mut reasons = choice.reasons;
+        reasons.extend(unused(&config));
+        let input = Input::Frames(Box::new(frames), detector);
+        Ok(Plan { input, config, reasons, lost: Vec::new(), total, reader })
+    }
+
+    fn for_source(mut self, source: Box<dyn FrameSource>, base: Config) -> Result<Plan> {
+        let info = source.info().clone();
+        let reasons = vec!["Configuration as given.".to_string()];
+        if let Some(detector) = &mut self.detector {
+            detector.std = (base.input.table.std_px, base.input.table.std_per_side);
+        }
+        match (self.detector.take(), self.config.is_some()) {
+            (Some(detector), true) => {
+                let config = changed(base, &self.sets)?;
+                let input = Input::Frames(source, Box::new(detector));
+                Ok(Plan { input, config, reasons, lost: Vec::new(), total: info.n_frames, reader: info.reader })
+            }
+            (Some(detector), false) => {
+                let rate = info.rate_hz.or(self.rate_hz).unwrap_or(ASSUMED_RATE_HZ);
+                let (scans, lost) = all_scans(source, detector)?;
+                let mut plan = self.for_scans(scans, rate, base, info.reader)?;
+                plan.lost.extend(lost);
+                Ok(plan)
+            }
+            (None, _) => {
+                let config = changed(base, &self.sets)?;
+                let detector = vision::build(&config.detector, &info)?;
+                let reasons = reasons.into_iter().chain(unused(&config)).collect();
+                let input = Input::Frames(source, detector);
+                Ok(Plan { input, config, reasons, lost: Vec::new(), total: info.n_frames, reader: info.reader })
+            }
+        }
+    }
+
+    fn for_table(self, input: &str, mut base: Config) -> Result<Plan> {
+        base.input.table.rate_hz = self.rate_hz.or(base.input.table.rate_hz);
+        let table = io::read_detections(input, &base.input.table_options())?;
+        if table.scans.is_empty() {
+            let e = Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track");
+            return Err(e.at(input));
+        }
+        let notes = table.warnings.iter().filter(|w| !table.lost.contains(w)).cloned().collect::<Vec<_>>();
+        let mut plan = self.for_scans(table.scans, table.rate_hz, base, table.format)?;
+        plan.reasons.splice(0..0, notes);
+        plan.lost = table.lost;
+        Ok(plan)
+    }
+
+    /// The plan for detections made elsewhere.
+    pub fn for_scans(self, scans: Vec<Scan>, rate_hz: f64, base: Config, reader: String) -> Result<Plan> {
+        let mut config = changed(base, &self.sets)?;
+        let mut reasons = Vec::new();
+        if self.config.is_some() {
+            reasons.push("Configuration as given.".to_string());
+        } else {
+            auto::for_detections(&scans, rate_hz, self.false_tracks_per_hour, &mut config, &mut reasons);
+            config = changed(config, &self.sets)?;
+        }
+        let total = Some(scans.len() as u64);
+        Ok(Plan { input: Input::Scans(scans), config, reasons, lost: Vec::new(), total, reader })
+    }
+}
+
+/// A sentence that names the detector's keys that are set in vain.
+fn unused(config: &Config) -> Option<String> {
+    let keys = config.detector.unused_keys();
+    (!keys.is_empty()).then(|| format!("Without effect beside this detector.threshold: {}.", keys.join(", ")))
+}
+
+/// Every frame's detections: the tracker's configuration is learnt from all of them.
+fn all_scans(mut source: Box<dyn FrameSource>, mut detector: PythonDetector) -> Result<(Vec<Scan>, Vec<String>)> {
+    let mut scans = Vec::new();
+    while let Some(frame) = source.next_frame()? {
+        let mut scan = Scan::default();
+        vision::Detector::detect(&mut detector, &frame, &mut scan)?;
+        source.recycle(frame);
+        scans.push(scan);
+    }
+    Ok((scans, source.warnings().to_vec()))
+}
