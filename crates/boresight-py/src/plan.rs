@@ -51,8 +51,12 @@ impl Wishes {
         changed(base, &input)
     }
 
+    fn request(&self) -> auto::Request {
+        auto::Request { detector: None, false_tracks_per_hour: self.false_tracks_per_hour }
+    }
+
     /// The plan for a path, a glob, a folder, a table of detections.
-    pub fn for_path(mut self, input: &str) -> Result<Plan> {
+    pub fn for_path(self, input: &str) -> Result<Plan> {
         let base = self.base()?;
         if io::is_table(input) {
             return self.for_table(input, base);
@@ -61,23 +65,25 @@ impl Wishes {
             let source = io::open(input, &base.input.open_options())?;
             return self.for_source(source, base);
         }
-        let (mut frames, mut choice) = auto::open_and_choose(input, &base)?;
+        let request = self.request();
+        let (mut frames, mut choice) = auto::open_and_choose(input, &base, &request)?;
         choice.config = changed(choice.config, &self.sets)?;
-        let detector = auto::learn(&mut frames, &mut choice, self.false_tracks_per_hour.take())?;
+        let detector = auto::learn(&mut frames, &mut choice, &request)?;
         self.chosen(frames, choice, detector)
     }
 
     /// The plan for arrays; `again` hands them out a second time, if they can be had.
-    pub fn for_arrays(mut self, frames: ArrayFrames, again: Option<ArrayFrames>) -> Result<Plan> {
+    pub fn for_arrays(self, frames: ArrayFrames, again: Option<ArrayFrames>) -> Result<Plan> {
         let base = self.base()?;
         if self.config.is_some() || self.detector.is_some() {
             return self.for_source(Box::new(frames), base);
         }
+        let request = self.request();
         let mut again = again;
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
-        let (mut frames, mut choice) = auto::read_and_choose(Box::new(frames), again, &base)?;
+        let (mut frames, mut choice) = auto::read_and_choose(Box::new(frames), again, &base, &request)?;
         choice.config = changed(choice.config, &self.sets)?;
-        let detector = auto::learn(&mut frames, &mut choice, self.false_tracks_per_hour.take())?;
+        let detector = auto::learn(&mut frames, &mut choice, &request)?;
         self.chosen(frames, choice, detector)
     }
 

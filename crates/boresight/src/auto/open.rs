@@ -75,14 +75,16 @@ pub fn read_and_choose(
     source: Box<dyn FrameSource>,
     again: Option<&mut dyn FrameSource>,
     base: &Config,
+    request: &Request,
 ) -> Result<(Replay, Choice)> {
     let info = source.info().clone();
-    let most = if info.n_frames.is_some() || again.is_some() { noise::MOST_SCANS } else { PROBE_FRAMES };
+    let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let mut frames = Replay::new(source, frames_ahead(&info, most, LEARN_BYTES));
     let scene = scene::look(probed(frames.ahead()), &info)?;
-    let again = again.filter(|_| scene.camera == Camera::Fixed);
+    let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
+    let again = again.filter(|_| look_again);
     let second = again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
-    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base)?;
+    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)?;
     Ok((frames, choice))
 }
 
