@@ -5,6 +5,7 @@
 
 use crate::{Frame, FrameSource, Result, SourceInfo};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
 
 /// Frames read ahead.
 const AHEAD: usize = 2;
@@ -23,6 +24,7 @@ pub(super) struct ReadAhead {
     warnings: Vec<String>,
     frames: Option<Receiver<Read>>,
     spare: SyncSender<Frame>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl ReadAhead {
@@ -42,11 +44,9 @@ impl ReadAhead {
                 read_all(source, &out, &spare_out, n_warnings);
             }
         };
-        if std::thread::Builder::new().name("boresight-read".into()).spawn(work).is_err() {
-            return source;
-        }
+        let Ok(thread) = std::thread::Builder::new().name("boresight-read".into()).spawn(work) else { return source };
         match hand_over.send(source) {
-            Ok(()) => Box::new(Self { info, warnings, frames: Some(frames), spare }),
+            Ok(()) => Box::new(Self { info, warnings, frames: Some(frames), spare, thread: Some(thread) }),
             Err(back) => back.0,
         }
     }
@@ -72,7 +72,14 @@ impl FrameSource for ReadAhead {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        let Some(read) = self.frames.as_ref().and_then(|f| f.recv().ok()) else { return Ok(None) };
+        let Some(frames) = &self.frames else { return Ok(None) };
+        let Ok(read) = frames.recv() else {
+            // It said no end: it panicked, and so does the reader.
+            if let Some(Err(panic)) = self.thread.take().map(JoinHandle::join) {
+                std::panic::resume_unwind(panic);
+            }
+            return Ok(None);
+        };
         if let Some(warnings) = read.warnings {
             self.warnings = warnings;
         }
@@ -93,5 +100,38 @@ impl FrameSource for ReadAhead {
 
     fn reads_ahead(&self) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PixelKind;
+
+    struct Panics(SourceInfo);
+
+    impl FrameSource for Panics {
+        fn info(&self) -> &SourceInfo {
+            &self.0
+        }
+        fn next_frame(&mut self) -> Result<Option<Frame>> {
+            panic!("as asked");
+        }
+    }
+
+    #[test]
+    fn a_panic_of_the_source_is_the_readers_and_no_end() {
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: 2,
+            height: 2,
+            kind: PixelKind::Gray8,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        let mut ahead = ReadAhead::of(Box::new(Panics(info)));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| ahead.next_frame())).is_err());
     }
 }
