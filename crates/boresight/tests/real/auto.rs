@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 real_tests! {
     a_street_seen_by_a_fixed_camera_is_searched_for_what_moves
         needs ["traffic_bgslibrary/video02.avi", "traffic_bgslibrary/demo.avi", FFMPEG];
+    a_mouse_in_an_arena_is_found_as_what_moves needs ["animals_tracktor/mouse_video.mp4"];
     a_green_ball_is_told_by_its_colour needs ["ball_green_trflorian/ball.mp4"];
     a_thrown_ball_is_followed_on_its_whole_way needs ["ball_green_trflorian/ball.mp4"];
     particles_are_spots_and_nuclei_are_compact_pieces
@@ -29,6 +30,12 @@ fn a_street_seen_by_a_fixed_camera_is_searched_for_what_moves() {
         assert!(matches!(threshold, ThresholdConfig::Moving(_)), "{name}: {threshold:?}");
         assert!(why.contains("Fixed camera") && why.contains("moving pixels"), "{why}");
     }
+}
+
+fn a_mouse_in_an_arena_is_found_as_what_moves() {
+    // At the dark wall it is no isolated blob: less than half of what moves is.
+    let (threshold, why) = chosen("animals_tracktor/mouse_video.mp4");
+    assert!(matches!(threshold, ThresholdConfig::Moving(_)), "{threshold:?} {why}");
 }
 
 fn a_green_ball_is_told_by_its_colour() {
