@@ -21,7 +21,7 @@ def _covariance(r: Any, n: int, name: str) -> np.ndarray[Any, Any]:
     """n x n from a matrix, or from one variance for all."""
     a = numbers(r, name)
     if a.ndim == 0:
-        return np.eye(n) * a
+        return np.diag(np.full(n, float(a)))
     if a.shape[-2:] != (n, n):
         raise BoresightError(f"shape {a.shape}: expected {n} x {n}, or one variance", where=name, hint="np.diag makes one of variances")
     return a
