@@ -103,6 +103,14 @@ impl Given<'_> {
     /// The detections.
     pub fn detections(&self) -> PyResult<Vec<Detection>> {
         let boxes: Option<Vec<[f64; 4]>> = self.boxes.as_ref().map(|b| rows(b, "boxes")).transpose()?;
+        if let Some(k) = boxes.iter().flatten().position(|[l, t, r, b]| r < l || b < t) {
+            let place = format!("boxes, row {k}");
+            return Err(refused("the right or bottom lies before the left or top", place, "left, top, right, bottom"));
+        }
+        if !(self.std_px > 0.0 && self.std_px.is_finite() && (0.0..=1.0).contains(&self.std_per_side)) {
+            let place = format!("std_px = {}, std_per_side = {}", self.std_px, self.std_per_side);
+            return Err(refused("expected a deviation above 0 px, a share in 0..=1", place, "1 px is a fair guess"));
+        }
         let extents: Option<Vec<Extent>> = boxes.map(|boxes| boxes.iter().map(extent_of_corners).collect());
         let positions: Vec<Vector2<f64>> = match (&self.positions, &extents) {
             (Some(p), _) => rows::<2>(p, "positions")?.into_iter().map(Vector2::from).collect(),

@@ -122,6 +122,7 @@ impl Filter {
         Ok(Self { inner: inner.or_raise(py)? })
     }
 
+    /// Moves the belief `dt_s` seconds ahead; the process noise follows.
     fn predict(&mut self, py: Python<'_>, dt_s: f64) -> PyResult<()> {
         self.inner.predict(dt_s).or_raise(py)
     }
@@ -144,22 +145,26 @@ impl Filter {
         self.inner.log_likelihood(&measurement(z, r)?).or_raise(py)
     }
 
+    /// Mean of the state.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.inner.belief().0)
     }
 
+    /// Covariance of the state.
     #[getter(P)]
     fn p<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (x, p) = self.inner.belief();
         PyArray1::from_vec(py, p).reshape([x.len(), x.len()])
     }
 
+    /// x, y, px.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.inner.predicted().mean.as_slice())
     }
 
+    /// Covariance of the position, 2 x 2, px².
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         PyArray1::from_slice(py, self.inner.predicted().cov.as_slice()).reshape([2, 2])
@@ -238,6 +243,7 @@ impl Batch {
         refused_packs.or_raise(py)
     }
 
+    /// N x 4, `[x, vx, y, vy]`.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let flat = (0..self.n).filter_map(|i| self.packs[i / L].get(i % L));
@@ -245,6 +251,7 @@ impl Batch {
         PyArray1::from_vec(py, flat).reshape([self.n, 4])
     }
 
+    /// N x 4 x 4.
     #[getter(P)]
     fn p<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let flat = (0..self.n).filter_map(|i| self.packs[i / L].get(i % L));

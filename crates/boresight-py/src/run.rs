@@ -41,6 +41,16 @@ pub struct Request {
 }
 
 impl Request {
+    /// The rate of frames without times, frames/s.
+    fn rate(&self) -> PyResult<f64> {
+        let rate = self.rate_hz.unwrap_or(boresight::ASSUMED_RATE_HZ);
+        if (1e-6..=1e9).contains(&rate) {
+            return Ok(rate);
+        }
+        let place = format!("rate_hz = {rate}");
+        Err(refused("expected a rate from 1e-6 to 1e9 frames/s", place, "25.0 is that of video"))
+    }
+
     fn wishes(&self, py: Python<'_>, raised: &Raised) -> Wishes {
         let detector = self.detector.as_ref();
         Wishes {
@@ -136,14 +146,7 @@ fn plan_arrays(
     request: &Request,
     kept: &Raised,
 ) -> PyResult<Plan> {
-    let rate = request.rate_hz.unwrap_or(boresight::ASSUMED_RATE_HZ);
-    if !(1e-6..=1e9).contains(&rate) {
-        return Err(refused(
-            "expected a rate from 1e-6 to 1e9 frames/s",
-            format!("rate_hz = {rate}"),
-            "25.0 is that of video",
-        ));
-    }
+    let rate = request.rate()?;
     let times = times.map_or(Times::Rate(rate), |t| Times::Each(Arc::new(t)));
     let Some(source) = ArrayFrames::start(frames, n_frames, times.clone(), kept.clone())? else {
         return Err(refused("there are no frames", "frames", "give at least one array"));
@@ -322,7 +325,7 @@ pub fn track_columns(
     request: Request,
 ) -> PyResult<Tracks> {
     let kept = Raised::default();
-    let rate = request.rate_hz.unwrap_or(boresight::ASSUMED_RATE_HZ);
+    let rate = request.rate()?;
     let scans = scans_of(&frames, &positions, &covariances, &sizes, rate)?;
     let wishes = request.wishes(py, &kept);
     let plan = py.detach(|| {

@@ -81,14 +81,7 @@ impl ArrayFrames {
         raised: Raised,
     ) -> PyResult<Option<Self>> {
         let iterator = frames.call_method0("__iter__")?;
-        let Some(first) = frames
-            .py()
-            .import("builtins")?
-            .call_method1("next", (&iterator, frames.py().None()))
-            .map(|f| if f.is_none() { None } else { Some(f) })?
-        else {
-            return Ok(None);
-        };
+        let Some(first) = iterator.try_iter()?.next().transpose()? else { return Ok(None) };
         let pixels = pixels_of(&first)?;
         let info = SourceInfo {
             label: "arrays".into(),

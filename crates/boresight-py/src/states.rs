@@ -61,62 +61,74 @@ fn state_cov(t: &TrackState, i: usize, j: usize) -> f64 {
 
 #[pymethods]
 impl State {
+    /// The track's number, from 1, never used twice.
     #[getter]
     fn id(&self) -> u64 {
         self.get().id.0
     }
 
+    /// `tentative`, `confirmed` or `coasting` (confirmed, no detection in this scan).
     #[getter]
     fn status(&self) -> &'static str {
         STATUS[status_code(self.get().status) as usize]
     }
 
+    /// Whether it is confirmed, coasting or not.
     #[getter]
     fn is_confirmed(&self) -> bool {
         self.get().status != TrackStatus::Tentative
     }
 
+    /// x, y, px.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &position(self.get()))
     }
 
+    /// vx, vy, px/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &velocity(self.get()))
     }
 
+    /// Covariance of the position, 2 x 2, px².
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let one = std::slice::from_ref(self.get());
         matrices::<2>(py, one, position_cov)?.reshape([2, 2])
     }
 
+    /// `[x, vx, y, vy]`, px and px/s.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.get().kinematics.mean.as_slice())
     }
 
+    /// Covariance of the state, 4 x 4.
     #[getter]
     fn state_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrices::<4>(py, std::slice::from_ref(self.get()), state_cov)?.reshape([4, 4])
     }
 
+    /// Left, top, right, bottom, px, as object detectors count: the first pixel begins at 0.
     #[getter]
     fn r#box<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &corners_of(&self.get().extent))
     }
 
+    /// Confidence.
     #[getter]
     fn score(&self) -> f32 {
         self.get().score
     }
 
+    /// Number of the detection of this scan that the track took, or `None`.
     #[getter]
     fn detection(&self) -> Option<u32> {
         self.get().detection
     }
 
+    /// Normalised innovation squared of this scan's update; 2 in the mean if the uncertainty is honest.
     #[getter]
     fn nis(&self) -> Option<f64> {
         self.get().innovation.as_ref().map(|i| i.nis)
@@ -167,52 +179,62 @@ impl States {
         PyList::new(py, states.collect::<Vec<_>>())?.try_iter()
     }
 
+    /// Those that are confirmed, coasting ones among them.
     #[getter]
     fn confirmed(&self) -> Self {
         let kept = self.all.iter().filter(|t| t.status != TrackStatus::Tentative).cloned().collect();
         Self { all: Arc::new(kept), ..*self }
     }
 
+    /// N numbers.
     #[getter]
     fn ids<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(py, self.all.iter().map(|t| i64::try_from(t.id.0).unwrap_or(i64::MAX)))
     }
 
+    /// N words.
     #[getter]
     fn statuses(&self) -> Vec<&'static str> {
         self.all.iter().map(|t| STATUS[status_code(t.status) as usize]).collect()
     }
 
+    /// N x 2, px.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, &self.all, position)
     }
 
+    /// N x 2, px/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, &self.all, velocity)
     }
 
+    /// Covariances of the positions, N x 2 x 2, px².
     #[getter]
     fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         matrices::<2>(py, &self.all, position_cov)
     }
 
+    /// Covariances of `[x, vx, y, vy]`, N x 4 x 4.
     #[getter]
     fn state_covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         matrices::<4>(py, &self.all, state_cov)
     }
 
+    /// N x 4, left, top, right, bottom, px, as object detectors count.
     #[getter]
     fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, &self.all, |t| corners_of(&t.extent))
     }
 
+    /// N confidences.
     #[getter]
     fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
         PyArray1::from_iter(py, self.all.iter().map(|t| t.score))
     }
 
+    /// Numbers of the detections taken, -1 for none.
     #[getter]
     fn detections<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(py, self.all.iter().map(|t| t.detection.map_or(-1, i64::from)))

@@ -102,6 +102,9 @@ impl Tracker {
     }
 
     /// Detects and tracks in one frame.
+    ///
+    /// `frame` is rows x columns, or rows x columns x 3 for colour, of any type that `track` takes; the first one settles size and type. `time_s`
+    /// rises; without it frames follow at the configuration's rate. Returns the `States` of all tracks after it.
     #[pyo3(signature = (frame, time_s = None))]
     fn step(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, time_s: Option<f64>) -> PyResult<States> {
         let pixels = pixels_of(frame)?;

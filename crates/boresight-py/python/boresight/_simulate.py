@@ -51,4 +51,6 @@ def simulate(scene: str | os.PathLike[str] = "ds2", *, seed: int = 1, run: int =
         if value is not None and not 0 <= value < 2**64:
             raise BoresightError("expected a number from 0 to 2**64 - 1", where=f"{what} = {value}")
     frames, times, truth, rate_hz = _boresight.simulate(name, text, seed, run, n_frames)
+    if not frames:
+        raise BoresightError("the scene has no frames", where=f"n_frames = {n_frames}", hint="at least 1")
     return Simulation(np.stack(frames), np.array(times), Tracks(truth), rate_hz)

@@ -51,6 +51,11 @@ def needed(table: Any, names: tuple[str, ...], kind: Any = np.float64) -> np.nda
     return found
 
 
+def _one_length(*columns: np.ndarray[Any, Any] | None) -> None:
+    if len({len(c) for c in columns if c is not None}) > 1:
+        raise BoresightError("columns of different lengths", where="table", hint="one row for each track and frame")
+
+
 def table_of(source: Any, tentative: bool = False) -> _boresight.Table:
     """A table of tracks; rows that a run calls tentative are left out."""
     if isinstance(source, _boresight.Table):
@@ -69,8 +74,10 @@ def table_of(source: Any, tentative: bool = False) -> _boresight.Table:
     if width is None or height is None:
         width = height = np.zeros(len(frame))
     left, top = column(source, LEFT), column(source, TOP)
+    _one_length(frame, ids, width, height, left, top)
     if left is None or top is None:
         x, y = needed(source, X), needed(source, Y)
+        _one_length(frame, x, y)
         left, top = x - 0.5 * width, y - 0.5 * height
     boxes = np.stack([left, top, width, height], axis=1)
     states = np.full((len(frame), 5), np.nan)

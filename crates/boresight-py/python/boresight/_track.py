@@ -89,12 +89,19 @@ def request(
     return {
         "config": None if whole is None else whole._native,
         "sets": assignments(keys, keys.pop("filter", None), keys.pop("associator", None)),
-        "rate_hz": rate_hz,
-        "false_tracks_per_hour": false_tracks_per_hour,
+        "rate_hz": _number(rate_hz, "rate_hz"),
+        "false_tracks_per_hour": _number(false_tracks_per_hour, "false_tracks_per_hour"),
         "detector": detector,
         "annotate": annotate,
         "progress": progress,
     }
+
+
+def _number(value: Any, name: str) -> float | None:
+    try:
+        return None if value is None else float(value)
+    except (TypeError, ValueError) as e:
+        raise BoresightError(f"expected a number: {e}", where=name, hint="25.0, for example") from e
 
 
 def _rows(source: Any, times: Any, asked: dict[str, Any]) -> _boresight.Rows:
@@ -128,6 +135,8 @@ def frames_of(source: Any, times: Any) -> tuple[Any, int | None, list[float] | N
         )
     n = len(source) if hasattr(source, "__len__") else None
     seconds = None if times is None else [float(t) for t in np.asarray(times, dtype=float).ravel()]
+    if seconds is not None and not np.isfinite(seconds).all():
+        raise BoresightError("expected finite times", where="times", hint="seconds, from any zero, rising")
     if seconds is not None and n is not None and len(seconds) != n:
         raise BoresightError(f"{len(seconds)} times for {n} frames", where="times", hint="one for each frame, s")
     twice = isinstance(source, np.ndarray | list | tuple)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from . import _boresight
+from ._errors import BoresightError
 from ._frames import numbers
-from .models import ConstantVelocity, Model
+from .models import ConstantAcceleration, ConstantVelocity, Model, Singer
 
 __all__ = ["Batch", "Information", "Kf", "SquareRoot", "Srif", "Ud"]
 
@@ -19,23 +20,39 @@ __all__ = ["Batch", "Information", "Kf", "SquareRoot", "Srif", "Ud"]
 def _covariance(r: Any, n: int, name: str) -> np.ndarray[Any, Any]:
     """n x n from a matrix, or from one variance for all."""
     a = numbers(r, name)
-    return np.eye(n) * a if a.ndim == 0 else a
+    if a.ndim == 0:
+        return np.diag(np.full(n, float(a)))
+    if a.shape[-2:] != (n, n):
+        raise BoresightError(f"shape {a.shape}: expected {n} x {n}, or one variance", where=name, hint="np.diag makes one of variances")
+    return a
+
+
+def _vector(x: Any, name: str) -> np.ndarray[Any, Any]:
+    a = numbers(x, name)
+    if a.ndim != 1:
+        raise BoresightError(f"shape {a.shape}: expected a row of numbers", where=name, hint="numpy.ravel makes one")
+    return a
 
 
 class _Filter(_boresight.Filter):
     _form = ""
 
     def __new__(cls, model: Model, x: Any, P: Any) -> _Filter:
-        mean = np.atleast_1d(numbers(x, "x"))
-        return super().__new__(cls, cls._form, model._name, model._parameters(), mean, np.atleast_2d(_covariance(P, len(mean), "P")))
+        if not isinstance(model, ConstantVelocity | ConstantAcceleration | Singer):
+            raise BoresightError(f"a {type(model).__name__}", where="model", hint="boresight.models has them")
+        mean = _vector(x, "x")
+        cov = _covariance(P, len(mean), "P")
+        if cov.ndim != 2:
+            raise BoresightError(f"shape {cov.shape}: expected one matrix", where="P", hint="Batch takes many")
+        return super().__new__(cls, cls._form, model._name, model._parameters(), mean, cov)
 
     def correct(self, z: Any, R: Any) -> None:
         """Corrects the belief by a measured position `z` (x, y) with covariance `R`: 2 x 2, or one variance for both axes (px²)."""
-        self.correct_native(numbers(z, "z"), _covariance(R, 2, "R"))
+        self.correct_native(_vector(z, "z"), _covariance(R, 2, "R"))
 
     def log_likelihood(self, z: Any, R: Any) -> float:
         """The log of the density (per px²) of a measurement before it is used."""
-        return self.log_likelihood_native(numbers(z, "z"), _covariance(R, 2, "R"))
+        return self.log_likelihood_native(_vector(z, "z"), _covariance(R, 2, "R"))
 
     def __repr__(self) -> str:
         return f"<boresight.filters.{type(self).__name__} at {np.array2string(self.x, precision=3)}>"
@@ -102,6 +119,12 @@ class Batch(_boresight.Batch):
         if not (isinstance(z, np.ndarray) and z.dtype == np.float64 and z.flags.c_contiguous):
             z = numbers(z, "z")
         variance = numbers(r, "r")
+        if z.ndim != 2 or variance.shape not in {(), (2,), z.shape}:
+            raise BoresightError(
+                f"positions of shape {z.shape}, variances of shape {variance.shape}",
+                where="step",
+                hint=f"z is {len(self)} x 2; r one number, two, or as z",
+            )
         if variance.ndim < 2:
             variance = np.broadcast_to(variance, (1, 2))
         return self.step_native(dt_s, z, np.ascontiguousarray(variance))
