@@ -54,6 +54,11 @@ impl Decoders {
         self.since.and(self.fast.info).or(self.complete.info)
     }
 
+    /// Whether nothing that comes after it needs the picture of a sample, which then need not be decoded if nobody wants it.
+    pub fn may_leave_out(&self, data: &[u8]) -> bool {
+        self.since.is_some() && self.fast.is_needed_by_none(data)
+    }
+
     /// What the frames are read with, for the summary.
     pub fn reader(&self) -> &'static str {
         if self.since.is_some() { "H.264 in process, fast decoder" } else { "H.264 in process, complete decoder" }

@@ -69,6 +69,12 @@ impl Progressive {
         parts(data, self.length_size).is_some_and(|parts| parts.iter().any(|p| kind(p) == Some(SLICE_IDR)))
     }
 
+    /// Whether a sample holds nothing but slices that no other picture refers to (`nal_ref_idc` 0).
+    pub fn is_needed_by_none(&self, data: &[u8]) -> bool {
+        let part = |p: &&[u8]| p.first().is_some_and(|b| matches!(b & 0x1f, SLICE | 6 | 9) && b & 0x60 == 0);
+        parts(data, self.length_size).is_some_and(|parts| !parts.is_empty() && parts.iter().all(part))
+    }
+
     fn configure(&mut self, description: u16) -> Result<(), Refusal> {
         if self.active == Some(description) {
             return Ok(());

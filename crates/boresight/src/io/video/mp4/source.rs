@@ -14,12 +14,13 @@ use super::timeline::Step;
 use crate::io::options::{Colour, OpenOptions};
 use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
+    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp, Wanted,
 };
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, OnceLock};
 
 /// Frames decoded ahead of the caller.
 const AHEAD: usize = 4;
@@ -43,6 +44,7 @@ pub(in crate::io::video) struct Mp4Source {
     first: Option<Frame>,
     frames: Option<Receiver<Message>>,
     spare: Sender<Pixels>,
+    wanted: Arc<OnceLock<Wanted>>,
     n_frames: u64,
 }
 
@@ -78,8 +80,18 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
     let (frame_in, frame_out) = sync_channel(AHEAD);
     let (spare_in, spare_out) = channel();
     let units = Decoders::new(configurations, options.max_pixels);
-    let worker =
-        Worker { file, movie, ranks, units, colour: options.colour, out: frame_in, spare: spare_out, n_frames };
+    let wanted = Arc::<OnceLock<Wanted>>::default();
+    let worker = Worker {
+        file,
+        movie,
+        ranks,
+        units,
+        colour: options.colour,
+        out: frame_in,
+        spare: spare_out,
+        wanted: Arc::clone(&wanted),
+        n_frames,
+    };
     std::thread::Builder::new()
         .name("boresight-h264".into())
         .spawn(move || worker.run())
@@ -116,6 +128,7 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
         first: Some(first),
         frames: Some(frame_out),
         spare: spare_in,
+        wanted,
         n_frames,
     })))
 }
@@ -153,7 +166,7 @@ impl FrameSource for Mp4Source {
             Ok(Message::Frame(frame, _)) => {
                 let (w, h, kind) = (frame.pixels.width(), frame.pixels.height(), frame.pixels.kind());
                 let i = &self.info;
-                if (w, h, kind) != (i.width, i.height, i.kind) {
+                if (w, h, kind) != (i.width, i.height, i.kind) && (w, h) != (0, 0) {
                     let what = format!("the picture changes from {} x {} to {w} x {h} pixels", i.width, i.height);
                     self.frames = None;
                     return Err(Error::new(ErrorKind::Damaged, what)
@@ -194,6 +207,11 @@ impl FrameSource for Mp4Source {
         }
     }
 
+    fn want_only(&mut self, wanted: Wanted) {
+        // Said twice, the first holds: it may have been acted on.
+        let _ = self.wanted.set(wanted);
+    }
+
     fn reads_ahead(&self) -> bool {
         true
     }
@@ -211,6 +229,7 @@ struct Worker {
     colour: Colour,
     out: SyncSender<Message>,
     spare: Receiver<Pixels>,
+    wanted: Arc<OnceLock<Wanted>>,
     n_frames: u64,
 }
 
@@ -264,6 +283,7 @@ impl Worker {
                 continue;
             };
             let sample = *sample;
+            let unwanted = self.ranks.get(step).copied().flatten().filter(|rank| !is_wanted(&self.wanted, *rank));
             let result = if wait_for_sync && !sample.sync {
                 Err(Refusal::Damaged("it depends on a damaged picture".into()))
             } else {
@@ -274,6 +294,10 @@ impl Worker {
                     Some(read_sample(file, &sample, movie.file_len, data).map(|()| sample))
                 };
                 match read(step, &mut data) {
+                    Some(Ok(_)) if unwanted.is_some() && self.units.may_leave_out(&data) => {
+                        unwanted.iter().for_each(|rank| reorder.push(0, 0, *rank, nothing(), &mut due));
+                        Ok(())
+                    }
                     Some(Ok(sample)) => self.units.decode((&data, &sample, step), &mut read, &mut pictures),
                     Some(Err(refusal)) => Err(refusal),
                     None => continue,
@@ -307,6 +331,10 @@ impl Worker {
         for picture in pictures.drain(..) {
             let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
             let (period, count) = (picture.period, picture.order_count);
+            if !is_wanted(&self.wanted, rank) {
+                reorder.push(period, count, rank, nothing(), due);
+                continue;
+            }
             match self.pixels(picture) {
                 Some(pixels) => reorder.push(period, count, rank, pixels, due),
                 None => reorder.lose(rank, due),
@@ -361,6 +389,15 @@ impl Worker {
         }
         Image::from_vec(width, height, f.y).map(Pixels::Gray8)
     }
+}
+
+/// What stands for a picture that nobody wants.
+fn nothing() -> Pixels {
+    Pixels::Gray8(Image::default())
+}
+
+fn is_wanted(wanted: &OnceLock<Wanted>, rank: u64) -> bool {
+    wanted.get().is_none_or(|wanted| wanted(rank))
 }
 
 /// What has been sent.
