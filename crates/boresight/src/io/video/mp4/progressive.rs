@@ -291,7 +291,7 @@ mod tests {
             assert_eq!(order_count_type(&[0x67, 77, 0, 30, bits]), Some(want));
         }
         // High: chroma 1 (`010`), depths 0 (`1 1`), no bypass, no lists, then as above.
-        assert_eq!(order_count_type(&[0x67, 100, 0, 30, 0b1010_1100, 0b1101_1000]), Some(2));
+        assert_eq!(order_count_type(&[0x67, 100, 0, 30, 0b1010_1100, 0b1011_0000]), Some(2));
         assert_eq!(order_count_type(&[0x67, 100, 0]), None);
     }
 
