@@ -6,7 +6,6 @@
 
 use crate::bench_clips::{Clip, clips};
 use anyhow::{Context, Result, ensure};
-use boresight::io::OpenOptions;
 use nix::sys::resource::{UsageWho, getrusage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -40,10 +39,10 @@ pub struct Args {
     /// Measures one command and prints its cost (what this chore starts itself).
     #[arg(long, num_args = 1.., allow_hyphen_values = true, hide = true)]
     one: Option<Vec<String>>,
-    /// Reads an input to its end (what this chore starts itself).
-    #[arg(long, hide = true)]
-    decode: Option<String>,
 }
+
+/// A detector that only compares each pixel with a band in which none is: what is left is decoding, in the same program.
+const NOTHING: &str = "detector.threshold.band={low=1e6,high=2e6}";
 
 /// What a process cost.
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -69,13 +68,6 @@ pub fn run(args: &Args) -> Result<()> {
         println!("{}", serde_json::to_string(&measure_here(command)?)?);
         return Ok(());
     }
-    if let Some(input) = &args.decode {
-        let mut source = boresight::io::open(input, &OpenOptions::default())?;
-        while let Some(frame) = source.next_frame()? {
-            source.recycle(frame);
-        }
-        return Ok(());
-    }
     println!("| clip | work | CPU, ms a frame | wall, ms a frame | beside decoding alone: CPU, wall | peak, MB |");
     println!("| --- | --- | --- | --- | --- | --- |");
     let wanted = |c: &Clip| args.only.as_ref().is_none_or(|o| c.name.contains(o.as_str()));
@@ -88,7 +80,6 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// Measures and prints the rows of a clip; returns what decoding alone costs.
 fn rows(args: &Args, clip: &Clip) -> Result<Cost> {
-    let me = std::env::current_exe()?.to_string_lossy().into_owned();
     let input = clip.input.to_string_lossy().into_owned();
     let program = |p: &Path| p.to_string_lossy().into_owned();
     let track = |p: &Path, more: &[&str]| -> Vec<String> {
@@ -96,7 +87,13 @@ fn rows(args: &Args, clip: &Clip) -> Result<Cost> {
         let fixed = ["track", &input, "-q", "-o", &output];
         std::iter::once(program(p)).chain(fixed.iter().chain(more).map(|s| s.to_string())).collect()
     };
-    let mut jobs = vec![("decoding alone".to_string(), vec![me, "bench-run".into(), "--decode".into(), input.clone()])];
+    let config = args.folder.join("given.toml");
+    std::fs::write(&config, "")?;
+    let config = config.to_string_lossy().into_owned();
+    let table = args.folder.join("nothing.csv").to_string_lossy().into_owned();
+    let detect = ["detect", &input, "-q", "--config", &config, "--set", NOTHING, "-o", &table].map(String::from);
+    let decode = std::iter::once(program(&args.program)).chain(detect).collect();
+    let mut jobs: Vec<(String, Vec<String>)> = vec![("decoding alone".into(), decode)];
     if let Some(python) = args.python.as_ref().filter(|_| clip.is_video) {
         for (name, script) in [("PyAV decodes", PYAV), ("OpenCV decodes", OPENCV)] {
             jobs.push((name.into(), vec![program(python), "-c".into(), script.into(), input.clone()]));
@@ -113,9 +110,6 @@ fn rows(args: &Args, clip: &Clip) -> Result<Cost> {
         jobs.push((name.into(), track(&args.program, more)));
     }
     if !given.is_empty() {
-        let config = args.folder.join("given.toml");
-        std::fs::write(&config, "")?;
-        let config = config.to_string_lossy().into_owned();
         let more: Vec<&str> = ["--config", &config, "--no-video", "--no-report"].into_iter().chain(given).collect();
         jobs.push(("detector given, tables only".into(), track(&args.program, &more)));
     }

@@ -104,6 +104,9 @@ pub struct SourceInfo {
     pub true_times: bool,
 }
 
+/// Whether the frame of a number is wanted.
+pub type Wanted = Box<dyn Fn(u64) -> bool + Send + Sync>;
+
 /// A sequence of frames.
 pub trait FrameSource: Send {
     /// What is known of the sequence.
@@ -115,6 +118,10 @@ pub trait FrameSource: Send {
     /// Takes a frame back so that its memory can be used again; optional.
     fn recycle(&mut self, frame: Frame) {
         drop(frame);
+    }
+    /// Says by their numbers which frames are wanted; the others may come without pixels (0 x 0), or not be decoded at all.
+    fn want_only(&mut self, wanted: Wanted) {
+        drop(wanted);
     }
     /// Whether it reads on a thread of its own already, ahead of the caller.
     fn reads_ahead(&self) -> bool {

@@ -98,7 +98,7 @@ pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;
 pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
-pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo};
+pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use similarity::Similarity;

@@ -119,7 +119,7 @@ fn the_written_configuration_gives_the_identical_result() {
 
 #[test]
 fn any_number_of_threads_gives_identical_files() {
-    for threads in ["1", "3"] {
+    for threads in ["1", "2", "8"] {
         let dir = tempfile::tempdir().unwrap();
         let status = boresight()
             .env("RAYON_NUM_THREADS", threads)
@@ -127,7 +127,7 @@ fn any_number_of_threads_gives_identical_files() {
             .arg(clip())
             .arg("-o")
             .arg(dir.path())
-            .args(["-q", "--json"])
+            .args(["-q", "--json", "--threads", threads])
             .status()
             .unwrap();
         assert!(status.success());

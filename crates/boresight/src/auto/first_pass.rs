@@ -13,17 +13,19 @@ pub struct FirstPass {
 }
 
 impl FirstPass {
-    /// Runs `detector` over `frames`, the first of a source; a frame that it refuses ends the pass, and is refused again in the run.
-    pub fn over(frames: &[Frame], mut detector: Box<dyn Detector>) -> Self {
-        let mut scans = VecDeque::with_capacity(frames.len());
-        for frame in frames {
-            let mut scan = Scan::default();
-            if detector.detect(frame, &mut scan).is_err() {
-                break;
-            }
-            scans.push_back(scan);
+    /// Nothing seen yet.
+    pub fn new(detector: Box<dyn Detector>) -> Self {
+        Self { scans: VecDeque::new(), detector }
+    }
+
+    /// Takes the next frame of a source; one that the detector refuses ends the pass (`false`), and is refused again in the run.
+    pub fn take(&mut self, frame: &Frame) -> bool {
+        let mut scan = Scan::default();
+        let taken = self.detector.detect(frame, &mut scan).is_ok();
+        if taken {
+            self.scans.push_back(scan);
         }
-        Self { scans, detector }
+        taken
     }
 
     /// The scans made ahead.
@@ -83,7 +85,8 @@ mod tests {
     fn a_frame_is_detected_once_and_an_error_comes_in_its_place() {
         let seen = std::sync::Arc::default();
         let frames: Vec<Frame> = (0..5).map(frame).collect();
-        let mut pass = FirstPass::over(&frames[..2], Box::new(Counting(std::sync::Arc::clone(&seen))));
+        let mut pass = FirstPass::new(Box::new(Counting(std::sync::Arc::clone(&seen))));
+        assert!(frames[..2].iter().all(|f| pass.take(f)));
         assert_eq!(pass.scans().len(), 2);
         let mut scan = Scan::default();
         for f in &frames {

@@ -53,7 +53,8 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
         // A stream waits for nothing longer than the choice needs.
         let most = if second_look::can_be_opened_twice(input) { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, LEARN_BYTES);
-        Ok(Replay::new(source, n))
+        // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
+        Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
     let mut frames = read(base)?;
     let info = frames.info().clone();
@@ -79,7 +80,8 @@ pub fn read_and_choose(
 ) -> Result<(Replay, Choice)> {
     let info = source.info().clone();
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
-    let mut frames = Replay::new(source, frames_ahead(&info, most, LEARN_BYTES));
+    let n = frames_ahead(&info, most, LEARN_BYTES);
+    let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
     let again = again.filter(|_| look_again);
@@ -101,7 +103,11 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let detector = crate::vision::build(&choice.config.detector, &info)?;
-    let mut pass = FirstPass::over(frames.ahead(), detector);
+    let mut pass = FirstPass::new(detector);
+    let mut k = 0;
+    while frames.get(k).is_some_and(|frame| pass.take(frame)) {
+        k += 1;
+    }
     let area_px2 = (info.width * info.height).max(1) as f64;
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;

@@ -9,6 +9,8 @@ pub struct Replay {
     /// An error met while reading ahead, handed out in its place.
     failed: Option<crate::Error>,
     ended: bool,
+    /// Most frames that are held.
+    most: usize,
     rest: Box<dyn FrameSource>,
 }
 
@@ -16,23 +18,42 @@ opaque_debug!(Replay);
 
 impl Replay {
     /// Reads up to `n` frames ahead.
-    pub fn new(mut source: Box<dyn FrameSource>, n: usize) -> Self {
-        let mut ahead = VecDeque::with_capacity(n);
-        let (mut failed, mut ended) = (None, false);
-        while ahead.len() < n {
-            match source.next_frame() {
-                Ok(Some(frame)) => ahead.push_back(frame),
-                Ok(None) => {
-                    ended = true;
-                    break;
-                }
-                Err(e) => {
-                    failed = Some(e);
-                    break;
-                }
+    pub fn new(source: Box<dyn FrameSource>, n: usize) -> Self {
+        let mut replay = Self { ahead: VecDeque::with_capacity(n), failed: None, ended: false, most: n, rest: source };
+        while replay.read_one() {}
+        replay
+    }
+
+    /// Lets [`Replay::get`] read on, up to `most` frames in all.
+    pub(super) fn up_to(mut self, most: usize) -> Self {
+        self.most = most;
+        self
+    }
+
+    /// The frame at a place, read now if it has not been yet; `None` behind the last one that is held.
+    pub(super) fn get(&mut self, k: usize) -> Option<&Frame> {
+        while self.ahead.len() <= k {
+            if !self.read_one() {
+                return None;
             }
         }
-        Self { ahead, failed, ended, rest: source }
+        self.ahead.get(k)
+    }
+
+    /// Reads one more frame, if there is one and it may be held.
+    fn read_one(&mut self) -> bool {
+        if self.ahead.len() >= self.most || self.ended || self.failed.is_some() {
+            return false;
+        }
+        match self.rest.next_frame() {
+            Ok(Some(frame)) => {
+                self.ahead.push_back(frame);
+                return true;
+            }
+            Ok(None) => self.ended = true,
+            Err(e) => self.failed = Some(e),
+        }
+        false
     }
 
     /// The frames read ahead.

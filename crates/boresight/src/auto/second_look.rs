@@ -17,48 +17,110 @@ pub(super) fn can_be_opened_twice(input: &str) -> bool {
     on_disk || (input.contains('*') && !input.contains("://"))
 }
 
+/// Which frames are kept, so that at most `most` of any number stay, spread evenly.
+struct Spread {
+    most: usize,
+    n_kept: usize,
+    step: usize,
+}
+
+impl Spread {
+    fn new(most: usize) -> Self {
+        Self { most, n_kept: 0, step: 1 }
+    }
+
+    /// Whether the frame at place `k` is kept; first, whether every other one of those kept before goes.
+    fn keeps(&mut self, k: usize) -> (bool, bool) {
+        let mut thins = false;
+        if k.is_multiple_of(self.step) && self.n_kept == self.most {
+            // Twice as far apart, over twice the time.
+            thins = true;
+            self.n_kept = self.most.div_ceil(2);
+            self.step *= 2;
+        }
+        let keeps = k.is_multiple_of(self.step);
+        self.n_kept += usize::from(keeps);
+        (thins, keeps)
+    }
+}
+
 /// At most `n_kept` frames spread evenly over the beginning, in colour if the file has it; what cannot be read ends them.
 pub(super) fn frames(input: &str, base: &Config, n_kept: usize) -> Vec<Frame> {
+    // Frames that are lost shift the others: then the numbers do not tell which are wanted.
+    kept(input, base, n_kept, true).or_else(|| kept(input, base, n_kept, false)).unwrap_or_default()
+}
+
+/// The frames; `None` if one that is wanted came without pixels.
+fn kept(input: &str, base: &Config, n_kept: usize, sparing: bool) -> Option<Vec<Frame>> {
     let options = OpenOptions { colour: Colour::Rgb, ..base.input.open_options() };
     match crate::io::open(input, &options) {
-        Ok(mut source) => spread(source.as_mut(), n_kept),
-        Err(_) => Vec::new(),
+        Ok(mut source) => kept_of(source.as_mut(), n_kept, sparing),
+        Err(_) => Some(Vec::new()),
     }
 }
 
 /// At most `n_kept` frames spread evenly over the beginning of a source.
 pub(super) fn spread(source: &mut dyn FrameSource, n_kept: usize) -> Vec<Frame> {
+    kept_of(source, n_kept, false).unwrap_or_default()
+}
+
+fn kept_of(source: &mut dyn FrameSource, n_kept: usize, sparing: bool) -> Option<Vec<Frame>> {
     let info = source.info();
     let bytes = info.width.saturating_mul(info.height).saturating_mul(3).max(1);
     let most = (MAX_BYTES / bytes).clamp(4, n_kept);
-    let (mut kept, mut step) = (Vec::with_capacity(most), 1);
+    if sparing {
+        let mut spread = Spread::new(most);
+        let looked_at: Vec<bool> = (0..SECOND_LOOK_FRAMES).map(|k| spread.keeps(k).1).collect();
+        source.want_only(Box::new(move |k| usize::try_from(k).is_ok_and(|k| looked_at.get(k) == Some(&true))));
+    }
+    let (mut kept, mut spread) = (Vec::with_capacity(most), Spread::new(most));
     for k in 0..SECOND_LOOK_FRAMES {
         let Ok(Some(frame)) = source.next_frame() else { break };
-        if k % step != 0 {
-            source.recycle(frame);
-            continue;
-        }
-        if kept.len() == most {
-            // Twice as far apart, over twice the time.
+        let (thins, keeps) = spread.keeps(k);
+        if thins {
             let mut i = 0;
             kept.retain(|_| {
                 i += 1;
                 i % 2 == 1
             });
-            step *= 2;
-            if k % step != 0 {
-                source.recycle(frame);
-                continue;
-            }
         }
-        kept.push(frame);
+        match (keeps, frame.pixels.width()) {
+            (true, 0) => return None,
+            (true, _) => kept.push(frame),
+            (false, _) => source.recycle(frame),
+        }
     }
-    kept
+    Some(kept)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_are_kept_evenly_whatever_their_number() {
+        for n in [3, 4, 9, 40, 399] {
+            let (mut spread, mut kept) = (Spread::new(4), Vec::new());
+            for k in 0..n {
+                let (thins, keeps) = spread.keeps(k);
+                if thins {
+                    kept = kept.into_iter().step_by(2).collect();
+                }
+                kept.extend(keeps.then_some(k));
+                assert_eq!(spread.n_kept, kept.len());
+            }
+            assert!(kept.len() <= 4 && kept.windows(2).all(|w| w[1] - w[0] == spread.step), "{kept:?}");
+        }
+    }
+
+    #[cfg(feature = "video")]
+    #[test]
+    fn frames_that_nobody_keeps_change_none_of_those_kept() {
+        let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
+        let [spared, all] = [true, false].map(|sparing| kept(clip, &Config::default(), 8, sparing));
+        assert_eq!(all.as_ref().map(Vec::len), Some(5));
+        assert!(spared == all);
+    }
 
     #[test]
     fn streams_and_cameras_are_opened_once() {

@@ -54,6 +54,11 @@ impl Decoders {
         self.since.and(self.fast.info).or(self.complete.info)
     }
 
+    /// Whether nothing that comes after it needs the picture of a sample, which then need not be decoded if nobody wants it.
+    pub fn may_leave_out(&self, data: &[u8]) -> bool {
+        self.since.is_some() && self.fast.is_needed_by_none(data)
+    }
+
     /// What the frames are read with, for the summary.
     pub fn reader(&self) -> &'static str {
         if self.since.is_some() { "H.264 in process, fast decoder" } else { "H.264 in process, complete decoder" }
@@ -111,5 +116,67 @@ impl Decoders {
         self.complete.reset();
         self.since = None;
         self.is_new = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::source::{Opened, open_by};
+    use crate::io::{Colour, OpenOptions};
+    use crate::{Frame, FrameSource};
+    use std::path::{Path, PathBuf};
+
+    fn clip(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/video").join(name)
+    }
+
+    /// What the first frame was read with, and all frames.
+    fn frames(path: &Path, colour: Colour, may_be_fast: bool) -> (String, Vec<Frame>) {
+        let options = OpenOptions { colour, ..OpenOptions::default() };
+        let Ok(Opened::Source(mut source)) = open_by(path, &options, may_be_fast) else { panic!("{}", path.display()) };
+        let mut frames = Vec::new();
+        while let Some(frame) = source.next_frame().unwrap() {
+            frames.push(frame);
+        }
+        (source.info().reader.clone(), frames)
+    }
+
+    #[test]
+    fn both_decoders_give_the_same_frames() {
+        let fast = ["b_frames", "slices", "open_gop", "cropped", "edit_list", "fragmented", "variable_rate"];
+        let complete = ["interlaced", "ten_bit", "grey", "yuv422"];
+        for (name, is_fast) in fast.iter().map(|n| (n, true)).chain(complete.iter().map(|n| (n, false))) {
+            for colour in [Colour::Native, Colour::Rgb] {
+                let path = clip(&format!("{name}.mp4"));
+                let (reader, got) = frames(&path, colour, true);
+                let (slower, want) = frames(&path, colour, false);
+                assert_eq!(
+                    (reader.ends_with("fast decoder"), slower.ends_with("fast decoder")),
+                    (is_fast, false),
+                    "{name}"
+                );
+                assert!(!got.is_empty() && got == want, "{name}: {} and {} frames", got.len(), want.len());
+            }
+        }
+    }
+
+    #[test]
+    fn a_damaged_sample_has_the_last_word_of_the_complete_decoder() {
+        let dir = tempfile::tempdir().unwrap();
+        let sound = std::fs::read(clip("b_frames.mp4")).unwrap();
+        let data = sound.windows(4).position(|w| w == b"mdat").unwrap() + 4;
+        let end = sound.windows(4).position(|w| w == b"moov").unwrap();
+        let mut lost = 0;
+        for at in (data + 900..end - 64).step_by((end - data) / 12) {
+            let mut damaged = sound.clone();
+            damaged[at..at + 24].fill(0x55);
+            let path = dir.path().join("damaged.mp4");
+            std::fs::write(&path, &damaged).unwrap();
+            let [fast, complete] = [true, false].map(|may| frames(&path, Colour::Native, may).1);
+            let numbers = |f: &[Frame]| f.iter().map(|f| f.index.0).collect::<Vec<_>>();
+            assert_eq!(numbers(&fast), numbers(&complete), "damaged at {at}");
+            lost += usize::from(fast.len() < 25);
+        }
+        assert!(lost > 0, "no damage was seen");
     }
 }

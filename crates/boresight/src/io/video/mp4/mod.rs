@@ -12,5 +12,6 @@ mod sample;
 mod source;
 mod tables;
 mod timeline;
+mod worker;
 
 pub(in crate::io::video) use source::{Opened, open};

@@ -69,6 +69,12 @@ impl Progressive {
         parts(data, self.length_size).is_some_and(|parts| parts.iter().any(|p| kind(p) == Some(SLICE_IDR)))
     }
 
+    /// Whether a sample holds nothing but slices that no other picture refers to (`nal_ref_idc` 0).
+    pub fn is_needed_by_none(&self, data: &[u8]) -> bool {
+        let part = |p: &&[u8]| p.first().is_some_and(|b| matches!(b & 0x1f, SLICE | 6 | 9) && b & 0x60 == 0);
+        parts(data, self.length_size).is_some_and(|parts| !parts.is_empty() && parts.iter().all(part))
+    }
+
     fn configure(&mut self, description: u16) -> Result<(), Refusal> {
         if self.active == Some(description) {
             return Ok(());
@@ -285,7 +291,7 @@ mod tests {
             assert_eq!(order_count_type(&[0x67, 77, 0, 30, bits]), Some(want));
         }
         // High: chroma 1 (`010`), depths 0 (`1 1`), no bypass, no lists, then as above.
-        assert_eq!(order_count_type(&[0x67, 100, 0, 30, 0b1010_1100, 0b1101_1000]), Some(2));
+        assert_eq!(order_count_type(&[0x67, 100, 0, 30, 0b1010_1100, 0b1011_0000]), Some(2));
         assert_eq!(order_count_type(&[0x67, 100, 0]), None);
     }
 

@@ -7,34 +7,19 @@
 
 use super::decoders::Decoders;
 use super::movie::{Movie, read_movie};
-use super::picture::{Picture, Refusal, start_error};
-use super::reorder::{Order, Reorder};
-use super::sample::{Codec, Sample};
+use super::picture::{Refusal, start_error};
+use super::sample::Codec;
 use super::timeline::Step;
-use crate::io::options::{Colour, OpenOptions};
-use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
-use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
-};
+use super::worker::{Message, Worker};
+use crate::io::options::OpenOptions;
+use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Pixels, Result, SourceInfo, Wanted};
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::{Arc, OnceLock};
 
 /// Frames decoded ahead of the caller.
 const AHEAD: usize = 4;
-/// Largest accepted sample, bytes (an uncompressed picture of the largest size is below it).
-const MAX_SAMPLE_BYTES: u32 = 1 << 28;
-
-/// What the decoding thread reports.
-enum Message {
-    /// A frame in presentation order, and what it was read with.
-    Frame(Frame, &'static str),
-    /// Frames that could not be decoded: how many of them at the end, how many before, and the first reason.
-    End { lost_before: u64, lost_tail: u64, reason: Option<String> },
-    /// The stream cannot be decoded at all.
-    Refused(Refusal),
-}
 
 /// The source.
 pub(in crate::io::video) struct Mp4Source {
@@ -43,6 +28,7 @@ pub(in crate::io::video) struct Mp4Source {
     first: Option<Frame>,
     frames: Option<Receiver<Message>>,
     spare: Sender<Pixels>,
+    wanted: Arc<OnceLock<Wanted>>,
     n_frames: u64,
 }
 
@@ -58,6 +44,11 @@ pub(in crate::io::video) enum Opened {
 /// # Errors
 /// When the file is missing, damaged or too large.
 pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<Opened> {
+    open_by(path, options, true)
+}
+
+/// Opens an MP4 file, with the fast decoder where it may or with the complete one alone.
+pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> Result<Opened> {
     let mut file = File::open(path)
         .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be opened").at(path.display()).because(e))?;
     let mut movie = match read_movie(&mut file, path) {
@@ -78,8 +69,19 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
     let (frame_in, frame_out) = sync_channel(AHEAD);
     let (spare_in, spare_out) = channel();
     let units = Decoders::new(configurations, options.max_pixels);
-    let worker =
-        Worker { file, movie, ranks, units, colour: options.colour, out: frame_in, spare: spare_out, n_frames };
+    let wanted = Arc::<OnceLock<Wanted>>::default();
+    let worker = Worker {
+        file,
+        movie,
+        ranks,
+        units,
+        may_be_fast,
+        colour: options.colour,
+        out: frame_in,
+        spare: spare_out,
+        wanted: Arc::clone(&wanted),
+        n_frames,
+    };
     std::thread::Builder::new()
         .name("boresight-h264".into())
         .spawn(move || worker.run())
@@ -116,6 +118,7 @@ pub(in crate::io::video) fn open(path: &Path, options: &OpenOptions) -> Result<O
         first: Some(first),
         frames: Some(frame_out),
         spare: spare_in,
+        wanted,
         n_frames,
     })))
 }
@@ -153,7 +156,7 @@ impl FrameSource for Mp4Source {
             Ok(Message::Frame(frame, _)) => {
                 let (w, h, kind) = (frame.pixels.width(), frame.pixels.height(), frame.pixels.kind());
                 let i = &self.info;
-                if (w, h, kind) != (i.width, i.height, i.kind) {
+                if (w, h, kind) != (i.width, i.height, i.kind) && (w, h) != (0, 0) {
                     let what = format!("the picture changes from {} x {} to {w} x {h} pixels", i.width, i.height);
                     self.frames = None;
                     return Err(Error::new(ErrorKind::Damaged, what)
@@ -194,6 +197,11 @@ impl FrameSource for Mp4Source {
         }
     }
 
+    fn want_only(&mut self, wanted: Wanted) {
+        // Said twice, the first holds: it may have been acted on.
+        let _ = self.wanted.set(wanted);
+    }
+
     fn reads_ahead(&self) -> bool {
         true
     }
@@ -201,194 +209,4 @@ impl FrameSource for Mp4Source {
     fn warnings(&self) -> &[String] {
         &self.warnings
     }
-}
-
-struct Worker {
-    file: File,
-    movie: Movie,
-    ranks: Vec<Option<u64>>,
-    units: Decoders,
-    colour: Colour,
-    out: SyncSender<Message>,
-    spare: Receiver<Pixels>,
-    n_frames: u64,
-}
-
-/// The caller is gone.
-struct Gone;
-
-impl Worker {
-    fn run(mut self) {
-        let mut tally = Tally::default();
-        if let Err(refusal) = self.units.configure(self.movie.samples.first().map_or(0, |s| s.description)) {
-            let _ = self.out.send(Message::Refused(refusal));
-            return;
-        }
-        let order = self.order();
-        if order == Order::Rank {
-            self.units.allow_fast();
-        }
-        let mut reorder = Reorder::new(order);
-        match self.decode_all(&mut reorder, &mut tally) {
-            Ok(None) => {
-                let lost_tail = self.n_frames - tally.next_rank.min(self.n_frames);
-                let lost_before = tally.next_rank.min(self.n_frames).saturating_sub(tally.sent);
-                let _ = self.out.send(Message::End { lost_before, lost_tail, reason: tally.reason });
-            }
-            Ok(Some(refusal)) => {
-                let _ = self.out.send(Message::Refused(refusal));
-            }
-            Err(Gone) => {}
-        }
-    }
-
-    fn order(&self) -> Order {
-        let info = self.units.info();
-        let never_reorders = info.is_some_and(|i| i.profile == 66 || i.max_reorder_frames == Some(0));
-        if self.movie.reordered || never_reorders {
-            return Order::Rank;
-        }
-        let depth = info.and_then(|i| i.max_reorder_frames).unwrap_or(16);
-        Order::Count { depth: depth.min(16) as usize }
-    }
-
-    /// Decodes every step; gives the refusal that stops the stream before its first picture.
-    fn decode_all(&mut self, reorder: &mut Reorder<Pixels>, tally: &mut Tally) -> Result<Option<Refusal>, Gone> {
-        let mut data = Vec::new();
-        let mut pictures = Vec::new();
-        let mut due = Vec::new();
-        let mut wait_for_sync = false;
-        for step in 0..self.movie.steps.len() {
-            let Some(sample) = self.movie.steps.get(step).and_then(|s| self.movie.samples.get(s.sample as usize))
-            else {
-                continue;
-            };
-            let sample = *sample;
-            let result = if wait_for_sync && !sample.sync {
-                Err(Refusal::Damaged("it depends on a damaged picture".into()))
-            } else {
-                wait_for_sync = false;
-                let (file, movie) = (&mut self.file, &self.movie);
-                let mut read = |step: usize, data: &mut Vec<u8>| {
-                    let sample = *movie.samples.get(movie.steps.get(step)?.sample as usize)?;
-                    Some(read_sample(file, &sample, movie.file_len, data).map(|()| sample))
-                };
-                match read(step, &mut data) {
-                    Some(Ok(sample)) => self.units.decode((&data, &sample, step), &mut read, &mut pictures),
-                    Some(Err(refusal)) => Err(refusal),
-                    None => continue,
-                }
-            };
-            if let Err(refusal) = result {
-                if let (Refusal::Unsupported(_), 0, true) = (&refusal, tally.sent, pictures.is_empty()) {
-                    return Ok(Some(refusal));
-                }
-                if !wait_for_sync {
-                    self.units.reset();
-                    wait_for_sync = true;
-                    let (Refusal::Damaged(why) | Refusal::Unsupported(why)) = refusal;
-                    tally.reason.get_or_insert_with(|| format!("first in coded picture {step}: {why}"));
-                }
-                if let Some(rank) = self.ranks.get(step).copied().flatten() {
-                    reorder.lose(rank, &mut due);
-                }
-            }
-            self.place(&mut pictures, reorder, &mut due);
-            self.send(&mut due, tally)?;
-        }
-        self.units.finish(&mut pictures);
-        self.place(&mut pictures, reorder, &mut due);
-        reorder.finish(&mut due);
-        self.send(&mut due, tally)?;
-        Ok(None)
-    }
-
-    fn place(&mut self, pictures: &mut Vec<Picture>, reorder: &mut Reorder<Pixels>, due: &mut Vec<(u64, Pixels)>) {
-        for picture in pictures.drain(..) {
-            let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
-            let (period, count) = (picture.period, picture.order_count);
-            match self.pixels(picture) {
-                Some(pixels) => reorder.push(period, count, rank, pixels, due),
-                None => reorder.lose(rank, due),
-            }
-        }
-    }
-
-    fn send(&mut self, due: &mut Vec<(u64, Pixels)>, tally: &mut Tally) -> Result<(), Gone> {
-        for (rank, pixels) in due.drain(..) {
-            // Times that run backwards can only come from tables that lie; such a frame counts as lost.
-            if rank < tally.next_rank {
-                continue;
-            }
-            if tally.pts.is_empty() {
-                tally.pts = shown_times(&self.movie.steps);
-            }
-            let ticks = tally.pts.get(rank as usize).copied().unwrap_or_default();
-            let time = Timestamp::from_ticks(ticks, 1, i64::from(self.movie.timescale));
-            tally.next_rank = rank + 1;
-            tally.sent += 1;
-            let frame = Frame { index: FrameIndex(rank), time, pixels };
-            self.out.send(Message::Frame(frame, self.units.reader())).map_err(|_| Gone)?;
-        }
-        Ok(())
-    }
-
-    fn pixels(&mut self, picture: Picture) -> Option<Pixels> {
-        let f = picture;
-        let (width, height) = (f.width, f.height);
-        let spare = self.spare.try_recv().ok();
-        if self.colour == Colour::Rgb && self.units.info().is_some_and(|i| i.chroma_format != 0) {
-            let mut rgb = match spare {
-                Some(Pixels::Rgb8(image)) => image.into_vec(),
-                _ => Vec::new(),
-            };
-            let info = self.units.info();
-            let matrix = Matrix::new(info.map_or(2, |i| i.matrix), info.is_some_and(|i| i.full_range), height);
-            let shift = (1, f.chroma_row_shift);
-            let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
-            if !to_rgb(&planes, &matrix, &mut rgb) {
-                return None;
-            }
-            return Image::from_vec(width, height, rgb).map(Pixels::Rgb8);
-        }
-        if f.bits > 8 {
-            let mut gray = match spare {
-                Some(Pixels::Gray16(image)) => image.into_vec(),
-                _ => Vec::new(),
-            };
-            to_u16(&f.y, &mut gray);
-            return Image::from_vec(width, height, gray).map(Pixels::Gray16);
-        }
-        Image::from_vec(width, height, f.y).map(Pixels::Gray8)
-    }
-}
-
-/// What has been sent.
-#[derive(Default)]
-struct Tally {
-    sent: u64,
-    /// Rank after the last one sent.
-    next_rank: u64,
-    reason: Option<String>,
-    /// Presentation times by rank, media ticks.
-    pts: Vec<i64>,
-}
-
-fn shown_times(steps: &[Step]) -> Vec<i64> {
-    let mut times: Vec<i64> = steps.iter().filter(|s| s.shown).map(|s| s.pts).collect();
-    times.sort_unstable();
-    times
-}
-
-fn read_sample(file: &mut File, s: &Sample, file_len: u64, data: &mut Vec<u8>) -> Result<(), Refusal> {
-    if s.offset.saturating_add(u64::from(s.size)) > file_len {
-        return Err(Refusal::Damaged("the file ends before it".into()));
-    }
-    if s.size > MAX_SAMPLE_BYTES {
-        return Err(Refusal::Damaged(format!("it claims {} bytes", s.size)));
-    }
-    data.resize(s.size as usize, 0);
-    file.seek(SeekFrom::Start(s.offset))
-        .and_then(|_| file.read_exact(data))
-        .map_err(|e| Refusal::Damaged(format!("it cannot be read: {e}")))
 }

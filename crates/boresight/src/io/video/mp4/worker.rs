@@ -1,0 +1,240 @@
+//! The decoding thread of an MP4 file: samples in decoding order to frames in presentation order, and what was lost on the way.
+
+use super::decoders::Decoders;
+use super::movie::Movie;
+use super::picture::{Picture, Refusal};
+use super::reorder::{Order, Reorder};
+use super::sample::Sample;
+use super::timeline::Step;
+use crate::io::options::Colour;
+use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
+use crate::{Frame, FrameIndex, Image, Pixels, Timestamp, Wanted};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Arc, OnceLock};
+
+/// Largest accepted sample, bytes (an uncompressed picture of the largest size is below it).
+const MAX_SAMPLE_BYTES: u32 = 1 << 28;
+
+/// What the decoding thread reports.
+pub(super) enum Message {
+    /// A frame in presentation order, and what it was read with.
+    Frame(Frame, &'static str),
+    /// Frames that could not be decoded: how many of them at the end, how many before, and the first reason.
+    End { lost_before: u64, lost_tail: u64, reason: Option<String> },
+    /// The stream cannot be decoded at all.
+    Refused(Refusal),
+}
+
+/// The work of the decoding thread.
+pub(super) struct Worker {
+    pub file: File,
+    pub movie: Movie,
+    pub ranks: Vec<Option<u64>>,
+    pub units: Decoders,
+    pub may_be_fast: bool,
+    pub colour: Colour,
+    pub out: SyncSender<Message>,
+    pub spare: Receiver<Pixels>,
+    pub wanted: Arc<OnceLock<Wanted>>,
+    pub n_frames: u64,
+}
+
+/// The caller is gone.
+struct Gone;
+
+impl Worker {
+    /// Decodes to the end, or until nobody listens.
+    pub fn run(mut self) {
+        let mut tally = Tally::default();
+        if let Err(refusal) = self.units.configure(self.movie.samples.first().map_or(0, |s| s.description)) {
+            let _ = self.out.send(Message::Refused(refusal));
+            return;
+        }
+        let order = self.order();
+        if self.may_be_fast && order == Order::Rank {
+            self.units.allow_fast();
+        }
+        let mut reorder = Reorder::new(order);
+        match self.decode_all(&mut reorder, &mut tally) {
+            Ok(None) => {
+                let lost_tail = self.n_frames - tally.next_rank.min(self.n_frames);
+                let lost_before = tally.next_rank.min(self.n_frames).saturating_sub(tally.sent);
+                let _ = self.out.send(Message::End { lost_before, lost_tail, reason: tally.reason });
+            }
+            Ok(Some(refusal)) => {
+                let _ = self.out.send(Message::Refused(refusal));
+            }
+            Err(Gone) => {}
+        }
+    }
+
+    fn order(&self) -> Order {
+        let info = self.units.info();
+        let never_reorders = info.is_some_and(|i| i.profile == 66 || i.max_reorder_frames == Some(0));
+        if self.movie.reordered || never_reorders {
+            return Order::Rank;
+        }
+        let depth = info.and_then(|i| i.max_reorder_frames).unwrap_or(16);
+        Order::Count { depth: depth.min(16) as usize }
+    }
+
+    /// Decodes every step; gives the refusal that stops the stream before its first picture.
+    fn decode_all(&mut self, reorder: &mut Reorder<Pixels>, tally: &mut Tally) -> Result<Option<Refusal>, Gone> {
+        let mut data = Vec::new();
+        let mut pictures = Vec::new();
+        let mut due = Vec::new();
+        let mut wait_for_sync = false;
+        for step in 0..self.movie.steps.len() {
+            let Some(sample) = self.movie.steps.get(step).and_then(|s| self.movie.samples.get(s.sample as usize))
+            else {
+                continue;
+            };
+            let sample = *sample;
+            let unwanted = self.ranks.get(step).copied().flatten().filter(|rank| !is_wanted(&self.wanted, *rank));
+            let result = if wait_for_sync && !sample.sync {
+                Err(Refusal::Damaged("it depends on a damaged picture".into()))
+            } else {
+                wait_for_sync = false;
+                let (file, movie) = (&mut self.file, &self.movie);
+                let mut read = |step: usize, data: &mut Vec<u8>| {
+                    let sample = *movie.samples.get(movie.steps.get(step)?.sample as usize)?;
+                    Some(read_sample(file, &sample, movie.file_len, data).map(|()| sample))
+                };
+                match read(step, &mut data) {
+                    Some(Ok(_)) if unwanted.is_some() && self.units.may_leave_out(&data) => {
+                        unwanted.iter().for_each(|rank| reorder.push(0, 0, *rank, nothing(), &mut due));
+                        Ok(())
+                    }
+                    Some(Ok(sample)) => self.units.decode((&data, &sample, step), &mut read, &mut pictures),
+                    Some(Err(refusal)) => Err(refusal),
+                    None => continue,
+                }
+            };
+            if let Err(refusal) = result {
+                if let (Refusal::Unsupported(_), 0, true) = (&refusal, tally.sent, pictures.is_empty()) {
+                    return Ok(Some(refusal));
+                }
+                if !wait_for_sync {
+                    self.units.reset();
+                    wait_for_sync = true;
+                    let (Refusal::Damaged(why) | Refusal::Unsupported(why)) = refusal;
+                    tally.reason.get_or_insert_with(|| format!("first in coded picture {step}: {why}"));
+                }
+                if let Some(rank) = self.ranks.get(step).copied().flatten() {
+                    reorder.lose(rank, &mut due);
+                }
+            }
+            self.place(&mut pictures, reorder, &mut due);
+            self.send(&mut due, tally)?;
+        }
+        self.units.finish(&mut pictures);
+        self.place(&mut pictures, reorder, &mut due);
+        reorder.finish(&mut due);
+        self.send(&mut due, tally)?;
+        Ok(None)
+    }
+
+    fn place(&mut self, pictures: &mut Vec<Picture>, reorder: &mut Reorder<Pixels>, due: &mut Vec<(u64, Pixels)>) {
+        for picture in pictures.drain(..) {
+            let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
+            let (period, count) = (picture.period, picture.order_count);
+            if !is_wanted(&self.wanted, rank) {
+                reorder.push(period, count, rank, nothing(), due);
+                continue;
+            }
+            match self.pixels(picture) {
+                Some(pixels) => reorder.push(period, count, rank, pixels, due),
+                None => reorder.lose(rank, due),
+            }
+        }
+    }
+
+    fn send(&mut self, due: &mut Vec<(u64, Pixels)>, tally: &mut Tally) -> Result<(), Gone> {
+        for (rank, pixels) in due.drain(..) {
+            // Times that run backwards can only come from tables that lie; such a frame counts as lost.
+            if rank < tally.next_rank {
+                continue;
+            }
+            if tally.pts.is_empty() {
+                tally.pts = shown_times(&self.movie.steps);
+            }
+            let ticks = tally.pts.get(rank as usize).copied().unwrap_or_default();
+            let time = Timestamp::from_ticks(ticks, 1, i64::from(self.movie.timescale));
+            tally.next_rank = rank + 1;
+            tally.sent += 1;
+            let frame = Frame { index: FrameIndex(rank), time, pixels };
+            self.out.send(Message::Frame(frame, self.units.reader())).map_err(|_| Gone)?;
+        }
+        Ok(())
+    }
+
+    fn pixels(&mut self, picture: Picture) -> Option<Pixels> {
+        let f = picture;
+        let (width, height) = (f.width, f.height);
+        let spare = self.spare.try_recv().ok();
+        if self.colour == Colour::Rgb && self.units.info().is_some_and(|i| i.chroma_format != 0) {
+            let mut rgb = match spare {
+                Some(Pixels::Rgb8(image)) => image.into_vec(),
+                _ => Vec::new(),
+            };
+            let info = self.units.info();
+            let matrix = Matrix::new(info.map_or(2, |i| i.matrix), info.is_some_and(|i| i.full_range), height);
+            let shift = (1, f.chroma_row_shift);
+            let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
+            if !to_rgb(&planes, &matrix, &mut rgb) {
+                return None;
+            }
+            return Image::from_vec(width, height, rgb).map(Pixels::Rgb8);
+        }
+        if f.bits > 8 {
+            let mut gray = match spare {
+                Some(Pixels::Gray16(image)) => image.into_vec(),
+                _ => Vec::new(),
+            };
+            to_u16(&f.y, &mut gray);
+            return Image::from_vec(width, height, gray).map(Pixels::Gray16);
+        }
+        Image::from_vec(width, height, f.y).map(Pixels::Gray8)
+    }
+}
+
+/// What stands for a picture that nobody wants.
+fn nothing() -> Pixels {
+    Pixels::Gray8(Image::default())
+}
+
+fn is_wanted(wanted: &OnceLock<Wanted>, rank: u64) -> bool {
+    wanted.get().is_none_or(|wanted| wanted(rank))
+}
+
+/// What has been sent.
+#[derive(Default)]
+struct Tally {
+    sent: u64,
+    /// Rank after the last one sent.
+    next_rank: u64,
+    reason: Option<String>,
+    /// Presentation times by rank, media ticks.
+    pts: Vec<i64>,
+}
+
+fn shown_times(steps: &[Step]) -> Vec<i64> {
+    let mut times: Vec<i64> = steps.iter().filter(|s| s.shown).map(|s| s.pts).collect();
+    times.sort_unstable();
+    times
+}
+
+fn read_sample(file: &mut File, s: &Sample, file_len: u64, data: &mut Vec<u8>) -> Result<(), Refusal> {
+    if s.offset.saturating_add(u64::from(s.size)) > file_len {
+        return Err(Refusal::Damaged("the file ends before it".into()));
+    }
+    if s.size > MAX_SAMPLE_BYTES {
+        return Err(Refusal::Damaged(format!("it claims {} bytes", s.size)));
+    }
+    data.resize(s.size as usize, 0);
+    file.seek(SeekFrom::Start(s.offset))
+        .and_then(|_| file.read_exact(data))
+        .map_err(|e| Refusal::Damaged(format!("it cannot be read: {e}")))
+}
