@@ -3,7 +3,7 @@
 //! The fast decoder refuses what it does not do, and whatever looks damaged. Then the complete one decodes again from the last refresh,
 //! throws away what has been handed out, and its word on the sample is the last one. The next refresh is the fast one's again, unless it
 //! refused too often.
-//! Limits: a sample is decoded at most twice by the complete decoder's side, so a stream costs at most three times the slower way.
+//! Limits: after three refusals the fast decoder is not asked again, so a stream's samples are decoded a second time at most three times over.
 
 use super::h264::AccessUnits;
 use super::picture::{Picture, PictureDecoder, Refusal};
@@ -13,6 +13,9 @@ use rust_h264::nal::SpsInfo;
 
 /// Refusals after which the fast decoder is not asked again.
 const MAX_REFUSALS: u32 = 3;
+
+/// Reads the sample of a step into a buffer; `None` if there is no such step.
+type ReadAgain<'a> = dyn FnMut(usize, &mut Vec<u8>) -> Option<Result<Sample, Refusal>> + 'a;
 
 /// Both decoders of one track.
 pub(super) struct Decoders {
@@ -68,7 +71,7 @@ impl Decoders {
     pub fn decode(
         &mut self,
         (data, sample, step): (&[u8], &Sample, usize),
-        read: &mut dyn FnMut(usize, &mut Vec<u8>) -> Option<Result<Sample, Refusal>>,
+        read: &mut ReadAgain<'_>,
         out: &mut Vec<Picture>,
     ) -> Result<(), Refusal> {
         let ask_fast = self.may_be_fast && self.refusals < MAX_REFUSALS && !self.fast.unfit;
