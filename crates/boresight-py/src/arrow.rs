@@ -4,6 +4,7 @@
 //! columns are plain vectors: one batch, no offsets; only `detection` has gaps and only `status` is a dictionary. Every structure owns a
 //! count of the columns, so they live as long as any reader wants.
 //! Limits: the one file with unsafe code; a stream is read by one thread at a time, as its standard says.
+#![allow(unsafe_code)] // Raw pointers are what the Arrow C interface is made of; it stands in this file only.
 
 use crate::columns::{Columns, N_FLOATS, STATUS};
 use boresight::io::TRACKS_HEADER;
