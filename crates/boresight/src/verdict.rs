@@ -229,14 +229,14 @@ fn more_sensitive(config: &Config) -> Option<String> {
 
 /// What looks for something else than this detector.
 fn another_detector(config: &Config) -> Option<String> {
-    Some(match &config.detector.threshold {
+    let option = match &config.detector.threshold {
         ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
             "--detector isolated"
         }
         ThresholdConfig::Isolated(_) | ThresholdConfig::Cfar(_) => "--detector moving",
         _ => "--detector cfar",
-    })
-    .map(str::to_string)
+    };
+    Some(option.to_string())
 }
 
 /// A number with its thing, in the plural where it is not one.

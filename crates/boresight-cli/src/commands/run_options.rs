@@ -304,6 +304,7 @@ mod tests {
         let args = InputArgs {
             input: "-".into(),
             config: None,
+            detector: None,
             sets: Vec::new(),
             rate_hz: None,
             columns: None,
