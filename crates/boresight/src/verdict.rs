@@ -162,7 +162,7 @@ impl Observed {
                 another_detector(config),
             );
         }
-        if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && over_s > SHORT_S * SHORT_TRACKS as f64 {
+        if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && over_s > SHORT_TRACKS as f64 * mean_s {
             return doubt(
                 format!(
                     "{} of {mean_s:.2} s in the mean: moments of clutter, or targets that are lost again and again.",

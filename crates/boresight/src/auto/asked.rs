@@ -2,11 +2,10 @@
 //!
 //! Source: our own. Each is configured as where it is chosen; a size that nothing in the frames shows is assumed and said to be.
 
-use super::choose::Choice;
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
 use super::{cells, colour, faint, moving, particles, spots};
-use crate::{Error, ErrorKind, Frame, Result, SourceInfo};
+use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
 const ASSUMED_SIDE: f64 = 0.05;
@@ -21,9 +20,9 @@ pub fn configure(
     scene: &Scene,
     interval_s: f64,
     info: &SourceInfo,
-    choice: &mut Choice,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
 ) -> Result<()> {
-    let Choice { config, reasons } = choice;
     reasons.push(format!("The detector is the one asked for: {kind}, for {}.", kind.purpose()));
     match kind {
         DetectorKind::Isolated => spots::configure(&spots::look(frames, info)?, info, config, reasons),
@@ -70,12 +69,12 @@ fn seen_or_assumed(scene: &Scene, info: &SourceInfo, reasons: &mut Vec<String>) 
 mod tests {
     use super::*;
     use crate::vision::threshold::ThresholdConfig;
-    use crate::{Config, FrameIndex, Image, PixelKind, Pixels, Timestamp};
+    use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     /// What is written for a kind on 24 frames of noise, with a bright square that moves if `target`.
-    fn asked(kind: DetectorKind, target: bool) -> Result<Choice> {
+    fn asked(kind: DetectorKind, target: bool) -> Result<(Config, Vec<String>)> {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         let frames: Vec<Frame> = (0..24u64)
             .map(|k| {
@@ -102,17 +101,17 @@ mod tests {
             true_times: true,
         };
         let scene = super::super::scene::look(&frames, &info)?;
-        let mut choice = Choice { config: Config::default(), reasons: Vec::new() };
-        configure(kind, &frames, &[], &scene, 0.04, &info, &mut choice)?;
-        Ok(choice)
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        configure(kind, &frames, &[], &scene, 0.04, &info, &mut config, &mut reasons)?;
+        Ok((config, reasons))
     }
 
     #[test]
     fn what_is_asked_for_is_written_whatever_the_frames_show() {
         for target in [true, false] {
             for kind in DetectorKind::ALL.into_iter().filter(|k| *k != DetectorKind::Colour) {
-                let choice = asked(kind, target).unwrap();
-                let written = match &choice.config.detector.threshold {
+                let (config, reasons) = asked(kind, target).unwrap();
+                let written = match &config.detector.threshold {
                     ThresholdConfig::Isolated(_) => DetectorKind::Isolated,
                     ThresholdConfig::Cfar(_) => DetectorKind::Cfar,
                     ThresholdConfig::Moving(_) => DetectorKind::Moving,
@@ -121,11 +120,11 @@ mod tests {
                     other => panic!("{kind}: {other:?}"),
                 };
                 assert_eq!(written, kind);
-                choice.config.validate().unwrap();
-                assert!(choice.reasons[0].contains(kind.name()), "{:?}", choice.reasons);
+                config.validate().unwrap();
+                assert!(reasons[0].contains(kind.name()), "{reasons:?}");
             }
         }
-        let size = |target| asked(DetectorKind::Moving, target).unwrap().config.detector.cluster.min_area_px.unwrap();
+        let size = |target| asked(DetectorKind::Moving, target).unwrap().0.detector.cluster.min_area_px.unwrap();
         assert!(size(true) > 9 && size(true) != size(false), "the size that moves: {} {}", size(true), size(false));
     }
 

@@ -63,9 +63,7 @@ pub(super) fn choose_seen(
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
     if let Some(kind) = asked {
-        let mut choice = Choice { config, reasons };
-        asked::configure(kind, frames, second, &scene, interval_s, info, &mut choice)?;
-        Choice { config, reasons } = choice;
+        asked::configure(kind, frames, second, &scene, interval_s, info, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
     } else if moving::fits(&scene, info) {
