@@ -7,7 +7,7 @@ use crate::detections::detections_of;
 use crate::errors::{OrRaise, raised, refused};
 use crate::plan::{Plan, Wishes};
 use crate::python_detector::PythonDetector;
-use crate::source::{ArrayFrames, Raised, Times};
+use crate::source::{ArrayFrames, READER, Raised, Times};
 use crate::tracks::Tracks;
 use boresight::draw::{AnnotatedVideo, DrawOptions};
 use boresight::io::video::Mp4Options;
@@ -205,7 +205,11 @@ fn drive(
     request: &Request,
     kept: &Raised,
     total: Option<u64>,
+    reader: &str,
 ) -> PyResult<Outcome> {
+    // The threads of a run are not waited for when it is interrupted. One that asks Python for a frame or for detections would do so while the interpreter ends.
+    let asks_python = reader == READER || request.detector.is_some();
+    let n_threads = if asks_python { 1 } else { std::thread::available_parallelism().map_or(1, usize::from) };
     let (mut looked, mut told) = (Instant::now(), Instant::now());
     let mut go_on = |so_far: &pipeline::Summary| -> ControlFlow<()> {
         let now = Instant::now();
@@ -232,7 +236,7 @@ fn drive(
             }
         }
     };
-    let outcome = py.detach(|| pipeline::run(input, tracking, sinks, &mut go_on));
+    let outcome = py.detach(|| pipeline::run_on(n_threads, input, tracking, sinks, &mut go_on));
     if let Some(e) = kept.take() {
         return Err(e);
     }
@@ -257,7 +261,7 @@ fn run(py: Python<'_>, plan: Plan, request: &Request, kept: &Raised, label: Stri
     }
     sinks.push(Box::new(Recorder(&mut columns)));
     let Plan { input, config, reasons, lost, total, reader } = plan;
-    let outcome = drive(py, input, Some(tracking), sinks, request, kept, total)?;
+    let outcome = drive(py, input, Some(tracking), sinks, request, kept, total, &reader)?;
     let (summary, broken) = outcome.all_written().or_raise(py)?;
     if summary.frames == 0 {
         return Err(raised(py, &broken.unwrap_or_else(|| empty(&label))));
@@ -278,7 +282,7 @@ fn run(py: Python<'_>, plan: Plan, request: &Request, kept: &Raised, label: Stri
 fn detect<'py>(py: Python<'py>, plan: Plan, request: &Request, kept: &Raised, label: &str) -> PyResult<Detected<'py>> {
     let mut found = Found::default();
     let sinks: Vec<Box<dyn Sink + '_>> = vec![Box::new(FoundSink(&mut found))];
-    let outcome = drive(py, plan.input, None, sinks, request, kept, plan.total)?;
+    let outcome = drive(py, plan.input, None, sinks, request, kept, plan.total, &plan.reader)?;
     let (summary, broken) = outcome.all_written().or_raise(py)?;
     match broken {
         Some(e) => Err(raised(py, &e)),

@@ -5,6 +5,9 @@ use boresight::{Error, ErrorKind, Frame, FrameIndex, FrameSource, Result, Source
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex};
 
+/// How the input of a run is named that asks Python for its frames.
+pub const READER: &str = "arrays in memory";
+
 /// An exception raised by the user's own code in the middle of a run; it is what the caller gets to see.
 #[derive(Clone, Default)]
 pub struct Raised(Arc<Mutex<Option<PyErr>>>);
@@ -85,7 +88,7 @@ impl ArrayFrames {
         let pixels = pixels_of(&first)?;
         let info = SourceInfo {
             label: "arrays".into(),
-            reader: "arrays in memory".into(),
+            reader: READER.into(),
             width: pixels.width(),
             height: pixels.height(),
             kind: pixels.kind(),
