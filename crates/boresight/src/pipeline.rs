@@ -5,7 +5,7 @@
 //! costs itself: a warning counts such scans, and if they are most of them, the run counts as broken. A run that did not get one frame finishes no sink: what stood under their names
 //! stays. The caller is asked after every frame whether to go on.
 //!
-//! Reading, detecting and the rest run on threads of their own, with short queues between them ([`scans`]); the results are the same bytes for
+//! Reading, detecting and the rest run on threads of their own, with short queues between them (`pipeline/scans.rs`); the results are the same bytes for
 //! any number of threads.
 
 mod read_ahead;
