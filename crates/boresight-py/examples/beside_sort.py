@@ -2,11 +2,13 @@
 
 Needs filterpy and scipy; ByteTrack is left out where supervision does not have it (0.26 has it).
 
-python crates/boresight-py/examples/beside_sort.py
+python crates/boresight-py/examples/beside_sort.py              people turn round within a second
+python crates/boresight-py/examples/beside_sort.py --bounce     they bounce off the edges at once, which constant velocity does not hold
 """
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
 
@@ -18,7 +20,7 @@ import boresight as bs
 N_SCANS, N_PEOPLE, RATE_HZ = 500, 25, 25.0
 
 
-def scene(seed: int = 4) -> tuple[list[np.ndarray], dict[str, np.ndarray]]:
+def scene(seed: int = 4, bounce: bool = False) -> tuple[list[np.ndarray], dict[str, np.ndarray]]:
     """People who walk through 1280 x 720 px: boxes with noise, one in ten is missed, one false box a scan; N x 5 with scores."""
     rng = np.random.default_rng(seed)
     at, height = rng.uniform([0, 150], [1280, 600], (N_PEOPLE, 2)), rng.uniform(80, 200, N_PEOPLE)
@@ -26,8 +28,11 @@ def scene(seed: int = 4) -> tuple[list[np.ndarray], dict[str, np.ndarray]]:
     scans, rows = [], []
     for k in range(N_SCANS):
         velocity += rng.normal(0, 4, velocity.shape)
-        # Who comes near an edge turns round within a second.
-        velocity += 150 / RATE_HZ * ((at < [100, 200]).astype(float) - (at > [1180, 560]))
+        if bounce:
+            velocity = np.where(at < [0, 150], np.abs(velocity), np.where(at > [1280, 600], -np.abs(velocity), velocity))
+        else:
+            # Who comes near an edge turns round within a second.
+            velocity += 150 / RATE_HZ * ((at < [100, 200]).astype(float) - (at > [1180, 560]))
         at += velocity / RATE_HZ
         half = np.stack([0.2 * height, 0.5 * height], axis=1)
         rows += [(k, i, *at[i], *(2 * half[i])) for i in range(N_PEOPLE)]
@@ -93,10 +98,11 @@ def ours(scans: list[np.ndarray], config: bs.Config) -> dict[str, np.ndarray]:
 
 def main() -> None:
     warnings.simplefilter("ignore")
-    scans, truth = scene()
+    bounce = "--bounce" in sys.argv[1:]
+    scans, truth = scene(bounce=bounce)
     print("| | time a scan | MOTA | IDF1 | switches | ids for 25 people |\n| --- | --- | --- | --- | --- | --- |")
     # Learnt from other people than those that are tracked.
-    config = bs.Config.for_detections(scene(seed=5)[0], rate_hz=RATE_HZ)
+    config = bs.Config.for_detections(scene(seed=5, bounce=bounce)[0], rate_hz=RATE_HZ)
     runs = {
         "SORT on filterpy": sort,
         "supervision's ByteTrack": bytetrack,

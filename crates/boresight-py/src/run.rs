@@ -209,7 +209,7 @@ fn drive(
 ) -> PyResult<Outcome> {
     // The threads of a run are not waited for when it is interrupted. One that asks Python for a frame or for detections would do so while the interpreter ends.
     let asks_python = reader == READER || request.detector.is_some();
-    let n_threads = if asks_python { 1 } else { std::thread::available_parallelism().map_or(1, usize::from) };
+    let n_threads = asks_python.then_some(std::num::NonZeroUsize::MIN);
     let (mut looked, mut told) = (Instant::now(), Instant::now());
     let mut go_on = |so_far: &pipeline::Summary| -> ControlFlow<()> {
         let now = Instant::now();

@@ -16,6 +16,7 @@ use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Error, FrameSource, Result, Scan, Sink, TrackStatus, View};
 use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -97,17 +98,18 @@ pub fn run(
     sinks: Vec<Box<dyn Sink + '_>>,
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
 ) -> Outcome {
-    run_on(std::thread::available_parallelism().map_or(1, usize::from), input, tracking, sinks, go_on)
+    run_on(None, input, tracking, sinks, go_on)
 }
 
-/// As [`run`], on at most `n_threads` threads (video is decoded and encoded on one more each).
+/// As [`run`], on at most `n_threads` threads, or as many as the machine has (video is decoded and encoded on one more each).
 pub fn run_on(
-    n_threads: usize,
+    n_threads: Option<NonZeroUsize>,
     input: Input,
     mut tracking: Option<Box<dyn Tracking>>,
     sinks: Vec<Box<dyn Sink + '_>>,
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
 ) -> Outcome {
+    let n_threads = n_threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, usize::from);
     let mut summary = Summary::default();
     let mut counts = Counts::default();
     let mut outputs = Outputs { sinks, unwritten: Vec::new() };

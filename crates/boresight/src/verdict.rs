@@ -5,6 +5,7 @@
 //! are not as large as the filter says. Otherwise the tracks are believed.
 //! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
 
+use crate::pipeline::Summary;
 use crate::track::{ConfirmationConfig, Report};
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Result, Sink, TrackStatus, View};
@@ -34,23 +35,17 @@ struct Life {
     seen_at: u64,
 }
 
-/// What is counted of a run, in memory that does not grow with it.
+/// What is counted of a run beside its [`Summary`], in memory that does not grow with it.
 #[derive(Clone, Debug, Default)]
 pub struct Observed {
     frames: u64,
     frames_with_tracks: u64,
-    detections: u64,
-    first_ns: Option<i64>,
-    last_ns: i64,
-    most_at_once: u64,
     lives: BTreeMap<u64, Life>,
     ended: u64,
     ended_s: f64,
     followed: u64,
     rows: u64,
     large_rows: u64,
-    nis_sum: f64,
-    nis_n: u64,
 }
 
 /// What is thought of a run.
@@ -78,30 +73,22 @@ impl Observed {
     fn put(&mut self, view: &View<'_>) {
         let now = view.scan.time.ns;
         self.frames += 1;
-        self.first_ns.get_or_insert(now);
-        self.last_ns = now;
-        self.detections += view.scan.detections.len() as u64;
         let frame_px2 = view.frame.map(|f| (f.pixels.width() * f.pixels.height()) as f64);
-        let mut at_once = 0;
+        let mut is_there = false;
         for t in view.tracks {
             let life = self.lives.entry(t.id.0).or_default();
             (life.seen_at, life.hits) = (self.frames, life.hits + u32::from(t.detection.is_some()));
             if t.status == TrackStatus::Tentative {
                 continue;
             }
-            at_once += 1;
+            is_there = true;
             life.first_ns.get_or_insert(now);
             life.last_ns = now;
             self.rows += 1;
             let box_px2 = t.extent.width_px * t.extent.height_px;
             self.large_rows += u64::from(frame_px2.is_some_and(|area| box_px2 > LARGE_SHARE * area));
-            if let Some(i) = t.innovation.filter(|i| i.nis.is_finite()) {
-                self.nis_sum += i.nis;
-                self.nis_n += 1;
-            }
         }
-        self.frames_with_tracks += u64::from(at_once > 0);
-        self.most_at_once = self.most_at_once.max(at_once);
+        self.frames_with_tracks += u64::from(is_there);
         let seen_at = self.frames;
         let mut gone = std::mem::take(&mut self.lives);
         gone.retain(|_, life| {
@@ -124,18 +111,17 @@ impl Observed {
         }
     }
 
-    /// The verdict on what was seen of a run with that configuration.
-    pub fn verdict(&self, config: &Config) -> Verdict {
+    /// The verdict on a run with that configuration and that outcome.
+    pub fn verdict(&self, config: &Config, summary: &Summary) -> Verdict {
         let mut all = self.clone();
         std::mem::take(&mut all.lives).values().for_each(|life| all.end(life));
         let doubt = |sentence: String, next: Option<String>| Verdict { sentence, is_doubtful: true, next };
-        let over_s = self.first_ns.map_or(0.0, |first| (self.last_ns - first) as f64 * 1e-9);
-        let frames = counted(self.frames, "frame");
-        if self.detections == 0 {
+        let frames = counted(summary.frames, "frame");
+        if summary.detections == 0 {
             return doubt(format!("no track: nothing was detected in {frames}."), more_sensitive(config));
         }
         if all.ended == 0 {
-            let per_frame = self.detections as f64 / self.frames.max(1) as f64;
+            let per_frame = summary.detections as f64 / summary.frames.max(1) as f64;
             if config.tracker.report == Report::Moving && all.followed > 0 {
                 let things = counted(all.followed, "thing");
                 return doubt(
@@ -155,14 +141,14 @@ impl Observed {
             );
         }
         let mean_s = all.ended_s / all.ended as f64;
-        let nis = (self.nis_n >= LEAST_NIS).then(|| self.nis_sum / self.nis_n as f64);
+        let nis = summary.mean_nis.filter(|(mean, n)| *n >= LEAST_NIS && mean.is_finite()).map(|(mean, _)| mean);
         if 2 * self.large_rows > self.rows {
             return doubt(
                 format!("most boxes cover more than {:.0} % of the frame: ground, not targets.", 100.0 * LARGE_SHARE),
                 another_detector(config),
             );
         }
-        if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && over_s > SHORT_TRACKS as f64 * mean_s {
+        if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && summary.duration_s > SHORT_TRACKS as f64 * mean_s {
             return doubt(
                 format!(
                     "{} of {mean_s:.2} s in the mean: moments of clutter, or targets that are lost again and again.",
@@ -177,7 +163,7 @@ impl Observed {
             return doubt(
                 format!(
                     "{}, but the stated covariances are {words}: mean NIS {nis:.2}, 2 is honest.",
-                    self.found(mean_s)
+                    self.found(mean_s, summary)
                 ),
                 Some(format!("--set tracker.detection-covariance-scale={scale:.3}")),
             );
@@ -190,15 +176,15 @@ impl Observed {
             };
             format!("; the covariances are {words} (mean NIS {n:.2}, 2 is honest)")
         });
-        Verdict { sentence: format!("{}{honest}.", self.found(mean_s)), is_doubtful: false, next: None }
+        Verdict { sentence: format!("{}{honest}.", self.found(mean_s, summary)), is_doubtful: false, next: None }
     }
 
     /// What was found, without the opinion.
-    fn found(&self, mean_s: f64) -> String {
+    fn found(&self, mean_s: f64, summary: &Summary) -> String {
         let share = 100.0 * self.frames_with_tracks as f64 / self.frames.max(1) as f64;
         format!(
             "up to {} at once, one or more in {share:.0} % of the frames, followed for {mean_s:.1} s in the mean",
-            counted(self.most_at_once, "target")
+            counted(summary.most_at_once, "target")
         )
     }
 }
@@ -258,11 +244,15 @@ mod tests {
     fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, bool, f64, f64)>) -> Verdict {
         let mut seen = Observed::default();
         let mut sink = seen.sink();
+        let (mut most_at_once, mut nis_sum, mut nis_n) = (0, 0.0, 0);
         for k in 0..100 {
             let (index, time) = (FrameIndex(k), Timestamp::from_secs_f64(0.1 * k as f64));
             let frame = Frame { index, time, pixels: Pixels::Gray8(Image::filled(100, 80, 0)) };
             let d = Detection::at(Vector2::new(5.0, 5.0), Matrix2::identity());
             let scan = Scan::at(index, time).with_detections(vec![d; n_detections]);
+            let reported: Vec<f64> = tracks(k).iter().filter(|t| t.1).map(|t| t.3).collect();
+            most_at_once = most_at_once.max(reported.len() as u64);
+            (nis_sum, nis_n) = (nis_sum + reported.iter().sum::<f64>(), nis_n + reported.len() as u64);
             let states: Vec<TrackState> = tracks(k)
                 .into_iter()
                 .map(|(id, reported, side, nis)| TrackState {
@@ -277,7 +267,15 @@ mod tests {
                 .collect();
             sink.put(&View { frame: Some(&frame), scan: &scan, tracks: &states }).unwrap();
         }
-        seen.verdict(config)
+        let summary = Summary {
+            frames: 100,
+            duration_s: 9.9,
+            detections: 100 * n_detections as u64,
+            most_at_once,
+            mean_nis: (nis_n > 0).then(|| (nis_sum / nis_n as f64, nis_n)),
+            ..Summary::default()
+        };
+        seen.verdict(config, &summary)
     }
 
     fn isolated(report: Report) -> Config {

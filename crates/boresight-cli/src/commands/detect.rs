@@ -39,7 +39,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(plan.total(), "frames");
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(sink)];
     stop.run_begins();
-    let done = pipeline::run_on(args.input.n_threads(), plan.input, None, sinks, &mut |so_far| {
+    let done = pipeline::run_on(args.input.threads, plan.input, None, sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
         stop.go_on()
     });

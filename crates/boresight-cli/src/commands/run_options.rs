@@ -48,13 +48,6 @@ pub struct InputArgs {
     pub quiet: bool,
 }
 
-impl InputArgs {
-    /// Number of threads to run on.
-    pub fn n_threads(&self) -> usize {
-        self.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, usize::from)
-    }
-}
-
 /// How tracks are made; short for keys of the configuration.
 #[derive(Debug, Default, clap::Args)]
 pub struct TrackerArgs {

@@ -84,12 +84,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let bar = progress::bar(plan.total(), "frames");
     let started = std::time::Instant::now();
     stop.run_begins();
-    let mut done = pipeline::run_on(args.input.n_threads(), plan.input, Some(tracking), sinks, &mut |so_far| {
+    let mut done = pipeline::run_on(args.input.threads, plan.input, Some(tracking), sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
         stop.go_on()
     });
     bar.finish_and_clear();
-    let verdict = observed.verdict(&settings);
+    let verdict = observed.verdict(&settings, &done.summary);
     let next = verdict.next.filter(|options| can_be_added(&args, options));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {

@@ -10,6 +10,9 @@ use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
 const ASSUMED_SIDE: f64 = 0.05;
 
+/// What is said where a size is assumed.
+const NOTHING_SEEN: &str = "Nothing of that kind is seen in the frames looked at: the size is assumed.";
+
 /// Writes detector and tracker of that kind; `frames` are the first ones, `looked` those of the second look, if there are any.
 /// # Errors
 /// No colour of a moving thing's own; frames of more than one size or pixel type.
@@ -32,9 +35,15 @@ pub fn configure(
         }
         DetectorKind::Moving => moving::configure(&seen_or_assumed(scene, info, reasons), info, config, reasons),
         DetectorKind::Spot => {
-            particles::configure(&particles::count(frames, info)?.0, info, interval_s, config, reasons);
+            let seen = particles::count(frames, info)?.0;
+            reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
+            particles::configure(&seen, info, interval_s, config, reasons);
         }
-        DetectorKind::Local => cells::configure(&cells::count(frames, info)?.0, info, interval_s, config, reasons),
+        DetectorKind::Local => {
+            let seen = cells::count(frames, info)?.0;
+            reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
+            cells::configure(&seen, info, interval_s, config, reasons);
+        }
         DetectorKind::Colour => {
             let Some(reference) = colour::look(looked, scene) else {
                 return Err(Error::new(
@@ -122,6 +131,9 @@ mod tests {
                 assert_eq!(written, kind);
                 config.validate().unwrap();
                 assert!(reasons[0].contains(kind.name()), "{reasons:?}");
+                if kind == DetectorKind::Local && !target {
+                    assert_eq!(reasons[1], NOTHING_SEEN);
+                }
             }
         }
         let size = |target| asked(DetectorKind::Moving, target).unwrap().0.detector.cluster.min_area_px.unwrap();

@@ -43,8 +43,13 @@ pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
 /// Writes detector and tracker.
 pub fn configure(scene: &Scene, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let [w, h] = scene.size_px;
+    let camera = match scene.camera {
+        Camera::Fixed => "Fixed camera",
+        Camera::Moving => "Moving camera",
+        Camera::Unknown => "A camera whose motion cannot be seen",
+    };
     reasons.push(format!(
-        "Fixed camera; in {} of {} frames looked at something moves: {:.1} regions a frame, median {w:.0} x {h:.0} px, of which {:.0} % are isolated \
+        "{camera}; in {} of {} frames looked at something moves: {:.1} regions a frame, median {w:.0} x {h:.0} px, of which {:.0} % are isolated \
          blobs. So moving pixels are detected, against a background learned as it goes.",
         scene.n_moving,
         scene.n_frames,

@@ -57,12 +57,11 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
         Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
     let mut frames = read(base)?;
-    let info = frames.info().clone();
-    let scene = scene::look(probed(frames.ahead()), &info)?;
-    let look_again = (scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour))
-        && second_look::can_be_opened_twice(input);
-    let second = if look_again { second_look::frames(input, base, PROBE_FRAMES) } else { Vec::new() };
-    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)?;
+    let again = || match second_look::can_be_opened_twice(input) {
+        true => second_look::frames(input, base, PROBE_FRAMES),
+        false => Vec::new(),
+    };
+    let choice = choose_from(&mut frames, again, base, request)?;
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
     }
@@ -82,12 +81,23 @@ pub fn read_and_choose(
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, LEARN_BYTES);
     let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
+    let again = || again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
+    let choice = choose_from(&mut frames, again, base, request)?;
+    Ok((frames, choice))
+}
+
+/// The choice from frames read ahead; `again` gives those of the second look, which only a fixed camera or a colour asks for.
+fn choose_from(
+    frames: &mut Replay,
+    again: impl FnOnce() -> Vec<Frame>,
+    base: &Config,
+    request: &Request,
+) -> Result<Choice> {
+    let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
-    let again = again.filter(|_| look_again);
-    let second = again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
-    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)?;
-    Ok((frames, choice))
+    let second = if look_again { again() } else { Vec::new() };
+    choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)
 }
 
 /// The frames that are looked at for the choice.

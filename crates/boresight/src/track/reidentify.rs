@@ -85,7 +85,7 @@ impl Reidentification {
             id: track.id,
             filter: track.filter.clone(),
             at: now,
-            last_seen_ns: track.history.last_seen_ns(),
+            last_seen_ns: track.history.last_seen_ns,
             height_px: track.appearance.size[1],
         });
     }
@@ -131,8 +131,8 @@ impl Reidentification {
             }
         }
         for (i, t) in tracks.iter().enumerate() {
-            if i != new && t.reported && t.history.misses > 0 && in_time(t.history.last_seen_ns()) {
-                let gap_s = now.seconds_since(Timestamp::from_ns(t.history.last_seen_ns()));
+            if i != new && t.reported && t.history.misses > 0 && in_time(t.history.last_seen_ns) {
+                let gap_s = now.seconds_since(Timestamp::from_ns(t.history.last_seen_ns));
                 let ratio = log_ratio(&t.filter.kinematics(), t.appearance.size[1], &belief, height, gap_s, field);
                 consider(ratio, Earlier::Coasting(i));
             }

@@ -162,8 +162,7 @@ impl Tracker {
             {
                 cost.learn(&t.appearance, &scan.detections[j as usize]);
             }
-            let evidence =
-                Evidence { hit: outcome.hit, merged: outcome.merged, likelihood_ratio: outcome.likelihood_ratio };
+            let evidence = Evidence { hit: outcome.hit, likelihood_ratio: outcome.likelihood_ratio };
             save_time_alone(&mut t.history, &outcome, now, coast_s, secondary_s);
             let deleted = config.confirmation.decide(&mut t.history, evidence, now.ns) == Decision::Delete
                 || budget_is_over(&t.history, outcome.secondary, now, coast_s)

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     fn evidence(likelihood_ratio: f64) -> Evidence {
-        Evidence { hit: likelihood_ratio > 1.0, merged: false, likelihood_ratio }
+        Evidence { hit: likelihood_ratio > 1.0, likelihood_ratio }
     }
 
     #[test]

@@ -12,10 +12,8 @@ pub struct History {
     pub(super) value: f64,
     /// Largest score so far (sequential test), or ln odds that it ever was a target (existence).
     pub(super) best: f64,
-    /// Time of the last detection that was the track's own, ns.
-    pub last_hit_ns: i64,
-    /// Time of the last detection that was merged with another track's, ns.
-    pub last_merged_ns: i64,
+    /// Time of the last detection, its own or merged with another track's, ns: coasting counts from here.
+    pub last_seen_ns: i64,
     /// Time of the initiation, ns.
     pub initiated_ns: i64,
     /// Misses in a row.
@@ -32,12 +30,6 @@ pub struct History {
 }
 
 impl History {
-    /// Time of the last detection, its own or merged, ns: coasting counts from here.
-    #[inline]
-    pub fn last_seen_ns(&self) -> i64 {
-        self.last_hit_ns.max(self.last_merged_ns)
-    }
-
     /// Holds the track for confirmed.
     #[inline]
     pub fn accept(&mut self) {
@@ -58,7 +50,7 @@ impl History {
         self.scans = self.scans.saturating_add(1).min(64);
         if evidence.hit {
             self.misses = 0;
-            *(if evidence.merged { &mut self.last_merged_ns } else { &mut self.last_hit_ns }) = now_ns;
+            self.last_seen_ns = now_ns;
         } else {
             self.misses = self.misses.saturating_add(1);
         }
@@ -70,8 +62,6 @@ impl History {
 pub struct Evidence {
     /// A detection was assigned.
     pub hit: bool,
-    /// It is a merged measurement of several tracks: the track continues, but was not seen by itself.
-    pub merged: bool,
     /// Λ of this scan.
     pub likelihood_ratio: f64,
 }

@@ -107,7 +107,7 @@ mod tests {
                     let mut history = rule.begin(n_points, 0, 1e-5, 1.0);
                     let mut got = Vec::new();
                     for hit in &scans {
-                        let evidence = Evidence { hit: *hit, merged: false, likelihood_ratio: 1.0 };
+                        let evidence = Evidence { hit: *hit, likelihood_ratio: 1.0 };
                         got.push((rule.decide(&mut history, evidence, 0), history.accepted));
                         if got.last().is_some_and(|g| g.0 == Decision::Delete) {
                             break;
@@ -128,7 +128,7 @@ mod tests {
     fn a_tentative_track_is_deleted_when_its_time_is_over_not_before() {
         let rule = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 60, tentative_s: 2.0 });
         let mut history = rule.begin(1, 1_000_000_000, 1e-5, 1.0);
-        let miss = Evidence { hit: false, merged: false, likelihood_ratio: 1.0 };
+        let miss = Evidence { hit: false, likelihood_ratio: 1.0 };
         assert_eq!(rule.decide(&mut history, miss, 3_000_000_000), Decision::Keep);
         assert_eq!(rule.decide(&mut history, miss, 3_000_000_001), Decision::Delete);
     }
@@ -138,7 +138,7 @@ mod tests {
         let rule = ConfirmationConfig::default();
         let mut history = rule.begin(2, 0, 1e-5, 1.0);
         let mut after = |hit| {
-            rule.decide(&mut history, Evidence { hit, merged: false, likelihood_ratio: 1.0 }, 0);
+            rule.decide(&mut history, Evidence { hit, likelihood_ratio: 1.0 }, 0);
             rule.score(&history)
         };
         // 11, then 0 1 1 0 0: windows of at most five.

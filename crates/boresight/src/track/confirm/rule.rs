@@ -66,8 +66,7 @@ impl ConfirmationConfig {
             misses: 0,
             value,
             best: if let Self::Existence(_) = self { value.ln() } else { value },
-            last_hit_ns: now_ns,
-            last_merged_ns: now_ns,
+            last_seen_ns: now_ns,
             initiated_ns: now_ns,
             alone_s: 0.0,
         }
@@ -125,14 +124,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_merged_measurement_continues_a_track_but_is_no_detection_of_its_own() {
+    fn a_detection_ends_the_misses_and_is_the_last_seen() {
         let rule = ConfirmationConfig::default();
         let mut history = rule.begin(1, 0, 1e-5, 1.0);
-        rule.decide(&mut history, Evidence { hit: false, merged: false, likelihood_ratio: 1.0 }, 5);
-        assert_eq!((history.misses, history.last_seen_ns()), (1, 0));
-        rule.decide(&mut history, Evidence { hit: true, merged: true, likelihood_ratio: 1.0 }, 9);
-        assert_eq!((history.misses, history.last_hit_ns, history.last_seen_ns()), (0, 0, 9));
-        rule.decide(&mut history, Evidence { hit: true, merged: false, likelihood_ratio: 1.0 }, 12);
-        assert_eq!((history.last_hit_ns, history.last_merged_ns, history.last_seen_ns()), (12, 9, 12));
+        rule.decide(&mut history, Evidence { hit: false, likelihood_ratio: 1.0 }, 5);
+        assert_eq!((history.misses, history.last_seen_ns), (1, 0));
+        rule.decide(&mut history, Evidence { hit: true, likelihood_ratio: 1.0 }, 9);
+        assert_eq!((history.misses, history.last_seen_ns), (0, 9));
     }
 }

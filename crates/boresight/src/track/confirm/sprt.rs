@@ -96,8 +96,7 @@ mod tests {
         let rule = ConfirmationConfig::Sprt(config.clone());
         let mut history = rule.begin(1, 0, 1e-5, 1.0);
         let mut step = |ln: &f64| {
-            let decision =
-                rule.decide(&mut history, Evidence { hit: *ln > 0.0, merged: false, likelihood_ratio: ln.exp() }, 0);
+            let decision = rule.decide(&mut history, Evidence { hit: *ln > 0.0, likelihood_ratio: ln.exp() }, 0);
             (history.accepted, decision)
         };
         ln_ratios.iter().map(&mut step).collect()

@@ -45,7 +45,7 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
             t.filter.predict(dt_s)?;
             config.confirmation.predict_existence(&mut t.history, survival);
             let now = growth.context.now();
-            leaf.predicted = predicted_of(&t.filter, t.history.last_seen_ns(), t.last_place, now, config);
+            leaf.predicted = predicted_of(&t.filter, t.history.last_seen_ns, t.last_place, now, config);
             children(growth, &leaf, gates, &mut tree.leaves);
         }
         tree.leaves.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.path.cmp(&b.path)));
@@ -76,7 +76,7 @@ fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut
     let outcome = Outcome { likelihood_ratio: miss, ..Outcome::default() };
     let mut missed = Hypothesis { path, outcome, ..leaf.clone() };
     missed.score += miss.max(1e-300).ln();
-    let evidence = Evidence { hit: false, merged: false, likelihood_ratio: miss };
+    let evidence = Evidence { hit: false, likelihood_ratio: miss };
     let history = &mut missed.track.history;
     if config.confirmation.decide(history, evidence, scan.time.ns) == Decision::Keep
         && !budget_is_over(history, false, scan.time, growth.coast_budget_s)
@@ -112,7 +112,7 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
         - growth.clutter.at(d.position.x, d.position.y).max(1e-200).ln();
     child.score += log_ratio;
     let likelihood_ratio = log_ratio.clamp(-100.0, 100.0).exp();
-    let evidence = Evidence { hit: true, merged: false, likelihood_ratio };
+    let evidence = Evidence { hit: true, likelihood_ratio };
     if config.confirmation.decide(&mut child.track.history, evidence, scan.time.ns) == Decision::Delete {
         return None;
     }

@@ -25,7 +25,7 @@ pub(in crate::track) fn coast_budget_s(config: &TrackerConfig, interval: &ScanIn
 /// Whether a track's coasting budget had ended before the scan at `now`, that is in scans which are missing. `interval_s` is the usual
 /// interval between scans, above 0.
 pub(in crate::track) fn expired_in_gap(history: &History, now: Timestamp, budget_s: f64, interval_s: f64) -> bool {
-    let missed_s = now.seconds_since(Timestamp::from_ns(history.last_seen_ns()));
+    let missed_s = now.seconds_since(Timestamp::from_ns(history.last_seen_ns));
     // The newest scan in which the track can still be seen ends the budget, not the gap itself.
     missed_s > 1e-9 && missed_s - interval_s >= budget_s - 1e-9
 }
@@ -42,7 +42,7 @@ pub(in crate::track) fn budget_is_over(
         return f64::from(history.alone_s) <= -coast_budget_s;
     }
     // Without any detection it coasts from the last, its own or merged.
-    history.misses > 0 && now.seconds_since(Timestamp::from_ns(history.last_seen_ns())) >= coast_budget_s - 1e-9
+    history.misses > 0 && now.seconds_since(Timestamp::from_ns(history.last_seen_ns)) >= coast_budget_s - 1e-9
 }
 
 /// Saves the time since the last scan in which the track was seen, if it was seen alone in both, or takes it off, if it is merged now; before the history takes
@@ -55,7 +55,7 @@ pub(in crate::track) fn save_time_alone(
     coast_budget_s: f64,
     secondary_budget_s: f64,
 ) {
-    let since_s = now.seconds_since(Timestamp::from_ns(history.last_seen_ns())) as f32;
+    let since_s = now.seconds_since(Timestamp::from_ns(history.last_seen_ns)) as f32;
     if outcome.merged {
         history.alone_s -= since_s;
     } else if outcome.hit && history.misses == 0 {
@@ -89,10 +89,10 @@ mod tests {
 
     const S: i64 = 1_000_000_000;
 
-    /// A track last seen by itself at 1 s and in a merged measurement at 3 s, with `misses` since.
+    /// A track last seen at 3 s, with `misses` since.
     fn history(misses: u32) -> History {
         let mut h = ConfirmationConfig::default().begin(1, 0, 1e-5, 1.0);
-        (h.last_hit_ns, h.last_merged_ns, h.misses) = (S, 3 * S, misses);
+        (h.last_seen_ns, h.misses) = (3 * S, misses);
         h
     }
 
@@ -113,7 +113,7 @@ mod tests {
             let now = Timestamp::from_ns(S / 4 * scan);
             let outcome = Outcome { hit: true, merged, secondary: merged, ..Outcome::default() };
             save_time_alone(&mut h, &outcome, now, 0.5, secondary_s);
-            rule.decide(&mut h, Evidence { hit: true, merged, likelihood_ratio: 1.0 }, now.ns);
+            rule.decide(&mut h, Evidence { hit: true, likelihood_ratio: 1.0 }, now.ns);
             budget_is_over(&h, merged, now, 0.5)
         };
         (0..alone).for_each(|_| assert!(!next(false)));

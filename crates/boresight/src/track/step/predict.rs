@@ -27,7 +27,7 @@ pub(in crate::track) fn predict(
     for t in tracks {
         t.filter.predict(dt_s)?;
         config.confirmation.predict_existence(&mut t.history, survival);
-        predicted.push(predicted_of(&t.filter, t.history.last_seen_ns(), t.last_place, now, config));
+        predicted.push(predicted_of(&t.filter, t.history.last_seen_ns, t.last_place, now, config));
     }
     Ok(())
 }
