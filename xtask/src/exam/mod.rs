@@ -32,6 +32,9 @@ pub struct Args {
     /// False tracks an hour that are allowed, as with `boresight track`; nothing is written then.
     #[arg(long)]
     false_tracks_per_hour: Option<f64>,
+    /// A detector by its name, as with `boresight track`; nothing is written then.
+    #[arg(long)]
+    detector: Option<boresight::auto::DetectorKind>,
     /// Folder with SORT's tracks (`MOT17-02.txt` ...), made by `scripts/sort_peer.py`.
     #[arg(long)]
     sort: Option<PathBuf>,
@@ -94,6 +97,9 @@ fn summary(kind: &str, half: char, scores: &[&(Clip, char, Score)]) -> String {
 
 /// Runs the exam, prints it and writes `docs/exam.md`.
 pub fn run(args: &Args) -> Result<()> {
+    let request =
+        boresight::auto::Request { detector: args.detector, false_tracks_per_hour: args.false_tracks_per_hour };
+    let asked = !args.only.is_empty() || !args.sets.is_empty() || request != boresight::auto::Request::default();
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     let mut done: Vec<(Clip, char, Score)> = Vec::new();
     let (mut kind, mut n_of_kind) = ("", 0);
@@ -110,7 +116,7 @@ pub fn run(args: &Args) -> Result<()> {
         if !(clip.name.contains(&args.only) || clip.kind.contains(&args.only)) {
             continue;
         }
-        let s = score(&clip, &args.sets, args.false_tracks_per_hour)?;
+        let s = score(&clip, &args.sets, &request)?;
         let row = row(&clip, half, &s);
         print!("{row}");
         if !args.only.is_empty() {
@@ -143,7 +149,7 @@ pub fn run(args: &Args) -> Result<()> {
     print!("\n{head}{closing}");
     let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
     print!("\n{tables}");
-    if args.only.is_empty() && args.sets.is_empty() && args.false_tracks_per_hour.is_none() {
+    if !asked {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
         std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}"))?;
     }

@@ -33,26 +33,20 @@ pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Sim
         return None;
     }
     let around = (corner.x.round() as i64, corner.y.round() as i64);
-    let mut costs = [[f32::INFINITY; SIDE]; SIDE];
+    let place = |i: usize, j: usize| -> Option<(usize, usize)> {
+        let (x, y) = (around.0 + j as i64 - SEARCH, around.1 + i as i64 - SEARCH);
+        (x >= 0 && y >= 0 && x + PATCH as i64 <= w && y + PATCH as i64 <= h).then_some((x as usize, y as usize))
+    };
+    let cost_at = |i, j, most| place(i, j).map_or(f32::INFINITY, |at| difference(&template, now, at, most));
+    // The predicted place is seldom far off: what is worse than it need not be summed to the end.
+    let mut most = cost_at(SEARCH as usize, SEARCH as usize, f32::INFINITY);
     let mut best = (f32::INFINITY, 0, 0);
-    for (i, line) in costs.iter_mut().enumerate() {
-        let y = around.1 + i as i64 - SEARCH;
-        if y < 0 || y + PATCH as i64 > h {
-            continue;
-        }
-        for (j, cost) in line.iter_mut().enumerate() {
-            let x = around.0 + j as i64 - SEARCH;
-            if x < 0 || x + PATCH as i64 > w {
-                continue;
-            }
-            let mut sum = 0.0;
-            for (r, a) in template.iter().enumerate() {
-                let b = &now.row(y as usize + r)[x as usize..x as usize + PATCH];
-                sum += a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>();
-            }
-            *cost = sum;
-            if sum < best.0 {
-                best = (sum, i, j);
+    for i in 0..SIDE {
+        for j in 0..SIDE {
+            let cost = cost_at(i, j, most);
+            if cost < best.0 {
+                best = (cost, i, j);
+                most = most.min(cost);
             }
         }
     }
@@ -64,11 +58,31 @@ pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Sim
         let bend = before - 2.0 * at + after;
         (bend.is_finite() && bend > 0.0).then(|| f64::from(0.5 * (before - after) / bend).clamp(-0.5, 0.5))
     };
-    let dx = vertex(costs[i][j - 1], cost, costs[i][j + 1])?;
-    let dy = vertex(costs[i - 1][j], cost, costs[i + 1][j])?;
+    let whole = |i, j| cost_at(i, j, f32::INFINITY);
+    let dx = vertex(whole(i, j - 1), cost, whole(i, j + 1))?;
+    let dy = vertex(whole(i - 1, j), cost, whole(i + 1, j))?;
     let (x, y) = (around.0 + j as i64 - SEARCH, around.1 + i as i64 - SEARCH);
     let part = refine(&template, now, (x, y)).unwrap_or(Vector2::new(dx, dy));
     Some(Vector2::new(x as f64 + half, y as f64 + half) + part)
+}
+
+/// Sum of absolute differences with the template's first pixel at `(x, y)`; what exceeds `most` may be infinite.
+#[inline]
+fn difference(template: &Block, now: &Image<f32>, (x, y): (usize, usize), most: f32) -> f32 {
+    // One sum a column: they are added in vectors, and together only where it may end the matter.
+    let mut sums = [0.0f32; PATCH];
+    for (r, line) in template.iter().enumerate() {
+        let Some(row) = now.row(y + r).get(x..).and_then(|row| row.first_chunk::<PATCH>()) else {
+            return f32::INFINITY;
+        };
+        for ((sum, a), b) in sums.iter_mut().zip(line).zip(row) {
+            *sum += (a - b).abs();
+        }
+        if r % 3 == 2 && r + 1 < PATCH && sums.iter().sum::<f32>() > most {
+            return f32::INFINITY;
+        }
+    }
+    sums.iter().sum()
 }
 
 /// The patch as it should look now; `None` if that needs pixels outside the key frame.
@@ -130,14 +144,7 @@ fn refine(template: &Block, now: &Image<f32>, at: (i64, i64)) -> Option<Vector2<
     let factor = square.cholesky()?;
     let mut part = Vector2::<f64>::zeros();
     for _ in 0..STEPS {
-        let mut sum = Vector2::<f32>::zeros();
-        for (r, (line, g)) in template.iter().zip(&gradients).enumerate() {
-            let y = at.1 as f64 + r as f64 + part.y;
-            for (c, (t, g)) in line.iter().zip(g).enumerate() {
-                let value = bilinear(now, Vector2::new(at.0 as f64 + c as f64 + part.x, y))?;
-                sum += g * (value - t);
-            }
-        }
+        let sum = pull(template, &gradients, now, Vector2::new(at.0 as f64, at.1 as f64) + part)?;
         let step = factor.solve(&sum.cast());
         part -= step;
         if !(part.x.abs() <= 1.0 && part.y.abs() <= 1.0) {
@@ -148,6 +155,34 @@ fn refine(template: &Block, now: &Image<f32>, at: (i64, i64)) -> Option<Vector2<
         }
     }
     Some(part)
+}
+
+/// Sum of g e with the template's first pixel at `at`; `None` if that needs pixels outside.
+fn pull(
+    template: &Block,
+    gradients: &[[Vector2<f32>; PATCH]; PATCH],
+    now: &Image<f32>,
+    at: Vector2<f64>,
+) -> Option<Vector2<f32>> {
+    if !(at.x >= 0.0 && at.y >= 0.0) {
+        return None;
+    }
+    // All pixels of the patch lie at the same fraction of a pixel.
+    let (x, y) = (at.x as usize, at.y as usize);
+    let (u, v) = ((at.x - x as f64) as f32, (at.y - y as f64) as f32);
+    let row = |r: usize| (y + r < now.height()).then(|| now.row(y + r).get(x..x + PATCH + 1)).flatten();
+    let mut above = row(0)?;
+    let mut sum = Vector2::<f32>::zeros();
+    for (r, (line, g)) in template.iter().zip(gradients).enumerate() {
+        let below = row(r + 1)?;
+        for c in 0..PATCH {
+            let upper = above[c] * (1.0 - u) + above[c + 1] * u;
+            let lower = below[c] * (1.0 - u) + below[c + 1] * u;
+            sum += g[c] * (upper * (1.0 - v) + lower * v - line[c]);
+        }
+        above = below;
+    }
+    Some(sum)
 }
 
 #[cfg(test)]

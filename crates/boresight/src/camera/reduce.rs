@@ -26,6 +26,10 @@ pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>) {
 fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
     let (w, h) = (image.width() / factor, image.height() / factor);
     out.reset(w, h, 0.0);
+    if factor == 1 {
+        out.as_mut_slice().iter_mut().zip(image.as_slice()).for_each(|(o, &p)| *o = value(p));
+        return;
+    }
     let scale = 1.0 / (factor * factor) as f32;
     for y in 0..h {
         for dy in 0..factor {

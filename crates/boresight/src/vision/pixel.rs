@@ -64,6 +64,7 @@ macro_rules! integer_pixel {
             fn value(self) -> f64 {
                 f64::from(self)
             }
+            #[inline]
             fn value_f32(self) -> f32 {
                 f32::from(self)
             }

@@ -29,6 +29,8 @@ pub struct Reference {
 const WINDOWS: usize = 24;
 /// Below this saturation a pixel has no hue worth the name.
 const MIN_SATURATION: f64 = 0.1;
+/// Pixels of the grid that a piece has at least.
+const MIN_PIXELS: usize = 6;
 /// Difference of a channel from the background that counts as moving, counts.
 const MOVED: u8 = 25;
 
@@ -47,13 +49,22 @@ pub fn choose_reference(frames: &[&Image<[u8; 3]>]) -> Option<Reference> {
     let mut found: Vec<(f64, Vec<usize>, Vec<[u8; 3]>)> = vec![(0.0, Vec::new(), Vec::new()); WINDOWS];
     let mut hues = vec![u8::MAX; gw * gh];
     for pixels in &grids {
+        let mut n_of_sector = [0usize; WINDOWS];
         for ((hue, p), b) in hues.iter_mut().zip(pixels).zip(&background) {
-            let moved = (0..3).any(|c| p[c].abs_diff(b[c]) > MOVED);
-            let c = hsi(*p);
-            *hue = if moved && c.saturation >= MIN_SATURATION { sector(c.hue_deg) } else { u8::MAX };
+            *hue = u8::MAX;
+            if (0..3).any(|c| p[c].abs_diff(b[c]) > MOVED) {
+                let c = hsi(*p);
+                if c.saturation >= MIN_SATURATION {
+                    *hue = sector(c.hue_deg);
+                    n_of_sector[usize::from(*hue)] += 1;
+                }
+            }
         }
         for (k, found) in found.iter_mut().enumerate() {
             let in_window = |hue: u8| hue != u8::MAX && near(usize::from(hue), k);
+            if (0..WINDOWS).filter(|&s| near(s, k)).map(|s| n_of_sector[s]).sum::<usize>() < MIN_PIXELS {
+                continue;
+            }
             let Some(piece) = compact_piece(&hues, gw, gh, in_window) else { continue };
             let colours = piece.iter().map(|&i| pixels[i]);
             let saturation = colours.clone().map(|p| hsi(p).saturation).sum::<f64>() / piece.len() as f64;
@@ -153,7 +164,7 @@ fn compact_piece(hues: &[u8], w: usize, h: usize, inside: impl Fn(u8) -> bool) -
     let (x0, x1, y0, y1) = (xs().min()?, xs().max()?, ys().min()?, ys().max()?);
     let whole = x0 > 0 && y0 > 0 && x1 + 1 < w && y1 + 1 < h;
     let filled = largest.len() as f64 >= 0.45 * ((x1 + 1 - x0) * (y1 + 1 - y0)) as f64;
-    (whole && filled && largest.len() >= 6 && 2 * largest.len() >= all).then_some(largest)
+    (whole && filled && largest.len() >= MIN_PIXELS && 2 * largest.len() >= all).then_some(largest)
 }
 
 #[cfg(test)]

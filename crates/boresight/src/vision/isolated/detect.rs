@@ -15,9 +15,10 @@
 //! sweep over the rows a level, about 2 ms for 320 x 256 with all levels and textured ground.
 
 use super::config::IsolatedConfig;
+use super::highest::Highest;
 use super::levels;
 use super::near::Near;
-use super::ring::{Candidate, Ring};
+use super::ring::{Candidate, Known, Ring};
 use super::sums::Sums;
 use super::sweep::{self, Sweep};
 use crate::vision::centroid::{Surroundings, centroid};
@@ -35,6 +36,7 @@ use crate::{Detection, Image, Result};
 #[derive(Debug)]
 pub struct IsolatedDetector {
     isolated: IsolatedConfig,
+    highest: Highest,
     sweep: Sweep,
     ring: Ring,
     sums: Sums,
@@ -52,6 +54,7 @@ impl IsolatedDetector {
     pub fn new(config: &IsolatedConfig) -> Self {
         Self {
             isolated: config.clone(),
+            highest: Highest::default(),
             sweep: Sweep::default(),
             ring: Ring::default(),
             sums: Sums::default(),
@@ -95,10 +98,13 @@ impl IsolatedDetector {
     ) {
         let isolated = &self.isolated;
         levels::choose(image, side, isolated.levels as usize, noise, &mut self.samples, &mut self.levels);
+        let sign = if side == Side::Bright { 1.0 } else { -1.0 };
+        self.highest.read(image, sign);
         self.candidates.clear();
         let (min_area, max_area) = config.cluster.area_limits();
+        let around = Known { sums: &self.sums, highest: Some(&self.highest) };
         for &level in &self.levels {
-            self.sweep.run(image, side, level, &mut self.bits);
+            self.sweep.run(image, &self.highest, side, level, &mut self.bits);
             for blob in self.sweep.blobs() {
                 let (w, h) = (blob.right - blob.left + 1, blob.bottom - blob.top + 1);
                 let (short, long) = (f64::from(w.min(h)), f64::from(w.max(h)));
@@ -115,7 +121,7 @@ impl IsolatedDetector {
                 {
                     continue;
                 }
-                if let Some(c) = self.ring.judge(image, &self.sums, side, level, &blob, noise, isolated.min_score)
+                if let Some(c) = self.ring.judge(image, &around, side, level, &blob, noise, isolated.min_score)
                     && c.score >= isolated.min_score
                 {
                     self.candidates.push(Candidate { number: self.candidates.len(), ..c });

@@ -2,6 +2,7 @@
 
 mod config;
 mod detect;
+mod highest;
 mod levels;
 mod near;
 mod ring;

@@ -2,6 +2,7 @@
 //!
 //! The full moments of a cluster are taken later and only for the few that count.
 
+use super::highest::Highest;
 use crate::Image;
 use crate::union_find::{Node, root};
 use crate::vision::pixel::Pixel;
@@ -71,13 +72,25 @@ pub struct Sweep {
 
 impl Sweep {
     /// Finds the clusters of the pixels beyond `level`; `bits` is scratch of one row.
-    pub fn run<T: Pixel>(&mut self, image: &Image<T>, side: Side, level: f64, bits: &mut [u64]) {
+    pub fn run<T: Pixel>(&mut self, image: &Image<T>, highest: &Highest, side: Side, level: f64, bits: &mut [u64]) {
         self.blobs.clear();
         self.above.clear();
         let Some((low, high)) = band::<T>(side, level) else { return };
+        // Rounded down: a word too many costs little.
+        let least = (if side == Side::Bright { level } else { -level } as f32).next_down();
         for y in 0..image.height() {
-            T::band_bits(image.row(y), low, high, bits);
-            self.row(y as u32, bits);
+            let (mut any, row) = (false, image.row(y));
+            bits.fill(0);
+            for w in highest.words(y, least) {
+                let Some(bits) = bits.get_mut(w..=w) else { break };
+                T::band_bits(&row[64 * w..row.len().min(64 * (w + 1))], low, high, bits);
+                any |= bits[0] != 0;
+            }
+            if any {
+                self.row(y as u32, bits);
+            } else {
+                self.above.clear();
+            }
         }
     }
 
