@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What a run can write, and what it may remove if an earlier run says that it wrote it; a name with `/` is a folder of frames.
-const NAMES: [&str; 9] = [
+const NAMES: [&str; 11] = [
     "tracks.csv",
     "detections.csv",
     "mot.txt",
@@ -19,6 +19,8 @@ const NAMES: [&str; 9] = [
     "annotated.mp4",
     "frames/",
     "report.html",
+    "summary.json",
+    "thumbnail.png",
     "config.toml",
 ];
 /// Starts the line of `config.toml` that lists the files.
