@@ -65,8 +65,11 @@ pub struct Args {
     /// Take one part of N of the inputs, told by their names: one part for each machine, all with one folder.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Also write the table of all tracks as Parquet, tracks.parquet (a build with the feature `parquet`).
+    #[arg(long)]
+    parquet: bool,
     /// Run nothing: hash the inputs and outputs that the manifest names, and say what is missing or differs.
-    #[arg(long, conflicts_with_all = ["resume", "shard", "jobs", "timeout", "max_memory", "options"])]
+    #[arg(long, conflicts_with_all = ["resume", "shard", "jobs", "timeout", "max_memory", "parquet", "options"])]
     verify: bool,
     /// Print nothing but errors.
     #[arg(short, long)]
@@ -98,6 +101,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.output.as_os_str() == "-" {
         return Err(Error::new(ErrorKind::Config, "expected a folder: the results are many files")
             .at("--output -")
+            .into());
+    }
+    if args.parquet && !cfg!(feature = "parquet") {
+        return Err(Error::new(ErrorKind::Unsupported, "this build writes no Parquet")
+            .at("--parquet")
+            .hint("build with the feature: cargo install --path crates/boresight-cli --features parquet")
             .into());
     }
     let mut inputs = inputs::find(&args.inputs)?;
@@ -140,6 +149,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if args.shard.is_none() {
         let n_rows = all_tracks::write(&args.output, &entries)?;
+        #[cfg(feature = "parquet")]
+        if args.parquet {
+            all_tracks::write_parquet(&args.output, &entries)?;
+        }
         boresight::io::write_whole(args.output.join("index.html"), page::page(&args.output, &entries).as_bytes())?;
         if !args.quiet {
             say!("{} inputs, {} failed, {n_rows} rows of tracks", entries.len(), failed.len());

@@ -1,5 +1,6 @@
 //! One file a command: its arguments and what it does.
 
+mod also;
 pub mod batch;
 pub mod completions;
 pub mod config;

@@ -8,6 +8,7 @@ use std::path::Path;
 
 /// Counts, verdict and warnings of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RunSummary {
     /// The input as it was given.
     pub input: String,

@@ -1,5 +1,6 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
+use super::also;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
 use super::run_summary::RunSummary;
@@ -25,6 +26,8 @@ const EXAMPLES: &str = "Examples:
       one parameter changed, another filter
   boresight track detections.csv --rate-hz 30
       tracks from detections made elsewhere (also MOTChallenge det.txt)
+  boresight track flight.mp4 --also geff,cvat
+      also for napari and CVAT
   boresight track rtsp://camera/stream --no-video
       anything an installed ffmpeg can read; end it with Ctrl-C";
 
@@ -60,6 +63,9 @@ pub struct Args {
     /// Also write a small picture, the first of the frames with the most tracks, to DIR/thumbnail.png.
     #[arg(long)]
     thumbnail: bool,
+    /// Also write the confirmed tracks for other programs: geff, trackmate-xml, cvat, mot-zip, napari, parquet ..
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = also::file_name())]
+    also: Vec<&'static str>,
     /// End at once when standard input ends: for a program that starts this one and may be killed.
     #[arg(long, hide = true)]
     end_with_stdin: bool,
@@ -119,6 +125,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         add_outcome(&mut notes, &done);
         if let Some(report) = report {
             done.unwritten.extend(report.write(&notes).err());
+        }
+        // An earlier run's table may still stand under the name of one that failed.
+        let failed = |e: &boresight::Error| e.place().is_some_and(|place| place.contains("tracks.csv"));
+        if !done.unwritten.iter().any(failed) {
+            done.unwritten.extend(also::write(&folder, &args.also, quiet));
         }
         if folder.makes("summary.json") {
             let told = RunSummary::new(input, &done.summary, &verdict, next.as_deref(), &notes.warnings);
@@ -184,7 +195,7 @@ fn made(args: &Args) -> Vec<&'static str> {
         ("thumbnail.png", args.thumbnail),
         ("config.toml", true),
     ];
-    asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).collect()
+    asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
 fn sinks(folder: &RunFolder) -> boresight::Result<Vec<Box<dyn Sink>>> {

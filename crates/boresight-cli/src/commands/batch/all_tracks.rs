@@ -45,6 +45,20 @@ pub fn write(dir: &Path, entries: &[Entry]) -> Result<u64> {
     Ok(n_rows)
 }
 
+/// Writes the same rows as `tracks.parquet`; the file appears whole.
+/// # Errors
+/// As [`write`].
+#[cfg(feature = "parquet")]
+pub fn write_parquet(dir: &Path, entries: &[Entry]) -> Result<u64> {
+    use boresight::io::tracks::{ReadOptions, read, write_parquet};
+    let done = entries.iter().filter(|e| e.status == Status::Done && e.outputs.contains_key("tracks.csv"));
+    let tables = done.map(|e| {
+        let path = dir.join(&e.folder).join("tracks.csv");
+        Ok((e.input.clone(), read(&path, None, ReadOptions::default(), true)?.table))
+    });
+    write_parquet(dir.join("tracks.parquet"), tables)
+}
+
 /// A name as the first cell of a row, with its comma.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r', ';', '#', ' ']) {
