@@ -8,7 +8,7 @@ use std::process::ExitCode;
 /// The table of exit codes, shown under every help text.
 pub const HELP: &str = "Exit codes:
   0  done
-  1  a demand was not met (evaluate --require), or an unforeseen error
+  1  a demand was not met (evaluate --require), an input of a batch failed, or an unforeseen error
   2  wrong usage or configuration
   3  an input is missing, damaged or of a kind that is not read
   4  a program that is needed is not installed (ffmpeg)

@@ -23,6 +23,8 @@ struct Cli {
 enum Command {
     /// Track what moves in a video, an image sequence or a table of detections.
     Track(commands::track::Args),
+    /// Track many videos, each in a process of its own; go on after a kill; verify.
+    Batch(commands::batch::Args),
     /// Detect what stands out in a video or an image sequence.
     Detect(commands::detect::Args),
     /// Score tracks, detections or centroids against a truth.
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
+        Command::Batch(args) => commands::batch::run(args),
         Command::Detect(args) => commands::detect::run(args),
         Command::Evaluate(args) => commands::evaluate::run(*args),
         Command::Fuse(args) => commands::fuse::run(args),

@@ -91,6 +91,55 @@ fn a_loss_that_is_not_allowed_writes_nothing() {
 }
 
 #[test]
+fn formats_of_other_programs_are_written_whole_and_say_what_they_lose() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("in.csv");
+    std::fs::write(&input, "frame,track_id,x,y,width,height,score,mood\n0,3,5,6,2,4,0.5,good\n2,3,6,6,2,4,0.5,bad\n")
+        .unwrap();
+    let to = |name: &str, more: &[&str]| {
+        let output = dir.path().join(name);
+        let args = ["convert", input.to_str().unwrap(), output.to_str().unwrap(), "--to", name];
+        (boresight(&[&args[..], more].concat()), output)
+    };
+    for (name, lost) in [
+        ("geff", "does not hold: mood\n"),
+        ("trackmate-xml", "width, height (a disc of the same area), mood"),
+        ("cvat", "does not hold: score, mood"),
+        ("mot-zip", "does not hold: score, mood"),
+        ("napari", "width, height, score, mood"),
+    ] {
+        let (o, output) = to(name, &["--lossless"]);
+        assert!(o.status.code() == Some(3) && !output.exists(), "{name}: {}", text(&o.stderr));
+        let (o, output) = to(name, &[]);
+        assert!(o.status.success() && output.exists(), "{name}: {}", text(&o.stderr));
+        assert!(text(&o.stderr).contains(lost), "{name}: {}", text(&o.stderr));
+        // They are written only: who reads them back are others (crates/boresight-py/tests/test_formats.py).
+        let o = boresight(&["convert", output.to_str().unwrap(), "-", "--from", name, "--to", "csv"]);
+        assert_eq!(o.status.code(), Some(2), "{name}");
+    }
+    let (o, _) = to("parquet", &[]);
+    assert_eq!(o.status.success(), cfg!(feature = "parquet"), "{}", text(&o.stderr));
+    assert!(cfg!(feature = "parquet") || text(&o.stderr).contains("--features parquet"));
+}
+
+#[test]
+fn detections_of_coco_are_a_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("results.json");
+    let rows = "[{\"image_id\": 0, \"category_id\": 3, \"bbox\": [0, 2, 4, 6], \"score\": 0.5, \"track_id\": 7}]";
+    std::fs::write(&input, rows).unwrap();
+    let o = boresight(&["convert", input.to_str().unwrap(), "-", "--to", "csv"]);
+    let want = "frame,track_id,x_px,y_px,width_px,height_px,score,class\n0,7,1.5,4.5,4,6,0.5,3\n";
+    assert_eq!(text(&o.stdout), want, "{}", text(&o.stderr));
+    let out = dir.path().join("out");
+    let o = boresight(&["track", input.to_str().unwrap(), "-o", out.to_str().unwrap(), "--rate-hz", "10"]);
+    assert!(o.status.success() && out.join("detections.csv").exists(), "{}", text(&o.stderr));
+    std::fs::write(&input, "{\"frame\": 1}\n").unwrap();
+    let o = boresight(&["track", input.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+    assert!(o.status.code() == Some(3) && text(&o.stderr).contains("not COCO"), "{}", text(&o.stderr));
+}
+
+#[test]
 fn cells_keep_their_parents_and_a_missing_input_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let input = dir.path().join("cells.csv");

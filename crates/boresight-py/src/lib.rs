@@ -54,6 +54,12 @@ mod _boresight {
     #[pymodule_export]
     use super::tracks::Tracks;
 
+    /// The processor's architecture and the vector instructions it has.
+    #[pyfunction]
+    fn cpu_features() -> Vec<&'static str> {
+        boresight::cpu_features()
+    }
+
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -4,8 +4,8 @@ use crate::arrow;
 use crate::columns::{Columns, STATUS};
 use crate::config::PyConfig;
 use crate::errors::{OrRaise, raised, refused};
-use boresight::io::tracks::{Format, write};
-use boresight::io::{JsonLines, MotWriter, TRACKS_HEADER, TracksCsv, write_whole};
+use boresight::io::tracks::{Format, write_path};
+use boresight::io::{JsonLines, MotWriter, TRACKS_HEADER, TracksCsv};
 use boresight::pipeline::Summary;
 use boresight::report::{HtmlReport, Notes};
 use boresight::{Config, Sink};
@@ -132,13 +132,11 @@ impl Tracks {
                 "mot" => Box::new(MotWriter::create(&path)?),
                 "jsonl" => Box::new(JsonLines::create(&path)?),
                 other => {
-                    let Some(format) = Format::ALL.into_iter().find(|f| f.name() == other && *f != Format::Ctc) else {
+                    let mut all = Format::ALL.into_iter().chain(Format::EXPORTS);
+                    let Some(format) = all.find(|f| f.name() == other && *f != Format::Ctc) else {
                         return Ok(None);
                     };
-                    let mut bytes = Vec::new();
-                    let dropped = write(&self.columns.table(&self.label, true)?, format, &mut bytes)?;
-                    write_whole(&path, &bytes)?;
-                    return Ok(Some(dropped));
+                    return write_path(&self.columns.table(&self.label, true)?, format, Some(&path)).map(Some);
                 }
             };
             self.columns.replay(sink.as_mut())?;
@@ -146,7 +144,7 @@ impl Tracks {
             Ok(Some(Vec::new()))
         });
         written.or_raise(py)?.ok_or_else(|| {
-            let known = "csv, mot, mot-truth, kitti, trackpy, trackmate, btrack, ultrack, jsonl, parquet";
+            let known = "csv, mot, mot-truth, kitti, trackpy, trackmate, btrack, ultrack, geff, trackmate-xml, cvat, mot-zip, napari, jsonl, parquet";
             refused("there is no such format", format!("format = {format}"), format!("formats: {known}"))
         })
     }

@@ -12,7 +12,7 @@ import warnings
 import pytest
 from conftest import ROOT
 
-PAGES = ["docs/python.md", "docs/from-trackpy.md", "docs/from-sort.md", "docs/from-filterpy.md", "README.md"]
+PAGES = ["docs/python.md", "docs/batch.md", "docs/from-trackpy.md", "docs/from-sort.md", "docs/from-filterpy.md", "README.md"]
 FENCE = re.compile(r"^```python(?P<words>[^\n]*)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

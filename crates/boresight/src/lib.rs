@@ -70,6 +70,7 @@ pub mod auto;
 pub mod camera;
 mod camera_motion;
 pub mod config;
+mod cpu;
 mod detection;
 #[cfg(feature = "draw")]
 pub mod draw;
@@ -96,6 +97,7 @@ pub mod vision;
 
 pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;
+pub use cpu::cpu_features;
 pub use detection::{ClassId, Detection, Extent, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};

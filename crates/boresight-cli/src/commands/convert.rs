@@ -1,8 +1,8 @@
 //! `boresight convert`: a table of tracks from one format into another, saying what is lost.
 
 use crate::console::{self, say};
-use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc_write, read, write};
-use boresight::io::{refuse_to_overwrite, write_whole};
+use boresight::io::refuse_to_overwrite;
+use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc_write, read, write, write_path};
 use boresight::{Error, ErrorKind};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,15 +17,16 @@ stays the same place.",
   boresight convert out/tracks.csv result.txt --to mot         for a MOTChallenge evaluation
   boresight convert 0006.txt cars.csv --to csv                 KITTI labels, all columns kept
   boresight convert spots.csv RES --to ctc --size 1024x1024    a folder of label images and res_track.txt
+  boresight convert out/tracks.csv tracks.geff --to geff       a graph with covariance ellipsoids, for napari and others
   boresight convert gt.txt - --to trackpy --lossless           fails if a column would be lost"
 )]
 pub struct Args {
     /// The table: MOTChallenge, KITTI, CSV with named columns, or a Cell Tracking Challenge folder.
     input: PathBuf,
-    /// Where to write: a file, a folder for ctc, or - for standard output.
+    /// Where to write: a file, a folder for ctc and geff, or - for standard output.
     output: PathBuf,
     /// Format to write.
-    #[arg(long, value_parser = super::evaluate::format())]
+    #[arg(long, value_parser = super::evaluate::written_format())]
     to: Format,
     /// Format of the input, if its look deceives.
     #[arg(long, value_parser = super::evaluate::format())]
@@ -62,9 +63,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if file.bad.without_track > 0 {
         say!("note: {} rows belong to no track and were left out", file.bad.without_track);
     }
+    let to_stdout = args.output.as_os_str() == "-";
+    if args.to.is_folder() && (to_stdout || args.output.is_file()) {
+        return Err(Error::new(ErrorKind::Config, format!("expected a folder: {} is several files", args.to.name()))
+            .at(args.output.display())
+            .into());
+    }
     let mut bytes = Vec::new();
-    let to_folder = args.to == Format::Ctc;
-    let dropped = if to_folder { to_ctc(&args, &file)? } else { write(&file.table, args.to, &mut bytes)? };
+    let place = (!args.lossless).then_some(args.output.as_path());
+    let dropped = match args.to {
+        _ if to_stdout => write(&file.table, args.to, &mut bytes)?,
+        Format::Ctc => to_ctc(&args, &file)?,
+        to => write_path(&file.table, to, place)?,
+    };
     if !dropped.is_empty() {
         let what = format!("{} does not hold: {}", args.to.name(), dropped.join(", "));
         if args.lossless {
@@ -79,12 +90,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if mot(file.format) && args.to == Format::Kitti || file.format == Format::Kitti && mot(args.to) {
         say!("note: classes keep their numbers: 1 is a car in KITTI and a pedestrian in MOTChallenge");
     }
-    if args.output.as_os_str() == "-" {
+    if to_stdout {
         console::print(&bytes)?;
         return Ok(ExitCode::SUCCESS);
     }
-    if !to_folder {
-        write_whole(&args.output, &bytes)?;
+    if args.lossless && args.to != Format::Ctc {
+        write_path(&file.table, args.to, Some(&args.output))?;
     }
     if file.table.n_rows() == 0 {
         say!("warning: {}: the table has no rows", args.input.display());
@@ -102,10 +113,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Writes a folder of label images.
 fn to_ctc(args: &Args, file: &TrackFile) -> boresight::Result<Vec<String>> {
-    if args.output.as_os_str() == "-" || args.output.is_file() {
-        return Err(Error::new(ErrorKind::Config, "expected a folder: ctc is a table and an image for each frame")
-            .at(args.output.display()));
-    }
     let size = args.size.map(|(w, h)| (w as usize, h as usize));
     let dropped = ctc_write::write_folder(&file.table, None, size)?;
     if args.lossless && !dropped.is_empty() {

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-pub use arguments::{Args, format, size};
+pub use arguments::{Args, format, size, written_format};
 
 /// Runs the command.
 /// # Errors

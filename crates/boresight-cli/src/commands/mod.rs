@@ -1,5 +1,7 @@
 //! One file a command: its arguments and what it does.
 
+mod also;
+pub mod batch;
 pub mod completions;
 pub mod config;
 pub mod convert;
@@ -9,6 +11,7 @@ pub mod fuse;
 pub mod reproduce;
 mod run_folder;
 mod run_options;
+mod run_summary;
 pub mod simulate;
 pub mod smooth;
 pub mod stitch;

@@ -9,8 +9,8 @@ use boresight::{Error, ErrorKind};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a run can write, and what it may remove if an earlier run says that it wrote it; a name with `/` is a folder of frames.
-const NAMES: [&str; 9] = [
+/// What a run can write, and what it may remove if an earlier run says that it wrote it; a name with `/` is a folder.
+const NAMES: [&str; 22] = [
     "tracks.csv",
     "detections.csv",
     "mot.txt",
@@ -19,6 +19,19 @@ const NAMES: [&str; 9] = [
     "annotated.mp4",
     "frames/",
     "report.html",
+    "summary.json",
+    "thumbnail.png",
+    "tracks.geff/",
+    "trackmate.xml",
+    "cvat.xml",
+    "mot.zip",
+    "napari.npy",
+    "tracks.parquet",
+    "kitti.txt",
+    "trackpy.csv",
+    "trackmate.csv",
+    "btrack.csv",
+    "ultrack.csv",
     "config.toml",
 ];
 /// Starts the line of `config.toml` that lists the files.
@@ -139,7 +152,10 @@ impl LeftOver {
     /// Removes them; what cannot be removed stays, as anything else in the folder.
     pub fn remove(self) {
         for path in self.0 {
-            if path.is_dir() {
+            if path.join(".zattrs").is_file() {
+                // A folder as `--also geff` writes it.
+                let _ = std::fs::remove_dir_all(path);
+            } else if path.is_dir() {
                 boresight::draw::PngFolder::remove(&path);
             } else {
                 let _ = std::fs::remove_file(path);

@@ -263,6 +263,14 @@ impl Stop {
     }
 }
 
+/// Ends the program at once when standard input ends: whoever started it and held the other end is gone, in whatever way.
+pub fn end_with_stdin() {
+    std::thread::spawn(|| {
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        std::process::exit(130);
+    });
+}
+
 /// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
 /// # Errors
 /// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.

@@ -1,10 +1,12 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
+use super::also;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
+use super::run_summary::RunSummary;
 use crate::console::say;
 use crate::progress;
-use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder};
+use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder, Thumbnail};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
@@ -24,6 +26,8 @@ const EXAMPLES: &str = "Examples:
       one parameter changed, another filter
   boresight track detections.csv --rate-hz 30
       tracks from detections made elsewhere (also MOTChallenge det.txt)
+  boresight track flight.mp4 --also geff,cvat
+      also for napari and CVAT
   boresight track rtsp://camera/stream --no-video
       anything an installed ffmpeg can read; end it with Ctrl-C";
 
@@ -53,17 +57,39 @@ pub struct Args {
     /// Also write how the camera moved, frame by frame with its covariance, to DIR/camera.csv.
     #[arg(long)]
     camera: bool,
+    /// Also write counts, verdict and warnings to DIR/summary.json.
+    #[arg(long)]
+    summary: bool,
+    /// Also write a small picture, the first of the frames with the most tracks, to DIR/thumbnail.png.
+    #[arg(long)]
+    thumbnail: bool,
+    /// Also write the confirmed tracks for other programs: geff, trackmate-xml, cvat, mot-zip, napari, parquet ..
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = also::file_name())]
+    also: Vec<&'static str>,
+    /// End at once when standard input ends: for a program that starts this one and may be killed.
+    #[arg(long, hide = true)]
+    end_with_stdin: bool,
+}
+
+impl Args {
+    /// The file of the configuration that is asked for.
+    pub fn configuration(&self) -> Option<&std::path::Path> {
+        self.input.config.as_deref()
+    }
 }
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.end_with_stdin {
+        run_options::end_with_stdin();
+    }
     let input = args.input.input.as_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &args.tracker)?;
     if matches!(plan.input, Input::Scans(..)) {
-        folder.leave_out(&["annotated.mp4", "frames/"]);
+        folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
     }
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
@@ -90,7 +116,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     });
     bar.finish_and_clear();
     let verdict = observed.verdict(&settings, &done.summary);
-    let next = verdict.next.filter(|options| can_be_added(&args, options));
+    let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
@@ -99,6 +125,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         add_outcome(&mut notes, &done);
         if let Some(report) = report {
             done.unwritten.extend(report.write(&notes).err());
+        }
+        // An earlier run's table may still stand under the name of one that failed.
+        let failed = |e: &boresight::Error| e.place().is_some_and(|place| place.contains("tracks.csv"));
+        if !done.unwritten.iter().any(failed) {
+            done.unwritten.extend(also::write(&folder, &args.also, quiet));
+        }
+        if folder.makes("summary.json") {
+            let told = RunSummary::new(input, &done.summary, &verdict, next.as_deref(), &notes.warnings);
+            done.unwritten.extend(told.write(&folder.path("summary.json")).err());
         }
         match config.finish(&notes.warnings) {
             Ok(left_over) if done.unwritten.is_empty() => left_over.remove(),
@@ -156,9 +191,11 @@ fn made(args: &Args) -> Vec<&'static str> {
         ("annotated.mp4", !args.no_video),
         ("frames/", args.png),
         ("report.html", !args.no_report),
+        ("summary.json", args.summary),
+        ("thumbnail.png", args.thumbnail),
         ("config.toml", true),
     ];
-    asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).collect()
+    asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
 fn sinks(folder: &RunFolder) -> boresight::Result<Vec<Box<dyn Sink>>> {
@@ -180,6 +217,9 @@ fn sinks(folder: &RunFolder) -> boresight::Result<Vec<Box<dyn Sink>>> {
     }
     if folder.makes("frames/") {
         sinks.push(Box::new(PngFolder::create(folder.path("frames/"), DrawOptions::default())?));
+    }
+    if folder.makes("thumbnail.png") {
+        sinks.push(Box::new(Thumbnail::create(folder.path("thumbnail.png"), DrawOptions::default())?));
     }
     Ok(sinks)
 }

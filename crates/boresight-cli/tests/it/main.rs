@@ -1,5 +1,6 @@
 //! The command end to end, as a user runs it: the sample clip in, tables out, every exit code, every help text.
 
+mod batch;
 mod config;
 mod detect;
 mod exit_codes;

@@ -25,9 +25,10 @@ pub(super) fn inputs() -> tempfile::TempDir {
 }
 
 /// Every command once, with outputs in `out/`: arguments, and the files that are made there.
-pub(super) const COMMANDS: [(&str, &[&str]); 13] = [
+pub(super) const COMMANDS: [(&str, &[&str]); 14] = [
     (
-        "track sim/frames.y4m --config sim/track.toml -o out --json --camera --png",
+        "track sim/frames.y4m --config sim/track.toml -o out --json --camera --png --summary --thumbnail \
+         --also geff,trackmate-xml,cvat,mot-zip,napari",
         &[
             "tracks.csv",
             "detections.csv",
@@ -37,6 +38,13 @@ pub(super) const COMMANDS: [(&str, &[&str]); 13] = [
             "annotated.mp4",
             "frames/frame_000023.png",
             "report.html",
+            "summary.json",
+            "thumbnail.png",
+            "tracks.geff/.zattrs",
+            "trackmate.xml",
+            "cvat.xml",
+            "mot.zip",
+            "napari.npy",
             "config.toml",
         ],
     ),
@@ -51,6 +59,7 @@ pub(super) const COMMANDS: [(&str, &[&str]); 13] = [
     ("smooth run/tracks.csv -o out/smooth.csv", &["smooth.csv"]),
     ("stitch run/tracks.csv -o out/stitched.txt --smooth", &["stitched.txt"]),
     ("convert run/tracks.csv out/c.csv --to csv", &["c.csv"]),
+    ("convert run/tracks.csv out/g --to geff", &["g/edges/ids/0.0"]),
     ("convert run/tracks.csv out/ctc --to ctc --size 64x64", &["ctc/res_track.txt", "ctc/mask023.tif"]),
     ("reproduce srif-1 --runs 2 -o out", &["index.html", "reproduce.json"]),
     (

@@ -21,6 +21,7 @@ __all__ = [
     "choose_for_arrays",
     "choose_for_path",
     "choose_for_scans",
+    "cpu_features",
     "detect_arrays",
     "detect_path",
     "evaluate",
@@ -33,6 +34,8 @@ __all__ = [
 ]
 
 __version__: str
+
+def cpu_features() -> list[str]: ...
 
 @final
 class Config:

@@ -19,7 +19,16 @@ if TYPE_CHECKING:
     import polars
     import pyarrow
 
-_FORMAT_OF_ENDING = {".csv": "csv", ".txt": "mot", ".jsonl": "jsonl", ".parquet": "parquet", ".html": "report"}
+_FORMAT_OF_ENDING = {
+    ".csv": "csv",
+    ".txt": "mot",
+    ".jsonl": "jsonl",
+    ".parquet": "parquet",
+    ".html": "report",
+    ".geff": "geff",
+    ".npy": "napari",
+    ".zip": "mot-zip",
+}
 
 
 class Tracks:
@@ -100,8 +109,9 @@ class Tracks:
     def write(self, path: str | os.PathLike[str], format: str | None = None) -> None:
         """Writes the table; without `format` the ending says which.
 
-        `csv` (the command's tracks.csv, byte by byte), `mot` (.txt), `jsonl`, `parquet` (needs pyarrow), and by name `kitti`, `trackpy`,
-        `trackmate`, `btrack`, `ultrack`. What a format cannot hold is said as a warning.
+        `csv` (the command's tracks.csv, byte by byte), `mot` (.txt), `jsonl`, `parquet` (needs pyarrow), `geff` (a folder), `napari`
+        (.npy), `mot-zip` (.zip), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`, `ultrack`. What a format
+        cannot hold is said as a warning.
         """
         chosen = format or _FORMAT_OF_ENDING.get(Path(path).suffix.lower())
         if chosen == "report":

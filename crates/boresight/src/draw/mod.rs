@@ -7,6 +7,7 @@ mod canvas;
 mod palette;
 mod png_folder;
 mod text;
+mod thumbnail;
 mod tone;
 
 pub use annotate::{Annotator, DrawOptions};
@@ -16,4 +17,5 @@ pub use canvas::{Canvas, Pen, Rgb};
 pub use palette::track_colour;
 pub use png_folder::{PngFolder, write_png};
 pub use text::Lettering;
+pub use thumbnail::Thumbnail;
 pub use tone::{Tone, legible_scale};

@@ -22,6 +22,7 @@ const LEAVES: &[&str] = &[
     "time",
     "union_find",
     "validate",
+    "cpu",
 ];
 
 /// room -> rooms it may use besides the leaves and itself.

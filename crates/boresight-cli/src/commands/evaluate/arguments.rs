@@ -172,6 +172,13 @@ pub fn format() -> impl TypedValueParser<Value = Format> {
         .try_map(|name| Format::ALL.into_iter().find(|f| f.name() == name).ok_or("no such format"))
 }
 
+/// Takes the name of a format that is written, among them those that are not read.
+pub fn written_format() -> impl TypedValueParser<Value = Format> {
+    let all = || Format::ALL.into_iter().chain(Format::EXPORTS);
+    PossibleValuesParser::new(all().map(Format::name).collect::<Vec<_>>())
+        .try_map(move |name| all().find(|f| f.name() == name).ok_or("no such format"))
+}
+
 /// Parses WIDTHxHEIGHT.
 pub fn size(text: &str) -> Result<(f64, f64), String> {
     let (w, h) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, for instance 640x512")?;

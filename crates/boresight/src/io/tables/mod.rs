@@ -5,6 +5,7 @@
 //! ([`read_detections`]), states ([`read_tracks`]), or a table of tracks (`io::tracks`).
 
 mod camera_csv;
+mod coco;
 pub(crate) mod columns;
 mod detection_row;
 mod detections_csv;
@@ -34,4 +35,6 @@ pub use mot_writer::MotWriter;
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
 pub use read_tracks::{StateTable, read_tracks};
+#[cfg(feature = "parquet")]
+pub(crate) use tracks_csv::status_word;
 pub use tracks_csv::{TRACKS_HEADER, TracksCsv};

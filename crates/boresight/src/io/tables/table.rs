@@ -1,12 +1,16 @@
 //! A table being read, whatever its dialect: told by its first line, then given row by row.
 
+use super::coco;
 use super::columns::{Columns, Field, Layout};
 use super::dialect::{kitti, mot, named};
 use super::kind::Kind;
 use super::lexer::{Lines, Separator, split};
 use super::number::parse_f64;
 use super::row::{Form, Row, list};
+use crate::io::sniff::{SNIFF_BYTES, read_up_to};
 use crate::{Error, ErrorKind, Result};
+use std::fs::File;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// A table, its form known, its rows still to come.
@@ -28,7 +32,16 @@ impl Table {
     /// A file that cannot be read or looks like no table; columns that are named but not there.
     pub fn open(path: &Path, columns: &Columns) -> Result<Self> {
         columns.validate("columns")?;
-        Self::begin(Lines::open(path)?, columns, None)
+        let label = path.display().to_string();
+        let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be opened").at(&label).because(e);
+        let mut file = File::open(path).map_err(cannot)?;
+        let mut head = read_up_to(&mut file, SNIFF_BYTES).map_err(cannot)?;
+        if coco::looks_like(&head) {
+            file.read_to_end(&mut head).map_err(cannot)?;
+            let rows = coco::as_table(&head, &label)?;
+            return Self::begin(Lines::new(label, Box::new(Cursor::new(rows.into_bytes()))), columns, None);
+        }
+        Self::begin(Lines::new(label, Box::new(Cursor::new(head).chain(file))), columns, None)
     }
 
     /// Opens a file that is said to be of this kind.
@@ -181,7 +194,7 @@ fn look_of(line: &[u8], separator: Separator, fields: &[String], columns: &Colum
     }
     let shown: String = String::from_utf8_lossy(line).trim().chars().take(60).collect();
     Err(Error::new(ErrorKind::Unsupported, format!("begins with \"{shown}\": no table of tracks known here"))
-        .hint("known are MOTChallenge, KITTI, CSV with named columns (frame, track_id, x, y ..) and Cell Tracking Challenge folders"))
+        .hint("known are MOTChallenge, KITTI, COCO, CSV with named columns (frame, track_id, x, y ..) and Cell Tracking Challenge folders"))
 }
 
 #[cfg(test)]

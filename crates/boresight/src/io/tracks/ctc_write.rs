@@ -6,6 +6,7 @@
 //! Limits: labels up to 65535; images up to 2²⁸ pixels.
 
 use super::ctc::Lineage;
+use super::parents::parents;
 use crate::io::AtomicFolder;
 use crate::io::tables::lost::lost;
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackTable};
@@ -82,19 +83,6 @@ fn plan(table: &TrackTable) -> Result<Plan> {
     }
     p.lineages.sort_unstable_by_key(|l| l.label);
     Ok(p)
-}
-
-/// The pairs (track, its parent's track) that a column `parent` names.
-fn parents(table: &TrackTable) -> Vec<(usize, usize)> {
-    let Some((_, values)) = table.extra.iter().find(|e| e.0 == "parent") else { return Vec::new() };
-    let mut out: Vec<(usize, usize)> = Vec::new();
-    for (r, v) in values.iter().enumerate() {
-        let named = v.parse::<i64>().ok().and_then(|id| table.ids.binary_search(&id).ok());
-        out.extend(named.map(|parent| (table.tracks[r] as usize, parent)));
-    }
-    out.sort_unstable();
-    out.dedup();
-    out
 }
 
 /// Writes a folder, which appears whole (an earlier result in it goes then, other files stay); says what it cannot hold. `size_px` is the size of the images; without it they reach to the last row.

@@ -15,6 +15,18 @@ pub enum Format {
     Named(Dialect),
     /// Cell Tracking Challenge folder.
     Ctc,
+    /// Graph Exchange File Format 1.3: a folder; written only.
+    Geff,
+    /// TrackMate's own file; written only.
+    TrackMateXml,
+    /// CVAT for video; written only.
+    Cvat,
+    /// MOT's archive as CVAT and Datumaro take it; written only.
+    MotZip,
+    /// napari's array of tracks; written only.
+    Napari,
+    /// Apache Parquet, with the feature `parquet`; written only.
+    Parquet,
 }
 
 impl Format {
@@ -30,10 +42,25 @@ impl Format {
             Self::Named(Dialect::Btrack) => "btrack",
             Self::Named(Dialect::Ultrack) => "ultrack",
             Self::Ctc => "ctc",
+            Self::Geff => "geff",
+            Self::TrackMateXml => "trackmate-xml",
+            Self::Cvat => "cvat",
+            Self::MotZip => "mot-zip",
+            Self::Napari => "napari",
+            Self::Parquet => "parquet",
         }
     }
 
-    /// All formats.
+    /// Formats that are written for other programs and not read.
+    pub const EXPORTS: [Self; 6] =
+        [Self::Geff, Self::TrackMateXml, Self::Cvat, Self::MotZip, Self::Napari, Self::Parquet];
+
+    /// Whether it is a folder rather than a file.
+    pub fn is_folder(self) -> bool {
+        matches!(self, Self::Ctc | Self::Geff)
+    }
+
+    /// All formats that are read and written.
     pub const ALL: [Self; 9] = [
         Self::Mot,
         Self::MotTruth,

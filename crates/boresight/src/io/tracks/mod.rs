@@ -1,18 +1,22 @@
 //! Tables of tracks in the formats of the field: MOTChallenge, KITTI, CSV with named columns, Cell Tracking Challenge.
 //!
-//! [`read`] finds the format by the look of the file; [`write()`] says what the target cannot hold.
+//! [`read`] finds the format by the look of the file; [`write()`] and [`write_path`] say what the target cannot hold.
 
 pub mod ctc;
 #[cfg(feature = "images")]
 pub mod ctc_write;
+mod export;
 mod format;
 mod options;
+mod parents;
 mod read;
 mod rows;
 mod write;
 
 pub use crate::io::tables::Dialect;
+#[cfg(feature = "parquet")]
+pub use export::parquet::write_parquet;
 pub use format::Format;
 pub use options::{BadRows, ReadOptions};
 pub use read::{TrackFile, read, sniff};
-pub use write::write;
+pub use write::{write, write_path};

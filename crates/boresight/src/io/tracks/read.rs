@@ -63,10 +63,15 @@ pub fn read(path: &Path, format: Option<Format>, options: ReadOptions, tentative
         let table = ctc::CtcFolder::open(path)?.table(path.display().to_string(), options.keep_extra)?;
         return Ok(TrackFile { table, format: Format::Ctc, bad: BadRows::default() });
     }
+    if let Some(format) = format.filter(|f| Format::EXPORTS.contains(f)) {
+        return Err(Error::new(ErrorKind::Unsupported, format!("{} is written, not read", format.name()))
+            .at(path.display())
+            .hint("keep the table it was made from"));
+    }
     let source = match format {
         Some(Format::Mot | Format::MotTruth) => Table::open_as(path, Kind::Mot)?,
         Some(Format::Kitti) => Table::open_as(path, Kind::Kitti)?,
-        Some(Format::Named(_) | Format::Ctc) => Table::open_as(path, Kind::Named)?,
+        Some(_) => Table::open_as(path, Kind::Named)?,
         None => Table::open(path, &Columns::default())?,
     };
     let format = format.unwrap_or(format_of(source.form.kind));

@@ -1,0 +1,48 @@
+//! The formats of other programs that `track --also` writes beside its own tables, made of the finished `tracks.csv`.
+
+use super::run_folder::RunFolder;
+use crate::console::say;
+use boresight::io::tracks::{Dialect, Format, ReadOptions, read, write_path};
+use boresight::{Error, Result};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+/// Each format with the name of its file, or its folder.
+const FORMATS: [(Format, &str); 11] = [
+    (Format::Geff, "tracks.geff/"),
+    (Format::TrackMateXml, "trackmate.xml"),
+    (Format::Cvat, "cvat.xml"),
+    (Format::MotZip, "mot.zip"),
+    (Format::Napari, "napari.npy"),
+    (Format::Parquet, "tracks.parquet"),
+    (Format::Kitti, "kitti.txt"),
+    (Format::Named(Dialect::Trackpy), "trackpy.csv"),
+    (Format::Named(Dialect::TrackMate), "trackmate.csv"),
+    (Format::Named(Dialect::Btrack), "btrack.csv"),
+    (Format::Named(Dialect::Ultrack), "ultrack.csv"),
+];
+
+/// Takes the name of a format, for the name of its file.
+pub fn file_name() -> impl TypedValueParser<Value = &'static str> {
+    PossibleValuesParser::new(FORMATS.map(|(format, _)| format.name()))
+        .try_map(|name| FORMATS.iter().find(|(f, _)| f.name() == name).map(|(_, file)| *file).ok_or("no such format"))
+}
+
+/// Writes the files among `names` and says what they cannot hold; what could not be written is returned.
+pub fn write(folder: &RunFolder, names: &[&'static str], quiet: bool) -> Vec<Error> {
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let options = ReadOptions { keep_extra: true, ..ReadOptions::default() };
+    let file = match read(&folder.path("tracks.csv"), None, options, false) {
+        Ok(file) => file,
+        Err(e) => return vec![e],
+    };
+    let one = |&(format, name): &(Format, &str)| -> Result<()> {
+        let dropped = write_path(&file.table, format, Some(&folder.path(name)))?;
+        if !dropped.is_empty() && !quiet {
+            say!("note: {} does not hold: {}", format.name(), dropped.join(", "));
+        }
+        Ok(())
+    };
+    FORMATS.iter().filter(|(_, name)| names.contains(name)).filter_map(|f| one(f).err()).collect()
+}
