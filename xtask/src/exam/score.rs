@@ -64,15 +64,20 @@ pub struct Score {
 
 /// Tracks a clip without options and scores the result.
 pub fn score(clip: &Clip, sets: &[String], false_tracks_per_hour: Option<f64>) -> Result<Score> {
-    let truth = truth(&clip.truth, &clip.columns)?;
+    score_asked(clip, sets, &auto::Request { detector: None, false_tracks_per_hour }, None)
+}
+
+/// The same for what is asked for, scored before frame `until`.
+pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until: Option<u32>) -> Result<Score> {
+    let mut truth = truth(&clip.truth, &clip.columns)?;
+    truth.retain(|r| until.is_none_or(|u| r.frame < u));
     let started = std::time::Instant::now();
-    let request = auto::Request { detector: None, false_tracks_per_hour };
     let (mut source, mut choice) =
-        auto::open_and_choose(&clip.input.display().to_string(), &Config::default(), &request)?;
+        auto::open_and_choose(&clip.input.display().to_string(), &Config::default(), request)?;
     let changed = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
     // As the command does: what is set holds for the first pass as well, and is not overruled by it.
     choice.config = changed(choice.config)?;
-    let detector = auto::learn(&mut source, &mut choice, &request)?;
+    let detector = auto::learn(&mut source, &mut choice, request)?;
     let config = changed(choice.config)?;
     let tracker = track::build(&config.tracker)?;
     let seen = Arc::new(Mutex::new(Reported::default()));

@@ -5,10 +5,10 @@
 //! background B is the mean of filtered frames: over those of this sum and, fading by [`FADE`] a sum, of the ones before. It holds the sum's own frames, which
 //! takes v = 0 out exactly and lessens noise there, never adds any. Residual r = filtered − B.
 //! Noise: deviation s(cell) of r in cells of [`CELL`] pixels, 1.4826 times the median of |r| over the sum's frames, times a factor g of each frame; least
-//! [`SHARED`] of the frame's median and the rounding of whole counts. Contributions to the sums: ψ = S r / s², φ = S² / s², S the median of s:
+//! [`SHARED`] of the median of cells and of frames, and the rounding of whole counts. Contributions to the sums: ψ = S r / s², φ = S² / s², S the median of s:
 //! a score Σψ / √Σφ of white noise is N(0, 1). ψ is kept as whole numbers of 1/[`PER_UNIT`] (rounding: 2·10⁻⁵ of the noise's variance; ends at 512), so
 //! that sums are exact in any order.
-//! Limits: noise that changes within a cell; pixels nearer than 3 σ to the border see part of the spot, and their scores are too low, never too high.
+//! Limits: noise that changes within a cell; pixels nearer than 3 σ to the border see part of the spot, so their scores are too low.
 //! Cost: some 10 ns a pixel and frame.
 
 use super::config::StillBackground;
@@ -21,7 +21,7 @@ pub(super) const CELL: usize = 16;
 pub(super) const PER_UNIT: f32 = 64.0;
 /// Part of the older background that is kept at each sum: half of the frames are new, so some eight sums count.
 const FADE: f32 = 0.875;
-/// Part of the frame's median noise that every cell has at least.
+/// Part of the median noise that every cell, and every frame, has at least.
 const SHARED: f32 = 0.5;
 /// Half width of the square of `spatial`, in σ: a target takes 4π / 16² = 5 % of its own energy out with its surroundings.
 const SURROUND: f64 = 8.0;
@@ -173,7 +173,8 @@ impl Memory {
         phi.cells.extend(self.cells.iter().map(|s| (middle / s.max(SHARED * middle)).powi(2)));
         phi.unit = middle;
         // From here on a frame's factor on φ.
-        phi.frames.iter_mut().for_each(|s| *s = (usual / *s).powi(2));
+        // One that shows nothing at all (a dropout) is no witness without noise.
+        phi.frames.iter_mut().for_each(|s| *s = (usual / s.max(SHARED * usual)).powi(2));
         for (age, psi) in psi.iter_mut().enumerate() {
             let frame = &self.frames[self.place(age)];
             for y in 0..self.height {

@@ -267,28 +267,35 @@ widest! {
         worst_at: &mut [u16],
     ) {
         let inside = if older.is_empty() { 0..0 } else { overlap(shift, width) };
-        let cells = newer.as_chunks::<CELL>().0.iter().zip(weights);
-        let bests = best.as_chunks_mut::<CELL>().0.iter_mut().zip(best_at.as_chunks_mut::<CELL>().0);
-        let worsts = worst.as_chunks_mut::<CELL>().0.iter_mut().zip(worst_at.as_chunks_mut::<CELL>().0);
-        let padded = [0i16; CELL];
-        for (c, (((newer, &weight), best), worst)) in cells.zip(bests).zip(worsts).enumerate() {
-            let x = c * CELL;
-            if inside.start <= x && x + CELL <= inside.end {
-                let from = (x as i64 + i64::from(shift)).max(0) as usize;
-                if let Some(older) = older.get(from..).and_then(|o| o.first_chunk::<CELL>()) {
-                    score_cell(newer, older, weight, at, best, worst);
-                }
-                continue;
+        let n = weights.len();
+        let newer = &newer.as_chunks::<CELL>().0[..n];
+        let (best, best_at) = (&mut best.as_chunks_mut::<CELL>().0[..n], &mut best_at.as_chunks_mut::<CELL>().0[..n]);
+        let (worst, worst_at) = (&mut worst.as_chunks_mut::<CELL>().0[..n], &mut worst_at.as_chunks_mut::<CELL>().0[..n]);
+        // Whole cells inside the overlap, then those at its ends and beyond, where what lies outside adds nothing.
+        let first = inside.start.div_ceil(CELL).min(n);
+        let last = (inside.end / CELL).clamp(first, n);
+        if last > first {
+            let from = ((first * CELL) as i64 + i64::from(shift)).max(0) as usize;
+            let older = &older[from..][..(last - first) * CELL].as_chunks::<CELL>().0[..last - first];
+            let (newer, weights) = (&newer[first..last], &weights[first..last]);
+            let (best, best_at) = (&mut best[first..last], &mut best_at[first..last]);
+            let (worst, worst_at) = (&mut worst[first..last], &mut worst_at[first..last]);
+            for c in 0..last - first {
+                let (best, worst) = ((&mut best[c], &mut best_at[c]), (&mut worst[c], &mut worst_at[c]));
+                score_cell(&newer[c], &older[c], weights[c], at, best, worst);
             }
-            // At an end of the overlap, or beyond: what lies outside adds nothing.
-            let mut part = padded;
+        }
+        for c in (0..first).chain(last..n) {
+            let mut part = [0i16; CELL];
             for (k, p) in part.iter_mut().enumerate() {
-                if inside.contains(&(x + k)) {
-                    let from = (x + k) as i64 + i64::from(shift);
+                let x = c * CELL + k;
+                if inside.contains(&x) {
+                    let from = x as i64 + i64::from(shift);
                     *p = usize::try_from(from).ok().and_then(|i| older.get(i)).copied().unwrap_or(0);
                 }
             }
-            score_cell(newer, &part, weight, at, best, worst);
+            let (best, worst) = ((&mut best[c], &mut best_at[c]), (&mut worst[c], &mut worst_at[c]));
+            score_cell(&newer[c], &part, weights[c], at, best, worst);
         }
     }
 }

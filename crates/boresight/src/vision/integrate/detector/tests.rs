@@ -1,3 +1,5 @@
+//! Sums of simulated frames: below the noise, with gaps, crossing, still.
+
 use super::*;
 use crate::Image;
 use rand::{RngExt, SeedableRng};
