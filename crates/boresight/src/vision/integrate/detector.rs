@@ -93,6 +93,9 @@ impl IntegrateDetector {
     /// Takes a frame into the memory; whether a report is due.
     fn remember<T: Pixel>(&mut self, frame: &TypedFrame<T>) -> bool {
         let (n, size) = (self.config.frames, (frame.image.width(), frame.image.height()));
+        if size.0 == 0 || size.1 == 0 {
+            return false;
+        }
         if self.memory.as_ref().is_none_or(|(w, h, _)| (*w, *h) != size) {
             let memory = Memory::new::<T>(size.0, size.1, n as usize, self.config.sigma_px, self.config.background);
             self.memory = Some((size.0, size.1, memory));
@@ -160,9 +163,6 @@ impl IntegrateDetector {
         let newest = memory.time_s(0);
         self.times_s.clear();
         self.times_s.extend((0..n).map(|age| memory.time_s(age) - newest));
-        if width == 0 || height == 0 {
-            return Ok(());
-        }
         if !self.lay_out(width, height)? {
             self.fresh = 0;
             if let Some((_, _, memory)) = &mut self.memory {
