@@ -17,6 +17,9 @@ const STEPS: usize = 8;
 const ENOUGH: f64 = 0.002;
 /// Longest step at either end of the path, px: about the spot's own width keeps the curvature valid.
 const LONGEST_PX: f64 = 1.0;
+/// Least variance of τ, weighted by φ, in squares of the sum's duration: below it one frame holds nearly all the weight and the velocity is not
+/// known. All frames have 1/12, half of them 1/48.
+const LEAST_SPREAD: f64 = 1e-3;
 
 /// A place and velocity with its score.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,7 +162,8 @@ impl Paths<'_> {
         let [m0, m1, m2] = here.moments;
         let (w, h) = (self.width as f64, self.height as f64);
         let inside = (-0.5..w - 0.5).contains(&x.x) && (-0.5..h - 0.5).contains(&x.y);
-        (inside && m0 > 0.0 && here.z * sign > 0.0).then(|| Found {
+        let known = m0 > 0.0 && m2 / m0 - (m1 / m0).powi(2) > LEAST_SPREAD * duration * duration;
+        (inside && known && here.z * sign > 0.0).then(|| Found {
             position: x,
             velocity: v,
             z: sign * here.z,
