@@ -13,6 +13,7 @@ mod detect_scenes;
 mod docs;
 mod exam;
 mod filter_table;
+mod limit;
 mod link_table;
 mod mot;
 mod mot_table;
@@ -50,6 +51,8 @@ enum Chore {
     Exam(exam::Args),
     /// Every filter by name over the sample clip: held, error, NIS.
     FilterTable(filter_table::Args),
+    /// Below the noise of a frame: curves, false alarms, crossing targets, real clips, cost; written to docs/limit.md.
+    Limit(limit::Args),
     /// Links against trackpy's and btrack's published ones.
     LinkTable(link_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
@@ -72,6 +75,7 @@ fn main() -> anyhow::Result<()> {
         Chore::DetectExam(args) => detect_exam::run(&args),
         Chore::Exam(args) => exam::run(&args),
         Chore::FilterTable(args) => filter_table::table(&args),
+        Chore::Limit(args) => limit::run(&args),
         Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
         Chore::OperatingCurves(args) => operating_curves::run(&args),

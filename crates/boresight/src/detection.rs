@@ -27,6 +27,17 @@ impl Extent {
     }
 }
 
+/// The velocity that came with a detection's position, from one fit of both over several frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetectedVelocity {
+    /// Velocity (x, y), px/s.
+    pub mean: Vector2<f64>,
+    /// Its covariance, px²/s².
+    pub cov: Matrix2<f64>,
+    /// Covariance of position (row) with velocity (column), px²/s.
+    pub with_position: Matrix2<f64>,
+}
+
 /// One detected thing in one frame; [`Detection::at`] makes one.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -47,10 +58,12 @@ pub struct Detection {
     pub score: f32,
     /// Class, if the detector tells classes apart.
     pub class: Option<ClassId>,
+    /// Velocity, if the detector looks at more than one frame; a track starts with it, and takes only positions afterwards.
+    pub velocity: Option<DetectedVelocity>,
 }
 
 impl Detection {
-    /// A point at `position` (px) with its covariance (px²): no size, one pixel, peak, sum and score 1, no class.
+    /// A point at `position` (px) with its covariance (px²): no size, one pixel, peak, sum and score 1, no class, no velocity.
     ///
     /// ```
     /// use boresight::boresight_filters::nalgebra::{Matrix2, Vector2};
@@ -63,7 +76,7 @@ impl Detection {
     /// ```
     pub fn at(position: Vector2<f64>, cov: Matrix2<f64>) -> Self {
         let extent = Extent::around(position, 0.0, 0.0);
-        Self { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None }
+        Self { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None, velocity: None }
     }
 
     /// A point at (x, y), px, known to `std_px` along both axes; else as [`Detection::at`].
@@ -100,6 +113,11 @@ impl Detection {
     pub fn with_class(self, class: Option<ClassId>) -> Self {
         Self { class, ..self }
     }
+
+    /// With this velocity, or none.
+    pub fn with_velocity(self, velocity: Option<DetectedVelocity>) -> Self {
+        Self { velocity, ..self }
+    }
 }
 
 /// All detections of one frame; [`Scan::at`] makes one.
@@ -114,12 +132,15 @@ pub struct Scan {
     pub detections: Vec<Detection>,
     /// How the background moved in the image since the scan before; `None` if it is unknown or was not looked at.
     pub camera_motion: Option<CameraMotion>,
+    /// Whether nothing could be detected in this frame, whatever it shows: the detector gathers frames and reports later. That no
+    /// target is detected then says nothing.
+    pub blind: bool,
 }
 
 impl Scan {
     /// A scan without detections.
     pub fn at(index: FrameIndex, time: Timestamp) -> Self {
-        Self { index, time, detections: Vec::new(), camera_motion: None }
+        Self { index, time, detections: Vec::new(), camera_motion: None, blind: false }
     }
 
     /// With these detections.
@@ -130,5 +151,10 @@ impl Scan {
     /// With how the background moved since the scan before.
     pub fn with_camera_motion(self, camera_motion: Option<CameraMotion>) -> Self {
         Self { camera_motion, ..self }
+    }
+
+    /// As one in which nothing could be detected, or not.
+    pub fn with_blind(self, blind: bool) -> Self {
+        Self { blind, ..self }
     }
 }

@@ -6,9 +6,9 @@
 //! NIS: mean over the updates of reported tracks, 2 if what the filter believes is true. ms: wall time of choice, decoding, detection
 //! and tracking, one run of this machine.
 
-mod clips;
+pub mod clips;
 mod scenes;
-mod score;
+pub mod score;
 mod tables;
 
 use anyhow::Result;

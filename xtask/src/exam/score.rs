@@ -64,7 +64,13 @@ pub struct Score {
 
 /// Tracks a clip without options and scores the result.
 pub fn score(clip: &Clip, sets: &[String], request: &auto::Request) -> Result<Score> {
-    let truth = truth(&clip.truth, &clip.columns)?;
+    score_asked(clip, sets, request, None)
+}
+
+/// The same, scored before frame `until`.
+pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until: Option<u32>) -> Result<Score> {
+    let mut truth = truth(&clip.truth, &clip.columns)?;
+    truth.retain(|r| until.is_none_or(|u| r.frame < u));
     let started = std::time::Instant::now();
     let (mut source, mut choice) =
         auto::open_and_choose(&clip.input.display().to_string(), &Config::default(), request)?;

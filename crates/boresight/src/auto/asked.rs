@@ -4,7 +4,7 @@
 
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
-use super::{cells, colour, faint, moving, particles, spots};
+use super::{cells, colour, faint, moving, particles, spots, summed};
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
@@ -32,6 +32,10 @@ pub fn configure(
         DetectorKind::Cfar => {
             spots::configure(&spots::look(frames, info)?, info, config, &mut Vec::new());
             faint::configure_asked(&faint::count(frames, info)?.0, config, reasons);
+        }
+        DetectorKind::Integrate => {
+            spots::configure(&spots::look(frames, info)?, info, config, &mut Vec::new());
+            summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Moving => moving::configure(&seen_or_assumed(scene, info, reasons), info, config, reasons),
         DetectorKind::Spot => {
@@ -123,6 +127,7 @@ mod tests {
                 let written = match &config.detector.threshold {
                     ThresholdConfig::Isolated(_) => DetectorKind::Isolated,
                     ThresholdConfig::Cfar(_) => DetectorKind::Cfar,
+                    ThresholdConfig::Integrate(_) => DetectorKind::Integrate,
                     ThresholdConfig::Moving(_) => DetectorKind::Moving,
                     ThresholdConfig::Spot(_) => DetectorKind::Spot,
                     ThresholdConfig::Local(_) => DetectorKind::Local,

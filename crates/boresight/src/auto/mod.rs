@@ -25,6 +25,7 @@ mod scene;
 mod second_look;
 mod spots;
 mod spread;
+mod summed;
 
 pub use choose::{Choice, choose};
 pub use detections::for_detections;

@@ -152,13 +152,27 @@ fn statistics(
         return Ok(None);
     }
     let Choice { config, reasons } = choice;
+    // Scans in which nothing could be detected are no misses.
+    let seeing: Vec<Scan>;
+    let scans = if scans.iter().any(|s| s.blind) {
+        seeing = scans.iter().filter(|s| !s.blind).cloned().collect();
+        &seeing
+    } else {
+        scans
+    };
     detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons).map(Some)
 }
 
 /// Whether what is detected is a point or a blob that stands alone: one detection a target, false ones anywhere. Regions come in pieces, which lie where
 /// targets are; what comes of counting those as independent is no probability, so regions are confirmed by the number of their hits.
 fn is_of_points(threshold: &ThresholdConfig) -> bool {
-    matches!(threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_) | ThresholdConfig::Cfar(_))
+    matches!(
+        threshold,
+        ThresholdConfig::Isolated(_)
+            | ThresholdConfig::Spot(_)
+            | ThresholdConfig::Cfar(_)
+            | ThresholdConfig::Integrate(_)
+    )
 }
 
 /// Opens frames and chooses a detector and a tracker by looking at the first [`PROBE_FRAMES`] of them, of a file also later ones.

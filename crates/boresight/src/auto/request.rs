@@ -10,6 +10,8 @@ pub enum DetectorKind {
     Isolated,
     /// Small and faint targets at a stated rate of false alarms.
     Cfar,
+    /// Small moving targets that no single frame shows.
+    Integrate,
     /// What moves before a fixed camera.
     Moving,
     /// Many small spots: particles, seeds, stars.
@@ -22,13 +24,15 @@ pub enum DetectorKind {
 
 impl DetectorKind {
     /// All of them, in the order in which they are listed.
-    pub const ALL: [Self; 6] = [Self::Isolated, Self::Cfar, Self::Moving, Self::Spot, Self::Local, Self::Colour];
+    pub const ALL: [Self; 7] =
+        [Self::Isolated, Self::Cfar, Self::Integrate, Self::Moving, Self::Spot, Self::Local, Self::Colour];
 
     /// Its word: the key below `detector.threshold`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Isolated => "isolated",
             Self::Cfar => "cfar",
+            Self::Integrate => "integrate",
             Self::Moving => "moving",
             Self::Spot => "spot",
             Self::Local => "local",
@@ -41,6 +45,7 @@ impl DetectorKind {
         match self {
             Self::Isolated => "targets of any size that stand clear of their surroundings",
             Self::Cfar => "small and faint targets at a stated rate of false alarms",
+            Self::Integrate => "small moving targets that no single frame shows",
             Self::Moving => "what moves before a fixed camera",
             Self::Spot => "many small spots: particles, seeds, stars",
             Self::Local => "bright compact pieces on an even dark ground: cells",

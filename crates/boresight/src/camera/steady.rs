@@ -46,11 +46,14 @@ impl SteadyGround {
         on_ground.index = scan.index;
         on_ground.time = scan.time;
         on_ground.camera_motion = scan.camera_motion;
+        on_ground.blind = scan.blind;
         on_ground.detections.clone_from(&scan.detections);
         let ground = self.image_from_ground.inverse();
         // Exactly known motions change no covariance, not even in the last bit.
         let motion = self.motion.filter(|m| m.cov != Matrix4::zeros());
         for d in &mut on_ground.detections {
+            // Measured over frames between which the ground moved: it is not the velocity on it.
+            d.velocity = None;
             if let Some(m) = motion {
                 d.cov += m.cov_at(d.position);
             }

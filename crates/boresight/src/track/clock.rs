@@ -7,6 +7,9 @@ use crate::{Error, ErrorKind, Result, Scan, Timestamp};
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     last: Option<Timestamp>,
+    /// The newest scan in which something could be detected.
+    last_seeing: Option<Timestamp>,
+    /// Usual interval between scans in which something could be detected.
     pub interval: ScanInterval,
 }
 
@@ -30,11 +33,15 @@ impl Clock {
         self.last.unwrap_or_default()
     }
 
-    /// Takes a scan in, `step_s` after the one before.
-    pub fn advance(&mut self, now: Timestamp, step_s: Option<f64>) {
-        if let Some(step_s) = step_s {
-            self.interval.note(step_s);
+    /// Takes a scan in.
+    pub fn advance(&mut self, scan: &Scan) {
+        self.last = Some(scan.time);
+        if scan.blind {
+            return;
         }
-        self.last = Some(now);
+        if let Some(before) = self.last_seeing {
+            self.interval.note(scan.time.seconds_since(before));
+        }
+        self.last_seeing = Some(scan.time);
     }
 }

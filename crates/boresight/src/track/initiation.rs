@@ -5,8 +5,8 @@
 //! velocity unknown within bounds, its variance that of a uniform density.
 //! Symbols: T time between the points, s; R measurement covariance, px².
 
-use crate::Result;
 use crate::validate::{check, positive};
+use crate::{DetectedVelocity, Result};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use schemars::JsonSchema;
@@ -140,6 +140,20 @@ pub fn from_one_point(
         cov[(2 * a + 1, 2 * a + 1)] = variance[a];
     }
     Gaussian { mean: Vector4::new(z.x, velocity.x, z.y, velocity.y), cov }
+}
+
+/// First belief from a point that comes with its velocity, whose covariances are multiplied by `scale`, as that of the point was.
+pub fn from_velocity(z: &Vector2<f64>, r: &Matrix2<f64>, velocity: &DetectedVelocity, scale: f64) -> Gaussian<4> {
+    let mut cov = Matrix4::zeros();
+    for a in 0..2 {
+        for b in 0..2 {
+            cov[(2 * a, 2 * b)] = r[(a, b)];
+            cov[(2 * a, 2 * b + 1)] = scale * velocity.with_position[(a, b)];
+            cov[(2 * b + 1, 2 * a)] = scale * velocity.with_position[(a, b)];
+            cov[(2 * a + 1, 2 * b + 1)] = scale * velocity.cov[(a, b)];
+        }
+    }
+    Gaussian { mean: Vector4::new(z.x, velocity.mean.x, z.y, velocity.mean.y), cov }
 }
 
 /// First belief from two points `dt_s` apart (above 0).

@@ -17,7 +17,7 @@ use super::confirm::history::{Decision, Evidence};
 use super::merged_measurements::MergedMeasurements;
 use super::reidentify::{Field, Reidentification};
 use super::scan_table::{Predicted, ScanTable};
-use super::single_track::{BATCH, Track};
+use super::single_track::{BATCH, Outcome, Track};
 use super::step::associate::{Association, associate, gate_confirmed};
 use super::step::context::Context;
 use super::step::delete::{budget_is_over, coast_budget_s, expired_in_gap, is_lasting_duplicate, save_time_alone};
@@ -123,6 +123,17 @@ impl Tracker {
         Ok(())
     }
 
+    /// Predicts and reports every track: a scan in which nothing could be detected is no miss.
+    fn coast(&mut self, scan: &Scan, dt_s: f64) -> Result<()> {
+        let Self { config, tracks, table, predicted, states, .. } = self;
+        predicted.clear();
+        predict(tracks, scan.time, dt_s, config.confirmation.survival(dt_s), config, predicted)?;
+        states.clear();
+        let outcome = Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
+        states.extend(tracks.iter_mut().map(|t| report(t, &outcome, config, table.camera)));
+        Ok(())
+    }
+
     /// Updates every track, confirms or deletes it, and reports it; the order stays.
     fn update_confirm_delete(&mut self, scan: &Scan) {
         let Self {
@@ -224,8 +235,12 @@ impl Tracking for Tracker {
             None => from_initial_tracks(&self.config, scan.time, &mut self.tracks, &mut self.next_id)?,
             Some(_) => self.delete_in_gap(scan.time),
         }
-        self.clock.advance(scan.time, step_s);
+        self.clock.advance(scan);
         let dt_s = step_s.unwrap_or(0.0);
+        if scan.blind {
+            self.coast(scan, dt_s)?;
+            return Ok(&self.states);
+        }
         self.table.sort(scan);
         self.association.begin(scan, &self.clutter);
         self.predict_and_gate(scan, dt_s)?;

@@ -197,7 +197,9 @@ impl DetectorConfig {
             | ThresholdConfig::Colour(_) => Vec::new(),
             ThresholdConfig::Isolated(_) => [&joining[..], &[weight, shot_noise]].concat(),
             ThresholdConfig::Spot(_) => [&joining[..], &areas, &[method, weight]].concat(),
-            ThresholdConfig::Cfar(_) => [&joining[..], &areas, &[method, weight, noise]].concat(),
+            ThresholdConfig::Cfar(_) | ThresholdConfig::Integrate(_) => {
+                [&joining[..], &areas, &[method, weight, noise]].concat()
+            }
         };
         unused.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
     }
@@ -301,11 +303,13 @@ mod tests {
         let [method, weight] = ["detector.centroid.method", "detector.centroid.weight"];
         assert_eq!(unused("isolated", all), [distance, inclusive, weight, "detector.noise.given.gain"]);
         assert_eq!(unused("spot", all), [distance, inclusive, area, method, weight]);
-        assert_eq!(unused("cfar", all), [distance, inclusive, area, method, weight, "detector.noise"]);
+        for threshold in ["cfar", "integrate"] {
+            assert_eq!(unused(threshold, all), [distance, inclusive, area, method, weight, "detector.noise"]);
+        }
         for threshold in ["band", "level", "otsu", "local", "moving", "difference"] {
             assert!(unused(threshold, all).is_empty(), "{threshold}");
         }
-        for threshold in ["isolated", "spot", "cfar"] {
+        for threshold in ["isolated", "spot", "cfar", "integrate"] {
             assert!(unused(threshold, "centroid.extra-sd-px = 0.1\nmax-detections = 5").is_empty(), "{threshold}");
         }
     }

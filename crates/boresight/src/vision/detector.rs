@@ -6,6 +6,7 @@ use super::background::{Background, FrameDifference};
 use super::cfar::CfarDetector;
 use super::colour::{ColourMask, grey_image, needs_colour};
 use super::config::DetectorConfig;
+use super::integrate::IntegrateDetector;
 use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
 use super::region_finder::RegionFinder;
@@ -48,6 +49,7 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
         ThresholdConfig::Isolated(c) => Box::new(IsolatedDetector::new(c)),
         ThresholdConfig::Spot(c) => Box::new(SpotDetector::new(c)),
         ThresholdConfig::Cfar(c) => Box::new(CfarDetector::new(c)),
+        ThresholdConfig::Integrate(c) => Box::new(IntegrateDetector::new(c)),
     })
 }
 
@@ -81,6 +83,7 @@ impl<T: Pixel> Typed<T> {
         Ok(Self { filter, finder: finder(config)? })
     }
 
+    /// Appends what is found; whether the frame was one in which nothing could be.
     fn find(
         &mut self,
         raw: &Image<T>,
@@ -88,7 +91,7 @@ impl<T: Pixel> Typed<T> {
         dt_s: f64,
         config: &DetectorConfig,
         out: &mut Vec<Detection>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let image = match &mut self.filter {
             Some((filter, filtered)) => {
                 filter.apply(raw, filtered);
@@ -96,7 +99,8 @@ impl<T: Pixel> Typed<T> {
             }
             None => raw,
         };
-        self.finder.find(&TypedFrame { raw, image, colours, dt_s }, config, out)
+        self.finder.find(&TypedFrame { raw, image, colours, dt_s }, config, out)?;
+        Ok(self.finder.is_blind())
     }
 }
 
@@ -151,21 +155,22 @@ impl Detector for FrameDetector {
         scan.time = frame.time;
         scan.detections.clear();
         scan.camera_motion = None;
+        scan.blind = false;
         if (frame.pixels.width(), frame.pixels.height()) != self.size {
             return Err(self.refused(frame));
         }
         let dt_s = self.last.map_or(0.0, |last| frame.time.seconds_since(last));
         let (config, out) = (&self.config, &mut scan.detections);
-        match (&mut self.by_pixel, &frame.pixels) {
+        scan.blind = match (&mut self.by_pixel, &frame.pixels) {
             (ByPixel::Gray8(d), Pixels::Gray8(image)) => d.find(image, None, dt_s, config, out)?,
             (ByPixel::Gray16(d), Pixels::Gray16(image)) => d.find(image, None, dt_s, config, out)?,
             (ByPixel::GrayF32(d), Pixels::GrayF32(image)) => d.find(image, None, dt_s, config, out)?,
             (ByPixel::Rgb8(d, grey), Pixels::Rgb8(image)) => {
                 grey_image(image, grey);
-                d.find(grey, Some(image), dt_s, config, out)?;
+                d.find(grey, Some(image), dt_s, config, out)?
             }
             _ => return Err(self.refused(frame)),
-        }
+        };
         self.last = Some(frame.time);
         let extra = nalgebra::Matrix2::identity() * (config.centroid.extra_sd_px * config.centroid.extra_sd_px);
         out.iter_mut().for_each(|d| d.cov += extra);

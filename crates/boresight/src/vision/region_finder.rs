@@ -98,5 +98,6 @@ fn detection<T: Pixel>(
         sum: c.sum,
         score,
         class: None,
+        velocity: None,
     }
 }

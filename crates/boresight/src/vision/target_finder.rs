@@ -1,7 +1,7 @@
 //! What every way of finding targets has in common: a frame of one pixel type goes in, detections come out.
 //!
 //! One struct for each way implements [`TargetFinder`]: those that join pixels to regions through [`super::region_finder`], the
-//! others (`isolated`, `threshold::spot`, `cfar`) by themselves. `super::detector` builds the one that the configuration names.
+//! others (`isolated`, `threshold::spot`, `cfar`, `integrate`) by themselves. `super::detector` builds the one that the configuration names.
 
 use super::config::{DetectorConfig, NoiseConfig};
 use super::noise_level::noise_level;
@@ -26,6 +26,11 @@ pub(super) trait TargetFinder<T: Pixel>: Send {
     /// # Errors
     /// A frame that does not go with the frames before.
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()>;
+
+    /// Whether nothing could be found in the last frame, whatever it shows.
+    fn is_blind(&self) -> bool {
+        false
+    }
 }
 
 /// Says how noisy a pixel is, as the configuration wants it.

@@ -102,6 +102,7 @@ impl<'o> RowReader<'o> {
             sum: row.maybe(Field::Sum)?.unwrap_or(0.0),
             score: row.maybe(Field::Score)?.unwrap_or(1.0) as f32,
             class: row.word(Field::Class).and_then(|word| class_of(&word, class_names)),
+            velocity: None,
         };
         Ok(Some(Seen { frame, id, time, detection }))
     }

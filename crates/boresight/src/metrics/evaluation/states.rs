@@ -363,6 +363,7 @@ mod tests {
             sum: 1.0,
             score: 1.0,
             class: None,
+            velocity: None,
         }
     }
 

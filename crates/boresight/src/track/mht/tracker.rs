@@ -118,7 +118,7 @@ impl Tracking for Mht {
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
         }
-        self.clock.advance(scan.time, step_s);
+        self.clock.advance(scan);
         let dt_s = step_s.unwrap_or(0.0);
         self.table.sort(scan);
         let growth = Growth {

@@ -2,7 +2,7 @@
 //!
 //! Source: docs/theory/track-management.md: each unassociated detection of the scan before, in order, with the nearest unassociated one
 //! of this scan that a target can have reached. With a known spread of velocities the second point corrects a one-point start instead,
-//! and its likelihood under that start says how much likelier a target is than clutter.
+//! and its likelihood under that start says how much likelier a target is than clutter. A detection that comes with its velocity starts a track at once.
 //! Symbols: Λ of a second point, P_D l / λ; l its density (1/px²), λ density of clutter (1/px²).
 //! Limits: at most `max_tracks` tracks; at most [`MOST_LOOKED_AT`] candidates are looked at for each unassociated detection.
 
@@ -11,7 +11,7 @@ use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
 use super::super::confirm::motion_test::MotionProgress;
 use super::super::filter::TrackedFilter;
-use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points};
+use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points, from_velocity};
 use super::super::scan_table::{Cov2, MOST_LOOKED_AT};
 use super::super::single_track::{BATCH, Outcome, Track, motion_of, place_of};
 use super::context::Context;
@@ -53,6 +53,13 @@ pub(in crate::track) fn initiate(
     let Context { scan, table, config, .. } = *context;
     let prior = config.initiation.velocity_prior();
     let max_tracks = config.max_tracks as usize;
+    // What comes with its velocity needs no second point.
+    for (j, d) in scan.detections.iter().enumerate().filter(|(_, d)| d.velocity.is_some()) {
+        if !used[j] && out.tracks.len() < max_tracks && config.may_initiate(d.score) {
+            used[j] = true;
+            begin(context, clutter, j, None, prior, 0.0, out);
+        }
+    }
     if let InitiationConfig::OnePoint(_) = config.initiation {
         for (j, d) in scan.detections.iter().enumerate() {
             if !used[j] && out.tracks.len() < max_tracks && config.may_initiate(d.score) {
@@ -181,6 +188,10 @@ fn first_filter(
             let start = from_two_points(&first.position, &first.noise.matrix(), &d.position, &noise.matrix(), dt_s);
             let filter = config.start_filter(&start, height_px).ok()?;
             Some((filter, uniform_ratio(config, dt_s, clutter.at(d.position.x, d.position.y))))
+        }
+        (None, _) if let Some(v) = &d.velocity => {
+            let start = from_velocity(&d.position, &noise.matrix(), v, config.detection_covariance_scale);
+            Some((config.start_filter(&start, height_px).ok()?, 1.0))
         }
         (None, prior) => {
             let (velocity, variance) = prior.unwrap_or_default();

@@ -261,6 +261,7 @@ impl CfarDetector {
             sum: self.region.sum * side * side,
             score: (-c.number.max(1e-300).log10()) as f32,
             class: None,
+            velocity: None,
         };
         self.found.push(Found { detection, cells: first..self.cells.len() });
     }

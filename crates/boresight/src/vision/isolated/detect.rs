@@ -199,6 +199,7 @@ fn detection<T: Pixel>(
         sum: c.sum,
         score: best.score as f32,
         class: None,
+        velocity: None,
     })
 }
 

@@ -16,6 +16,7 @@ pub use otsu::otsu_level;
 use super::background::{BackgroundConfig, DifferenceConfig};
 use super::cfar::CfarConfig;
 use super::colour::ColourMatchConfig;
+use super::integrate::config::IntegrateConfig;
 use super::isolated::IsolatedConfig;
 pub use super::polarity::{Polarity, Side};
 use crate::Result;
@@ -47,6 +48,8 @@ pub enum ThresholdConfig {
     Spot(SpotConfig),
     /// Small targets of any size that stand out more than a stated number of false alarms a frame would; no clusters.
     Cfar(CfarConfig),
+    /// Small moving targets that no single frame shows: frames are summed along every straight path; no clusters.
+    Integrate(IntegrateConfig),
 }
 
 impl Default for ThresholdConfig {
@@ -196,6 +199,7 @@ impl ThresholdConfig {
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
             Self::Cfar(c) => c.validate(&format!("{at}.cfar"))?,
+            Self::Integrate(c) => c.validate(&format!("{at}.integrate"))?,
             Self::Local(c) => {
                 if !(c.k > 0.0 && c.k.is_finite()) {
                     return Err(wrong(

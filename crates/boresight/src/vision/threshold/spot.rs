@@ -302,6 +302,7 @@ impl SpotDetector {
             sum: spot.mass,
             score: spot.score,
             class: None,
+            velocity: None,
         }
     }
 }

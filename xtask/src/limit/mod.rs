@@ -1,0 +1,75 @@
+//! `cargo xtask limit`: what is reached below the noise of a frame beside what was aimed at, as Markdown, written to docs/limit.md.
+
+mod cost;
+mod crossing;
+mod curve;
+mod real;
+mod scene_j;
+mod scenes;
+mod white;
+
+use anyhow::Result;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost. The page is then printed, not written.
+    #[arg(default_value = "")]
+    only: String,
+    /// Windows of eight spots for each point of the curves.
+    #[arg(long, default_value_t = 25)]
+    windows: u64,
+    /// Runs of crossing targets.
+    #[arg(long, default_value_t = 200)]
+    runs: u64,
+    /// Frames of noise for the false alarms of long sums; ten times as many for short ones.
+    #[arg(long, default_value_t = 20_000)]
+    frames: u64,
+    /// Keys set for the real clips.
+    #[arg(long = "set")]
+    sets: Vec<String>,
+    /// Test data (default: `BORESIGHT_TEST_DATA`).
+    #[arg(long)]
+    data: Option<PathBuf>,
+    /// Python with NumPy, for the comparison of cost.
+    #[arg(long)]
+    python: Option<PathBuf>,
+}
+
+const HEAD: &str = include_str!("head.md");
+
+pub fn run(args: &Args) -> Result<()> {
+    let wanted = |name: &str| name.contains(&args.only);
+    let mut page = HEAD.to_string();
+    let mut part = |name: &str, text: &str, fill: &mut dyn FnMut(&mut String) -> Result<()>| -> Result<()> {
+        if wanted(name) {
+            let mut section = format!("\n{text}\n\n");
+            fill(&mut section)?;
+            if !args.only.is_empty() {
+                println!("{section}");
+            }
+            page.push_str(&section);
+        }
+        Ok(())
+    };
+    let mut curves = Vec::new();
+    part("detection", include_str!("detection.md").trim(), &mut |p| {
+        curves = white::table_of_detection(args.windows, p)?;
+        Ok(())
+    })?;
+    part("alarms", include_str!("alarms.md").trim(), &mut |p| {
+        white::table_of_alarms(16, 10 * args.frames, p)?;
+        white::table_of_alarms(64, args.frames, p)
+    })?;
+    part("crossing", include_str!("crossing.md").trim(), &mut |p| crossing::table(args.runs, p))?;
+    part("scene", include_str!("scene_j.md").trim(), &mut |p| scene_j::table(p))?;
+    let data = args.data.clone().unwrap_or_else(crate::data::test_data);
+    part("real", include_str!("real.md").trim(), &mut |p| real::table(&data, &args.sets, p))?;
+    part("cost", include_str!("cost.md").trim(), &mut |p| cost::table(args.python.as_deref(), p))?;
+    if args.only.is_empty() {
+        let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");
+        std::fs::write(docs.join("limit.md"), page)?;
+        std::fs::write(docs.join("images/limit.svg"), curve::svg(&curves))?;
+    }
+    Ok(())
+}
