@@ -69,6 +69,7 @@ mod tests {
     use super::super::sweep::Sweep;
     use super::*;
     use crate::Image;
+    use crate::vision::isolated::highest::Highest;
     use crate::vision::threshold::Side;
     use crate::vision::threshold::band::words;
     use rand::{RngExt, SeedableRng};
@@ -79,9 +80,11 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         let image = Image::from_vec(150, 90, (0..150 * 90).map(|_| rng.random::<u8>()).collect()).unwrap();
         let (mut sweep, mut bits) = (Sweep::default(), vec![0; words(150)]);
+        let mut highest = Highest::default();
+        highest.read(&image, 1.0);
         let mut boxes = Vec::new();
         for level in [120.0, 150.0, 200.0] {
-            sweep.run(&image, Side::Bright, level, &mut bits);
+            sweep.run(&image, &highest, Side::Bright, level, &mut bits);
             boxes.extend(sweep.blobs());
         }
         let mut near = Near::default();
