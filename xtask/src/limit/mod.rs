@@ -36,7 +36,7 @@ pub struct Args {
     python: Option<PathBuf>,
 }
 
-const HEAD: &str = include_str!("head.md");
+const HEAD: &str = include_str!("head.txt");
 
 pub fn run(args: &Args) -> Result<()> {
     let wanted = |name: &str| name.contains(&args.only);
@@ -53,19 +53,19 @@ pub fn run(args: &Args) -> Result<()> {
         Ok(())
     };
     let mut curves = Vec::new();
-    part("detection", include_str!("detection.md").trim(), &mut |p| {
+    part("detection", include_str!("detection.txt").trim(), &mut |p| {
         curves = white::table_of_detection(args.windows, p)?;
         Ok(())
     })?;
-    part("alarms", include_str!("alarms.md").trim(), &mut |p| {
+    part("alarms", include_str!("alarms.txt").trim(), &mut |p| {
         white::table_of_alarms(16, 10 * args.frames, p)?;
         white::table_of_alarms(64, args.frames, p)
     })?;
-    part("crossing", include_str!("crossing.md").trim(), &mut |p| crossing::table(args.runs, p))?;
-    part("scene", include_str!("scene_j.md").trim(), &mut |p| scene_j::table(p))?;
+    part("crossing", include_str!("crossing.txt").trim(), &mut |p| crossing::table(args.runs, p))?;
+    part("scene", include_str!("scene_j.txt").trim(), &mut |p| scene_j::table(p))?;
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
-    part("real", include_str!("real.md").trim(), &mut |p| real::table(&data, &args.sets, p))?;
-    part("cost", include_str!("cost.md").trim(), &mut |p| cost::table(args.python.as_deref(), p))?;
+    part("real", include_str!("real.txt").trim(), &mut |p| real::table(&data, &args.sets, p))?;
+    part("cost", include_str!("cost.txt").trim(), &mut |p| cost::table(args.python.as_deref(), p))?;
     if args.only.is_empty() {
         let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");
         std::fs::write(docs.join("limit.md"), page)?;

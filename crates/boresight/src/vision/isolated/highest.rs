@@ -2,7 +2,6 @@
 //!
 //! Symbols: for dark targets all values are negated. Units: counts; cells of 8 x 8 px, words of 64 px.
 
-use super::sweep::Blob;
 use crate::Image;
 use crate::vision::pixel::Pixel;
 
@@ -54,11 +53,11 @@ impl Highest {
         of_word.filter(move |(_, most)| **most >= level).map(|(w, _)| w)
     }
 
-    /// The highest value in the cells that a blob's box touches.
-    pub fn near(&self, blob: &Blob) -> f32 {
+    /// The highest value in the cells that a box touches; `[left, top, right, bottom]`, px.
+    pub fn near(&self, [left, top, right, bottom]: [u32; 4]) -> f32 {
         let cell = |v: u32| v as usize / CELL;
-        let columns = cell(blob.left)..=cell(blob.right);
-        let rows = cell(blob.top)..=cell(blob.bottom);
+        let columns = cell(left)..=cell(right);
+        let rows = cell(top)..=cell(bottom);
         let cells = rows.flat_map(|r| &self.of_cell[r * self.columns..][columns.clone()]);
         cells.fold(f32::NEG_INFINITY, |a, &b| a.max(b))
     }
@@ -84,7 +83,7 @@ mod tests {
                     }
                     for x in 0..w {
                         let (px, py) = (x as u32, y as u32);
-                        assert!(highest.near(&Blob::of_box([px, py, px, py])) >= row(x));
+                        assert!(highest.near([px, py, px, py]) >= row(x));
                     }
                 }
             }

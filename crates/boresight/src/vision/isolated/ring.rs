@@ -71,7 +71,9 @@ impl Ring {
         let stride = ((((x1 - x0 + 1) * (y1 - y0 + 1)) as f64 / MAX_SAMPLES).sqrt() as usize).max(1);
         let whole = inner.0 >= margin && inner.1 >= margin && inner.2 + margin == x1 && inner.3 + margin == y1;
         // No mean is above the largest value near.
-        let most = known.highest.map_or(f64::INFINITY, |h| f64::from(h.near(blob).next_up()));
+        let most = known
+            .highest
+            .map_or(f64::INFINITY, |h| f64::from(h.near([blob.left, blob.top, blob.right, blob.bottom]).next_up()));
         let edge = outer_edge(image, side, level, [x0, y0, x1, y1])?;
         let mut bar = edge.ground + min_score * (least_unit + EDGE_SPREAD * edge.spread);
         if known.highest.is_none() {
