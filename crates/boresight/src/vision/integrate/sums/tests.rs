@@ -1,4 +1,4 @@
-//! Shared sums against direct ones, and what they cost.
+//! Shared sums against direct ones.
 
 use super::*;
 use proptest::prelude::*;
