@@ -18,6 +18,20 @@ var_vx_px2_per_s2,cov_vx_y_px2_per_s,cov_vx_vy_px2_per_s2,\
 var_y_px2,cov_y_vy_px2_per_s,var_vy_px2_per_s2,\
 width_px,height_px,detection";
 
+/// The ten entries of the state's covariance among its columns.
+pub(crate) const COVARIANCE_COLUMNS: [&str; 10] = [
+    "var_x_px2",
+    "cov_x_vx_px2_per_s",
+    "cov_x_y_px2",
+    "cov_x_vy_px2_per_s",
+    "var_vx_px2_per_s2",
+    "cov_vx_y_px2_per_s",
+    "cov_vx_vy_px2_per_s2",
+    "var_y_px2",
+    "cov_y_vy_px2_per_s",
+    "var_vy_px2_per_s2",
+];
+
 /// The word of a status in tables.
 pub fn status_word(status: TrackStatus) -> &'static str {
     match status {
@@ -86,5 +100,15 @@ impl Sink for TracksCsv {
 
     fn finish(self: Box<Self>) -> Result<()> {
         self.output.finish()
+    }
+}
+
+#[cfg(test)]
+mod names {
+    use super::*;
+
+    #[test]
+    fn the_covariance_stands_in_the_header_in_its_order() {
+        assert!(TRACKS_HEADER.contains(&COVARIANCE_COLUMNS.join(",")));
     }
 }

@@ -1,13 +1,14 @@
 //! Growth of the trees: every leaf by a miss and by its gated detections, every detection as a new target.
 //!
 //! A hypothesis that its confirmation rule or its coasting budget ends is cut at once. New targets start from one point with
-//! unknown velocity; those that the next scans do not bear out fall by their score.
+//! unknown velocity, or with the one that comes with it; those that the next scans do not bear out fall by their score.
 
 use super::super::appearance::Appearance;
 use super::super::association_cost::AssociationCost;
 use super::super::clutter::Clutter;
+use super::super::config::TrackerConfig;
 use super::super::confirm::history::{Decision, Evidence};
-use super::super::initiation::from_one_point;
+use super::super::initiation::{from_one_point, from_velocity};
 use super::super::scan_table::Predicted;
 use super::super::single_track::{Outcome, Track, motion_of, place_of};
 use super::super::step::context::Context;
@@ -63,6 +64,19 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
         for tree in trees {
             tree.leaves.truncate(each);
         }
+    }
+    Ok(())
+}
+
+/// Predicts every leaf over `dt_s`: a scan in which nothing could be detected is no miss, and no tree grows by it.
+/// # Errors
+/// A filter that cannot predict over that time.
+pub(super) fn coast(trees: &mut [Tree], dt_s: f64, config: &TrackerConfig) -> Result<()> {
+    let survival = config.confirmation.survival(dt_s);
+    for leaf in trees.iter_mut().flat_map(|tree| &mut tree.leaves) {
+        leaf.track.filter.predict(dt_s)?;
+        config.confirmation.predict_existence(&mut leaf.track.history, survival);
+        leaf.outcome = Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
     }
     Ok(())
 }
@@ -139,8 +153,11 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
             continue;
         }
         let noise = table.noise(j as u32);
-        let start = &from_one_point(&d.position, &noise.matrix(), velocity, variance);
-        let Ok(filter) = config.start_filter(start, d.extent.height_px) else { continue };
+        let start = match &d.velocity {
+            Some(v) => from_velocity(&d.position, &noise.matrix(), v, config.detection_covariance_scale),
+            None => from_one_point(&d.position, &noise.matrix(), velocity, variance),
+        };
+        let Ok(filter) = config.start_filter(&start, d.extent.height_px) else { continue };
         let density = growth.clutter.at(d.position.x, d.position.y).max(1e-200);
         let mut path = [NONE; WINDOW];
         path[0] = j as u32;

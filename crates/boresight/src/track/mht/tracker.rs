@@ -8,7 +8,7 @@
 //! twice within the window) is the answer; leaves that disagree with it `n_scan` scans back are cut.
 //! Memory is bounded: `max_leaves` a tree and `max_hypotheses` in all; the selection has a budget of steps (`select`).
 //! Symbols: score = Σ ln(P_D l / λ) over hits + Σ ln(1 − P_D P_G) over misses, from ln(β_new / λ) at the start.
-//! Limits: `n_scan` ≤ 7. Targets start from one point whatever `initiation` says (its velocities hold); `merged-measurements` and
+//! Limits: `n_scan` ≤ 7. Targets start from one detection whatever `initiation` says (its velocities hold where the detection has none); `merged-measurements` and
 //! `duplicate-s` have no effect here: compatible hypotheses share nothing.
 
 use super::super::association_cost::AssociationCost;
@@ -21,7 +21,7 @@ use super::super::step::delete::{coast_budget_s, expired_in_gap};
 use super::super::step::report::report;
 use super::super::tracking::Tracking;
 use super::config::MhtConfig;
-use super::grow::{Growth, grow, initiate};
+use super::grow::{Growth, coast, grow, initiate};
 use super::hypothesis::Tree;
 use super::prune::prune;
 use super::select::Select;
@@ -120,6 +120,11 @@ impl Tracking for Mht {
         }
         self.clock.advance(scan);
         let dt_s = step_s.unwrap_or(0.0);
+        if scan.blind {
+            coast(&mut self.trees, dt_s, &self.config)?;
+            self.report();
+            return Ok(&self.states);
+        }
         self.table.sort(scan);
         let growth = Growth {
             context: Context { scan, table: &self.table, config: &self.config, gate: self.gate },

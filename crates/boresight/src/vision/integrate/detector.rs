@@ -105,7 +105,7 @@ impl IntegrateDetector {
         let Some((_, _, memory)) = &mut self.memory else { return false };
         // After a gap as long as a sum nothing that was seen before is of use; nor if time stands still or runs back.
         let usual = self.search.as_ref().map_or(f64::INFINITY, |s| s.interval_s * f64::from(n));
-        if self.fresh > 0 && (frame.dt_s <= 0.0 || frame.dt_s > usual) {
+        if !memory.is_empty() && (frame.dt_s <= 0.0 || frame.dt_s > usual) {
             memory.clear();
             self.fresh = 0;
         }

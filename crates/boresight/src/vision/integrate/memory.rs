@@ -94,6 +94,11 @@ impl Memory {
         (self.next, self.filled, self.background_weight) = (0, 0, 0.0);
     }
 
+    /// Whether no frame is there.
+    pub(super) fn is_empty(&self) -> bool {
+        self.filled == 0
+    }
+
     /// Whether all frames of a sum are there.
     pub(super) fn is_full(&self) -> bool {
         self.filled == self.frames.len()
@@ -155,7 +160,7 @@ impl Memory {
         for age in 0..n {
             let frame = &self.frames[self.place(age)];
             self.samples.clear();
-            let sampled = frame.iter().zip(&self.background).step_by(SAMPLED | 1);
+            let sampled = frame.iter().zip(&self.background).step_by(SAMPLED);
             self.samples.extend(sampled.map(|(v, b)| (v - b).abs()));
             phi.frames.push((MAD * median(&mut self.samples)).max(self.rounding).max(f32::MIN_POSITIVE.sqrt()));
         }

@@ -97,9 +97,9 @@ impl IsolatedDetector {
         out: &mut Vec<Detection>,
     ) {
         let isolated = &self.isolated;
-        levels::choose(image, side, isolated.levels as usize, noise, &mut self.samples, &mut self.levels);
-        let sign = if side == Side::Bright { 1.0 } else { -1.0 };
-        self.highest.read(image, sign);
+        self.highest.read(image, if side == Side::Bright { 1.0 } else { -1.0 });
+        let high = f64::from(self.highest.most());
+        levels::choose(image, side, isolated.levels as usize, noise, high, &mut self.samples, &mut self.levels);
         self.candidates.clear();
         let (min_area, max_area) = config.cluster.area_limits();
         let around = Known { sums: &self.sums, highest: Some(&self.highest) };

@@ -28,29 +28,36 @@ impl Highest {
         self.of_cell.clear();
         self.of_cell.resize(self.columns * rows, f32::NEG_INFINITY);
         self.of_word.clear();
-        self.of_word.resize(self.words * rows, f32::NEG_INFINITY);
-        for r in 0..rows {
-            let cells = &mut self.of_cell[r * self.columns..][..self.columns];
+        for (r, cells) in self.of_cell.chunks_exact_mut(self.columns.max(1)).enumerate() {
             for y in r * CELL..((r + 1) * CELL).min(image.height()) {
-                for (most, line) in cells.iter_mut().zip(image.row(y).chunks(CELL)) {
-                    for p in line {
-                        let v = sign * p.value_f32();
-                        *most = if v > *most && v < f32::INFINITY { v } else { *most };
-                    }
+                let (whole, rest) = image.row(y).as_chunks::<CELL>();
+                for (most, line) in cells.iter_mut().zip(whole) {
+                    // Folded by halves, which is done in vectors.
+                    let [a, b, c, d, e, f, g, h] = line.map(|p| finite(sign * p.value_f32()));
+                    *most =
+                        larger(*most, larger(larger(larger(a, e), larger(c, g)), larger(larger(b, f), larger(d, h))));
+                }
+                if let Some(most) = cells.get_mut(whole.len()) {
+                    *most = rest.iter().fold(*most, |a, p| larger(a, finite(sign * p.value_f32())));
                 }
             }
-            let words = &mut self.of_word[r * self.words..][..self.words];
-            for (word, cells) in words.iter_mut().zip(cells.chunks(WORD / CELL)) {
-                *word = cells.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
-            }
+            let words = cells.chunks(WORD / CELL);
+            self.of_word.extend(words.map(|cells| cells.iter().copied().fold(f32::NEG_INFINITY, larger)));
         }
     }
 
-    /// The words of image row `y` in which a pixel can be at or above `level`.
-    pub fn words(&self, y: usize, level: f32) -> impl Iterator<Item = usize> {
+    /// The highest value of all; minus infinity if none is finite.
+    pub fn most(&self) -> f32 {
+        self.of_word.iter().copied().fold(f32::NEG_INFINITY, larger)
+    }
+
+    /// The words of image row `y` from the first to the last in which a pixel can be at or above `level`.
+    pub fn reached(&self, y: usize, level: f32) -> std::ops::Range<usize> {
         let row = y / CELL * self.words..(y / CELL + 1) * self.words;
-        let of_word = self.of_word.get(row).unwrap_or_default().iter().enumerate();
-        of_word.filter(move |(_, most)| **most >= level).map(|(w, _)| w)
+        let of_word = self.of_word.get(row).unwrap_or_default();
+        let first = of_word.iter().position(|most| *most >= level).unwrap_or(of_word.len());
+        let end = of_word.iter().rposition(|most| *most >= level).map_or(first, |last| last + 1);
+        first..end
     }
 
     /// The highest value in the cells that a box touches; `[left, top, right, bottom]`, px.
@@ -59,8 +66,20 @@ impl Highest {
         let columns = cell(left)..=cell(right);
         let rows = cell(top)..=cell(bottom);
         let cells = rows.flat_map(|r| &self.of_cell[r * self.columns..][columns.clone()]);
-        cells.fold(f32::NEG_INFINITY, |a, &b| a.max(b))
+        cells.copied().fold(f32::NEG_INFINITY, larger)
     }
+}
+
+/// The larger one; the first if they cannot be compared.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// The value, or minus infinity if it is not finite.
+#[inline(always)]
+fn finite(v: f32) -> f32 {
+    if v < f32::INFINITY { v } else { f32::NEG_INFINITY }
 }
 
 #[cfg(test)]
@@ -75,10 +94,12 @@ mod tests {
             for sign in [1.0, -1.0] {
                 let mut highest = Highest::default();
                 highest.read(&image, sign);
+                let all = image.as_slice().iter().map(|p| sign * f32::from(*p));
+                assert_eq!(highest.most(), all.fold(f32::NEG_INFINITY, f32::max));
                 for y in 0..h {
                     let row = |x: usize| sign * f32::from(image.row(y)[x]);
                     for level in [sign * 5000.0, sign * 9000.0, sign * 40.0] {
-                        let words: Vec<usize> = highest.words(y, level).collect();
+                        let words = highest.reached(y, level);
                         assert!((0..w).all(|x| row(x) < level || words.contains(&(x / 64))), "{w} {y} {level}");
                     }
                     for x in 0..w {
@@ -98,9 +119,11 @@ mod tests {
         image.row_mut(12)[201] = f32::INFINITY;
         let mut highest = Highest::default();
         highest.read(&image, 1.0);
-        let words = |y, level| highest.words(y, level).collect::<Vec<_>>();
-        assert_eq!((words(12, 80.0), words(12, 91.0), words(3, 80.0)), (vec![1], vec![], vec![]));
+        assert_eq!(highest.reached(12, 80.0), 1..2);
+        assert_eq!(highest.reached(12, 10.0), 0..4);
+        assert!(highest.reached(12, 91.0).is_empty() && highest.reached(3, 80.0).is_empty());
+        assert_eq!(highest.most(), 90.0);
         highest.read(&Image::filled(0, 0, 1u8), 1.0);
-        assert_eq!(highest.words(0, 0.0).count(), 0);
+        assert!(highest.reached(0, 0.0).is_empty() && highest.most() == f32::NEG_INFINITY);
     }
 }

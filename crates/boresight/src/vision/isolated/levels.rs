@@ -11,12 +11,14 @@ use crate::vision::threshold::Side;
 /// Pixels looked at for the two quantiles, at most.
 const MAX_SAMPLES: usize = 16_384;
 
-/// Writes the levels for `side`, from the background towards the extreme.
+/// Writes the levels for `side`, from the background towards the extreme: `high` is the highest value, negated if dark targets are looked for. It
+/// comes from every pixel, for a target may be one.
 pub fn choose<T: Pixel>(
     image: &Image<T>,
     side: Side,
     n: usize,
     noise: f64,
+    high: f64,
     samples: &mut Vec<f32>,
     levels: &mut Vec<f64>,
 ) {
@@ -38,7 +40,6 @@ pub fn choose<T: Pixel>(
         None => low,
     };
     let (low, bulk) = (f64::from(low), f64::from(bulk));
-    let high = f64::from(extreme(data, sign));
     let even = n * 3 / 4;
     levels.extend((1..=even).map(|i| low + (bulk - low) * i as f64 / even as f64));
     let first = (bulk - low) / even as f64;
@@ -65,22 +66,4 @@ pub fn choose<T: Pixel>(
         keep
     });
     levels.iter_mut().for_each(|l| *l *= f64::from(sign));
-}
-
-/// The largest finite value times `sign`; it needs every pixel, for a target may be one pixel.
-fn extreme<T: Pixel>(data: &[T], sign: f32) -> f32 {
-    let value = |p: &T| {
-        let v = sign * p.value_f32();
-        if v.is_finite() { v } else { f32::NEG_INFINITY }
-    };
-    let larger = |a: f32, b: f32| if b > a { b } else { a };
-    // Sixteen at a time, so that it is done in vectors.
-    let mut most = [f32::NEG_INFINITY; 16];
-    let (chunks, rest) = data.as_chunks::<16>();
-    for chunk in chunks {
-        for (m, p) in most.iter_mut().zip(chunk) {
-            *m = larger(*m, value(p));
-        }
-    }
-    most.into_iter().chain(rest.iter().map(value)).fold(f32::NEG_INFINITY, larger)
 }

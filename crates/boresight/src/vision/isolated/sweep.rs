@@ -79,18 +79,15 @@ impl Sweep {
         // Rounded down: a word too many costs little.
         let least = (if side == Side::Bright { level } else { -level } as f32).next_down();
         for y in 0..image.height() {
-            let (mut any, row) = (false, image.row(y));
-            bits.fill(0);
-            for w in highest.words(y, least) {
-                let Some(bits) = bits.get_mut(w..=w) else { break };
-                T::band_bits(&row[64 * w..row.len().min(64 * (w + 1))], low, high, bits);
-                any |= bits[0] != 0;
-            }
-            if any {
-                self.row(y as u32, bits);
-            } else {
+            let words = highest.reached(y, least);
+            if words.is_empty() {
                 self.above.clear();
+                continue;
             }
+            let row = image.row(y);
+            bits.fill(0);
+            T::band_bits(&row[64 * words.start..row.len().min(64 * words.end)], low, high, &mut bits[words]);
+            self.row(y as u32, bits);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Robustness of association and tracking: random gates and scans, bad input, extremes.
 
 mod associators;
+mod blind;
 mod extremes;
 mod merged;
 mod random_scans;

@@ -7,34 +7,15 @@
 
 use super::paths::{Paths, centre, dropped};
 use super::zarr::{Store, Values};
+use crate::io::tables::COVARIANCE_COLUMNS;
 use crate::io::tracks::parents::parents;
 use crate::{Error, ErrorKind, Result, TrackStatus, TrackTable};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Columns that the graph holds beside positions.
-const HELD: [&str; 20] = [
-    "score",
-    "class",
-    "parent",
-    "time_s",
-    "status",
-    "detection",
-    "vx_px_per_s",
-    "vy_px_per_s",
-    "var_x_px2",
-    "cov_x_vx_px2_per_s",
-    "cov_x_y_px2",
-    "cov_x_vy_px2_per_s",
-    "var_vx_px2_per_s2",
-    "cov_vx_y_px2_per_s",
-    "cov_vx_vy_px2_per_s2",
-    "var_y_px2",
-    "cov_y_vy_px2_per_s",
-    "var_vy_px2_per_s2",
-    "var_xy",
-    "cov_xy_px2",
-];
+/// Columns that the graph holds beside positions and [`COVARIANCE_COLUMNS`].
+const HELD: [&str; 10] =
+    ["score", "class", "parent", "time_s", "status", "detection", "vx_px_per_s", "vy_px_per_s", "var_xy", "cov_xy_px2"];
 
 /// Properties of nodes that are written, with what is said of them.
 struct Nodes<'a> {
@@ -90,7 +71,7 @@ impl Nodes<'_> {
 /// Something else under the name; a track that stands twice in a frame; files that cannot be written.
 pub(crate) fn write_folder(table: &TrackTable, folder: Option<&Path>) -> Result<Vec<String>> {
     let paths = Paths::new(table)?;
-    let Some(folder) = folder else { return Ok(dropped(table, &HELD)) };
+    let Some(folder) = folder else { return Ok(dropped(table, &[HELD, COVARIANCE_COLUMNS].concat())) };
     let failed = |what: &str, e: std::io::Error| Error::new(ErrorKind::Output, what).at(folder.display()).because(e);
     if folder.exists() && !is_geff(folder) {
         return Err(Error::new(ErrorKind::Output, "something else than a GEFF store is in the way")
@@ -112,7 +93,7 @@ pub(crate) fn write_folder(table: &TrackTable, folder: Option<&Path>) -> Result<
         let _ = std::fs::remove_dir_all(&part);
         return Err(e);
     }
-    Ok(dropped(table, &HELD))
+    Ok(dropped(table, &[HELD, COVARIANCE_COLUMNS].concat()))
 }
 
 /// Whether a folder is a store that was written here, or one like it, or empty.

@@ -5,7 +5,7 @@
 
 use super::paths::{centre, class, dropped};
 use crate::io::atomic::AtomicFile;
-use crate::io::tables::status_word;
+use crate::io::tables::{COVARIANCE_COLUMNS, status_word};
 use crate::{Error, ErrorKind, PixelOrigin, Result, TrackTable};
 use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
@@ -20,20 +20,6 @@ use std::sync::Arc;
 
 /// Rows of a group.
 const GROUP: usize = 1 << 20;
-
-/// The ten entries of a covariance, by their names in `tracks.csv`.
-const COV: [&str; 10] = [
-    "var_x_px2",
-    "cov_x_vx_px2_per_s",
-    "cov_x_y_px2",
-    "cov_x_vy_px2_per_s",
-    "var_vx_px2_per_s2",
-    "cov_vx_y_px2_per_s",
-    "cov_vx_vy_px2_per_s2",
-    "var_y_px2",
-    "cov_y_vy_px2_per_s",
-    "var_vy_px2_per_s2",
-];
 
 type Of<'a, T> = Box<dyn Fn(usize) -> Option<T> + 'a>;
 
@@ -140,7 +126,7 @@ fn columns<'a>(table: &'a TrackTable, input: Option<&'a str>) -> Vec<(&'static s
         ("vx_px_per_s", Column::Double(Box::new(|r| table.velocity(r).map(|v| v.x)))),
         ("vy_px_per_s", Column::Double(Box::new(|r| table.velocity(r).map(|v| v.y)))),
     ];
-    for (k, name) in COV.into_iter().enumerate() {
+    for (k, name) in COVARIANCE_COLUMNS.into_iter().enumerate() {
         let of = move |r: usize| match (table.state(r).cov, table.state(r).position_cov) {
             (Some(cov), _) => Some(cov[k]),
             // Variances of x and y, and between them, may stand alone.
