@@ -16,6 +16,24 @@ pub enum MotionBasis {
     Measured,
     /// Not seen in this scan: what went before goes on, less and less surely.
     Held,
+    /// Seen again, but only against the scan before, which was held: what was not known of the place there is never made up for.
+    Resumed,
+}
+
+impl MotionBasis {
+    /// Its word in tables and records.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Held => "held",
+            Self::Resumed => "resumed",
+        }
+    }
+
+    /// The basis of a word, if it is one.
+    pub fn of_word(word: &str) -> Option<Self> {
+        [Self::Measured, Self::Held, Self::Resumed].into_iter().find(|b| b.word() == word)
+    }
 }
 
 /// How the background moved in the image since the scan before.
@@ -49,7 +67,7 @@ impl CameraMotion {
 
     /// The shift, if it was measured in this scan.
     pub fn measured_shift_px(&self) -> Option<Vector2<f64>> {
-        (self.basis == MotionBasis::Measured && self.is_finite()).then(|| self.shift_px())
+        (self.basis != MotionBasis::Held && self.is_finite()).then(|| self.shift_px())
     }
 
     /// Covariance of where the background lies at a point of the image, px².

@@ -30,7 +30,7 @@ pub enum PixelKind {
 
 impl PixelKind {
     /// Bytes of a pixel.
-    pub(crate) fn bytes(self) -> usize {
+    pub fn bytes(self) -> usize {
         match self {
             Self::Gray8 => 1,
             Self::Gray16 => 2,

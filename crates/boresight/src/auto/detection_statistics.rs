@@ -10,6 +10,8 @@
 
 use super::digits::round;
 use super::first_scans::{Shares, first};
+use super::score_statistics::{self, Held};
+use crate::associate::{AssociatorConfig, CostKind, GlobalNearestConfig};
 use crate::track::{ClutterConfig, ConfirmationConfig, ExistenceConfig};
 use crate::{Config, Result, Scan, TrackStatus};
 use std::collections::BTreeMap;
@@ -89,7 +91,7 @@ pub fn learn(
     }
     let interval_s = over_s / (n_scans - 1) as f64;
     for _ in 0..PASSES {
-        let tracks = run(scans, config)?;
+        let (tracks, held) = run(scans, config)?;
         let targets = || tracks.values().filter(|t| t.confirmed);
         let (mut hits, mut missed, mut gaps, mut lived, mut ended, mut begun, mut own) = (0, 0, 0, 0, 0, 0, 0);
         // A track that was seen to the last scans has not ended; one that began in the first ones was there before.
@@ -125,6 +127,10 @@ pub fn learn(
         t.redetection_probability = Some(round(after_miss.clamp(0.01, MOST_P_DETECTION)));
         t.clutter_density_per_px2 = round(false_density);
         t.clutter = ClutterConfig::Given;
+        t.score_likelihood = score_statistics::of(scans, &held, t.appearance_gain);
+        if t.score_likelihood.is_some() {
+            t.associator = AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Likelihood });
+        }
         t.confirmation = ConfirmationConfig::Existence(ExistenceConfig {
             new_target_density_per_px2: round(new_density),
             confirm_probability: 1.0 - round(1.0 - confirm),
@@ -155,10 +161,11 @@ fn share(yes: usize, no: usize, prior: [f64; 2]) -> f64 {
 }
 
 /// What the tracker makes of the scans.
-fn run(scans: &[Scan], config: &Config) -> Result<BTreeMap<u64, Seen>> {
+fn run(scans: &[Scan], config: &Config) -> Result<(BTreeMap<u64, Seen>, Vec<Held>)> {
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Seen> = BTreeMap::new();
     let mut shares = Shares::default();
+    let mut held = Vec::new();
     for (k, scan) in scans.iter().enumerate() {
         let states = tracker.step(scan)?;
         shares.count(scan.detections.len(), states);
@@ -173,10 +180,14 @@ fn run(scans: &[Scan], config: &Config) -> Result<BTreeMap<u64, Seen>> {
             }
             t.last = k;
             t.hits += 1;
-            t.own += usize::from(shares.is_one(j));
+            if shares.is_one(j) {
+                t.own += 1;
+                held.push(Held { scan: k, detection: j, track: s.id.0 });
+            }
         }
     }
-    Ok(tracks)
+    held.retain(|h| tracks[&h.track].confirmed);
+    Ok((tracks, held))
 }
 
 #[cfg(test)]

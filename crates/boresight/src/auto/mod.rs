@@ -22,6 +22,7 @@ mod particles;
 mod replay;
 mod request;
 mod scene;
+mod score_statistics;
 mod second_look;
 mod spots;
 mod spread;

@@ -13,6 +13,7 @@ use super::replay::Replay;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
+use super::spots::{INITIATION_SCORE, WEAK_INITIATION_SCORE};
 use super::{first_scans, noise};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
@@ -121,9 +122,10 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     let area_px2 = (info.width * info.height).max(1) as f64;
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
-    if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
+    let nothing = |found: Option<Found>| found.is_some_and(|f| f.n_targets == 0);
+    if choice.config.tracker.report == Report::Moving && nothing(found) {
         // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them.
-        let mut still = assumed;
+        let mut still = assumed.clone();
         still.config.tracker.report = Report::All;
         let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut still)?;
         if let Some(things) = things.filter(|f| f.n_targets > 0 && f.per_scan <= FEW_STILL) {
@@ -132,6 +134,18 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
                 things.per_scan
             ));
             *choice = still;
+            return Ok(Box::new(pass));
+        }
+    }
+    if nothing(found) && assumed.config.tracker.min_initiation_score == INITIATION_SCORE {
+        let mut weak = assumed;
+        weak.config.tracker.min_initiation_score = WEAK_INITIATION_SCORE;
+        let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut weak)?;
+        if !nothing(things) {
+            weak.reasons.push(format!(
+                "No target of a score of {INITIATION_SCORE} moves, but some of {WEAK_INITIATION_SCORE}: these start tracks."
+            ));
+            *choice = weak;
         }
     }
     Ok(Box::new(pass))

@@ -175,7 +175,7 @@ fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
     for frame in frames {
         if let Some(step) = motion.step(&frame.pixels) {
             moved = moved.then(&step.now_from_before);
-            if step.basis == MotionBasis::Measured {
+            if step.basis != MotionBasis::Held {
                 said += 1;
                 // A turn and a zoom about the middle show at the corners.
                 let (w, h) = (frame.pixels.width() as f64, frame.pixels.height() as f64);

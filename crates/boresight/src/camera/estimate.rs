@@ -85,6 +85,7 @@ impl CameraMotionEstimator {
         }
         let middle = self.middle();
         let mut found = self.look(false, middle);
+        let at_last = found.is_none();
         if found.is_none() {
             self.last.choose();
             found = self.look(true, middle);
@@ -97,7 +98,7 @@ impl CameraMotionEstimator {
         self.last.forget();
         self.key_is_last = false;
         let (step, cov, basis) = match found {
-            Some(found) => self.measured(found, middle),
+            Some(found) => self.measured(found, at_last, middle),
             None => self.held(middle)?,
         };
         if !self.key_is_last {
@@ -151,16 +152,18 @@ impl CameraMotionEstimator {
         Some(found)
     }
 
-    /// The motion by a fit.
-    fn measured(&mut self, found: Fit, middle: Vector2<f64>) -> (Similarity, Matrix4<f64>, MotionBasis) {
+    /// The motion by a fit, to the key frame or, `at_last`, to the frame before.
+    fn measured(&mut self, found: Fit, at_last: bool, middle: Vector2<f64>) -> (Similarity, Matrix4<f64>, MotionBasis) {
         let before = self.from_key;
         self.from_key = self.rest.settle(&before, &found.now_from_key, middle);
         let step = if self.from_key == before { Similarity::identity() } else { before.inverse().then(&self.from_key) };
         self.turning = found.turned && self.rest.moving;
         // A step over bridged frames is none of one frame.
-        if self.n_held == 0 {
-            self.course.learn(&step, middle);
+        match self.n_held {
+            0 => self.course.learn(&step, middle),
+            _ => self.course.found(),
         }
+        let basis = if self.n_held > 0 && at_last { MotionBasis::Resumed } else { MotionBasis::Measured };
         (self.known, self.n_held) = (true, 0);
         let own = if self.rest.moving { found.cov } else { Matrix4::zeros() };
         let cov = own + self.carried;
@@ -174,7 +177,7 @@ impl CameraMotionEstimator {
         if far || turned || few {
             self.new_key();
         }
-        (step, cov, MotionBasis::Measured)
+        (step, cov, basis)
     }
 
     fn new_key(&mut self) {

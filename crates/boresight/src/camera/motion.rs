@@ -11,8 +11,10 @@ pub struct CameraPath {
     pub length_px: f64,
     /// Variance of the newest step, px² per axis, mean over the image.
     pub step_variance_px2: f64,
-    /// Sum of the variances of the steps that were not measured but held, px².
+    /// Sum of the variances that steps which were not measured but held have left for good, px² per axis, mean over the image.
     pub held_variance_px2: f64,
+    /// Variance of the place at the newest of the steps that were held last, px²: it grows from one to the next.
+    bridge_px2: f64,
     /// Times that a background which was followed for some scans was lost: another view, or a jerk.
     pub cuts: u32,
     followed: u32,
@@ -21,7 +23,8 @@ pub struct CameraPath {
 impl CameraPath {
     /// Variance of where the background lies now against where it lay at `start`, px² per axis, mean over the image.
     ///
-    /// Measured steps are known against a key frame, so that only the errors of both ends count; those of held ones add up.
+    /// Measured steps are known against a key frame, so that only the errors of both ends count, and what was held in between is made up for. It stays
+    /// where the key frame was not found again.
     pub fn variance_since(&self, start: &Self) -> f64 {
         start.step_variance_px2 + self.step_variance_px2 + self.held_variance_px2 - start.held_variance_px2
     }
@@ -35,9 +38,14 @@ impl CameraPath {
             // Mean of |p - centre|² over the image, whose half sides are the centre's coordinates, for one axis.
             let spread = m.centre_px.norm_squared() / 6.0;
             self.step_variance_px2 = 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
-            if m.basis == MotionBasis::Held {
-                self.held_variance_px2 += self.step_variance_px2;
+            match m.basis {
+                MotionBasis::Held => self.bridge_px2 = self.step_variance_px2,
+                MotionBasis::Resumed => self.held_variance_px2 += std::mem::take(&mut self.bridge_px2),
+                MotionBasis::Measured => self.bridge_px2 = 0.0,
             }
+        } else {
+            // Nobody knows what came of it.
+            self.held_variance_px2 += std::mem::take(&mut self.bridge_px2);
         }
         match motion.and_then(CameraMotion::measured_shift_px).map(|s| s.norm()) {
             Some(length) => {
@@ -59,6 +67,31 @@ mod tests {
 
     fn step(path: &mut CameraPath, shift: Option<Vector2<f64>>) {
         path.step(shift.map(CameraMotion::exact_shift).as_ref());
+    }
+
+    #[test]
+    fn what_was_held_is_made_up_for_where_the_key_frame_is_found_again_and_stays_where_it_is_not() {
+        let motion = |basis, variance: f64| {
+            let mut m = CameraMotion::exact_shift(Vector2::new(1.0, 0.0));
+            (m.basis, m.cov[(0, 0)], m.cov[(1, 1)]) = (basis, variance, variance);
+            m
+        };
+        let variance_after = |last| {
+            let mut path = CameraPath::default();
+            let start = path;
+            for m in [motion(MotionBasis::Held, 1.0), motion(MotionBasis::Held, 4.0), motion(MotionBasis::Held, 9.0)] {
+                path.step(Some(&m));
+            }
+            assert_eq!(
+                path.variance_since(&start),
+                9.0,
+                "the covariance of a held step is that of all since the last measured one"
+            );
+            path.step(Some(&motion(last, 0.25)));
+            path.variance_since(&start)
+        };
+        assert_eq!(variance_after(MotionBasis::Measured), 0.25);
+        assert_eq!(variance_after(MotionBasis::Resumed), 9.25);
     }
 
     #[test]

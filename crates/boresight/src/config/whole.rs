@@ -73,6 +73,7 @@ impl InputConfig {
             max_pixels: self.max_pixels,
             page_step: self.page_step,
             first_page: self.first_page,
+            stop: None,
         }
     }
 

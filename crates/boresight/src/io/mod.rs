@@ -41,7 +41,7 @@ pub use budget::set_memory_budget;
 pub use folder::ImageFiles;
 pub use natural::natural_order;
 pub use open::{is_table, open};
-pub use options::{Colour, OpenOptions, RawFormat, RawType};
+pub use options::{Colour, OpenOptions, RawFormat, RawType, StopFlag};
 pub use pixels::gray_of_rgb8;
 pub use same_file::{is_same_file, refuse_to_overwrite};
 #[cfg(feature = "images")]

@@ -3,6 +3,8 @@
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Which pixels are wanted from a source that could give several kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -45,6 +47,29 @@ pub struct RawFormat {
     pub pixel: RawType,
 }
 
+/// Tells a source from another thread that nobody wants its frames any more.
+#[derive(Clone, Debug, Default)]
+pub struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// Says so, for good.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+
+    /// Whether it was said.
+    pub fn is_stopped(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
+impl PartialEq for StopFlag {
+    /// Whether both are raised by one call.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 /// How a source is to be opened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenOptions {
@@ -60,6 +85,8 @@ pub struct OpenOptions {
     pub page_step: Option<u64>,
     /// Number of the first such page, from 0.
     pub first_page: u64,
+    /// Ends a stream that another program reads while it is waited for; other sources never wait for long. `None`: it ends by itself.
+    pub stop: Option<StopFlag>,
 }
 
 impl Default for OpenOptions {
@@ -71,6 +98,7 @@ impl Default for OpenOptions {
             max_pixels: 1 << 28,
             page_step: None,
             first_page: 0,
+            stop: None,
         }
     }
 }

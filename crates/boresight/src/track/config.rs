@@ -13,6 +13,7 @@ use super::initiation::InitiationConfig;
 use super::merged_measurements::MergedMeasurementsConfig;
 use super::mht::config::MhtConfig;
 use super::reidentify::ReidentificationConfig;
+use super::score_likelihood::ScoreLikelihoodConfig;
 use crate::associate::AssociatorConfig;
 use crate::validate::{at_least_one, check, not_negative, positive, probability};
 use crate::{Error, ErrorKind, Result};
@@ -83,6 +84,8 @@ pub struct TrackerConfig {
     pub initial_tracks: Vec<InitialTrackConfig>,
     /// What a pair costs beside position: size, intensity, class, overlap.
     pub association_cost: AssociationCostConfig,
+    /// How scores tell targets from false detections; left out: they only say what may initiate a track.
+    pub score_likelihood: Option<ScoreLikelihoodConfig>,
     /// A second association of weak detections with tracks that took no strong one; left out: all detections are equal.
     pub two_stage: Option<TwoStageConfig>,
     /// Detections of several targets at once are split among their tracks; left out: they are (`enabled = false` switches it off).
@@ -133,6 +136,7 @@ impl Default for TrackerConfig {
             min_initiation_score: 0.0,
             initial_tracks: Vec::new(),
             association_cost: AssociationCostConfig::default(),
+            score_likelihood: None,
             two_stage: None,
             merged_measurements: MergedMeasurementsConfig::default(),
             reidentification: ReidentificationConfig::default(),
@@ -265,6 +269,9 @@ impl TrackerConfig {
                 "at most high-score",
                 "0.1 and 0.5 suit detectors with scores in 0..1",
             )?;
+        }
+        if let Some(c) = &self.score_likelihood {
+            c.validate(&format!("{at}.score-likelihood"))?;
         }
         self.merged_measurements.validate(&format!("{at}.merged-measurements"))?;
         self.reidentification.validate(&format!("{at}.reidentification"))?;

@@ -1,13 +1,16 @@
 //! Reidentification: a target that was lost and is found again keeps its id.
 //!
-//! Source: our own; the hypothesis test is Bayes' with even odds. When a track is confirmed, the tracks lost within the last seconds, and those that
-//! coast without a detection since the new one began, are predicted to that time by their own filters. The difference of the two beliefs in
+//! Source: our own; the hypothesis test is Bayes' with even odds. When a track is confirmed by its rule, and again when it has shown that it moves, the tracks
+//! lost within the last seconds, and those that had no detection in any scan in which the new one had one of its own, are predicted to that time by their
+//! own filters. The difference of the two beliefs in
 //! position and velocity is either that of one target, N(0, P + P'), or a new target's, anywhere in the field with a velocity
 //! N(0, v²/9) per axis; the likelier hypothesis holds, and among several lost tracks the likeliest one.
 //! Tracks are also lost where a target turns harder than the model allows (a ball at a wall): with the probability [`TURNED`] the velocity has changed by
-//! as much as the speeds before and after, u and u', and only the place speaks: N(0, P + P' + ½ (u² + u'²) T² I), T the time since it was last seen.
+//! as much as the speeds before and after, u and u', and only the place speaks: N(0, P + P' + ½ (u² + u'²) T² I), T the time since it was last seen; or where
+//! it stops: with the probability [`RESTED`] the new velocity is 0 within its own covariance. A new track that has not moved yet may also be scenery, at rest, as
+//! often as such tracks are. One that continues a target which has moved needs not show it again.
 //! It decides once and looks back only: a stream's ids, the annotated video's and the table's are the same.
-//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A; s the logarithm of the ratio of the heights.
+//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A, and so with things at rest.
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
 
 use super::filter::TrackedFilter;
@@ -23,6 +26,8 @@ use serde::{Deserialize, Serialize};
 const CONFIRM_S: f64 = 10.0;
 /// Share of losses where the target had turned hard; with none, every reversal gives a new id. Chosen: such turns are rarer than hiding.
 const TURNED: f64 = 0.1;
+/// Share of losses where the target had stopped. Chosen as the one of turns.
+const RESTED: f64 = 0.1;
 /// Lost tracks remembered.
 const MOST_LOST: usize = 256;
 /// Deviation of the logarithm of a target's height between its loss and its return: a third larger or smaller.
@@ -57,6 +62,8 @@ struct Lost {
     /// Time of the filter's belief.
     at: Timestamp,
     last_seen_ns: i64,
+    /// Scans with a detection, the newest in the lowest bit.
+    hits: u64,
     height_px: f64,
 }
 
@@ -64,6 +71,16 @@ struct Lost {
 enum Earlier {
     Lost(usize),
     Coasting(usize),
+}
+
+/// Whose a new track is.
+pub(super) enum Identity {
+    /// Nobody's who was known.
+    New,
+    /// A lost one's.
+    Found,
+    /// That of the track with this number, which it replaces.
+    Replaces(usize),
 }
 
 /// Tracks that were lost.
@@ -86,8 +103,14 @@ impl Reidentification {
             filter: track.filter.clone(),
             at: now,
             last_seen_ns: track.history.last_seen_ns,
+            hits: track.history.hits(),
             height_px: track.appearance.size[1],
         });
+    }
+
+    /// Counts a scan more, before the tracks count it.
+    pub fn next_scan(&mut self) {
+        self.lost.iter_mut().for_each(|l| l.hits <<= 1);
     }
 
     /// Forgets what was lost too long ago.
@@ -95,24 +118,27 @@ impl Reidentification {
         self.lost.retain(|l| now.seconds_since(Timestamp::from_ns(l.last_seen_ns)) <= config.max_gap_s + CONFIRM_S);
     }
 
-    /// Gives track `new`, just confirmed, the id of the track that it continues, if there is one. Returns the number of a track that coasted
-    /// and is replaced by it.
+    /// Gives track `new`, just confirmed by its rule or, if it `has_moved`, reported, the id of the track that it continues, if there is one.
     pub fn identify(
         &mut self,
         config: &ReidentificationConfig,
         tracks: &mut [Track],
         new: usize,
+        has_moved: bool,
         now: Timestamp,
         field: &Field,
-    ) -> Option<usize> {
+    ) -> Identity {
         if config.max_gap_s <= 0.0 {
-            return None;
+            return Identity::New;
         }
+        let field = &Field { n_still: if has_moved { 0.0 } else { field.n_still }, ..*field };
         let (belief, height, initiated) =
             (tracks[new].filter.kinematics(), tracks[new].appearance.size[1], tracks[new].history.initiated_ns);
-        let in_time = |last_seen_ns: i64| {
+        let seen = tracks[new].history.alone_since_initiation();
+        // Two detections in one scan are two targets; one that both share is one.
+        let may_be_one = |last_seen_ns: i64, hits: u64| {
             let gap_s = Timestamp::from_ns(initiated).seconds_since(Timestamp::from_ns(last_seen_ns));
-            gap_s >= 0.0 && gap_s <= config.max_gap_s
+            gap_s <= config.max_gap_s && hits & seen == 0
         };
         let mut best: Option<(f64, Earlier)> = None;
         let mut consider = |log_ratio: Option<f64>, earlier: Earlier| {
@@ -122,7 +148,7 @@ impl Reidentification {
                 best = Some((l, earlier));
             }
         };
-        for (i, l) in self.lost.iter().enumerate().filter(|(_, l)| in_time(l.last_seen_ns)) {
+        for (i, l) in self.lost.iter().enumerate().filter(|(_, l)| may_be_one(l.last_seen_ns, l.hits)) {
             let mut filter = l.filter.clone();
             if filter.predict(now.seconds_since(l.at).max(0.0)).is_ok() {
                 let gap_s = now.seconds_since(Timestamp::from_ns(l.last_seen_ns));
@@ -131,37 +157,40 @@ impl Reidentification {
             }
         }
         for (i, t) in tracks.iter().enumerate() {
-            if i != new && t.reported && t.history.misses > 0 && in_time(t.history.last_seen_ns) {
+            if i != new && t.reported && may_be_one(t.history.last_seen_ns, t.history.hits()) {
                 let gap_s = now.seconds_since(Timestamp::from_ns(t.history.last_seen_ns));
                 let ratio = log_ratio(&t.filter.kinematics(), t.appearance.size[1], &belief, height, gap_s, field);
                 consider(ratio, Earlier::Coasting(i));
             }
         }
-        match best?.1 {
-            Earlier::Lost(i) => {
+        match best {
+            None => Identity::New,
+            Some((_, Earlier::Lost(i))) => {
                 tracks[new].id = self.lost.remove(i).id;
-                None
+                Identity::Found
             }
-            Earlier::Coasting(i) => {
+            Some((_, Earlier::Coasting(i))) => {
                 tracks[new].id = tracks[i].id;
-                Some(i)
+                Identity::Replaces(i)
             }
         }
     }
 }
 
 /// Where targets can be, how fast, and how many there are: a new track is as likely another one's as there are others.
+#[derive(Clone, Copy)]
 pub(super) struct Field {
     area_px2: f64,
     max_speed_px_per_s: f64,
     n_targets: f64,
+    n_still: f64,
 }
 
 impl Field {
     /// The field of an image of that size, px, if it is known.
-    pub fn new(size_px: Option<[f64; 2]>, max_speed_px_per_s: f64, n_targets: usize) -> Self {
+    pub fn new(size_px: Option<[f64; 2]>, max_speed_px_per_s: f64, n_targets: usize, n_still: usize) -> Self {
         let area_px2 = size_px.map_or(UNKNOWN_AREA_PX2, |[w, h]| w * h);
-        Self { area_px2, max_speed_px_per_s, n_targets: n_targets.max(1) as f64 }
+        Self { area_px2, max_speed_px_per_s, n_targets: n_targets.max(1) as f64, n_still: n_still as f64 }
     }
 }
 
@@ -186,72 +215,104 @@ fn log_ratio(
     let reach2 = 0.5 * (speed2(before) + speed2(now)) * gap_s * gap_s;
     let apart = Vector2::new(difference[0], difference[2]);
     let s = Matrix2::new(cov[(0, 0)] + reach2, cov[(0, 2)], cov[(0, 2)], cov[(2, 2)] + reach2);
-    let turned = TURNED.ln()
-        - 0.5 * apart.dot(&s.cholesky()?.solve(&apart))
-        - (std::f64::consts::TAU * s.determinant().sqrt()).ln()
-        + any_velocity;
+    let place = -0.5 * apart.dot(&s.cholesky()?.solve(&apart)) - (std::f64::consts::TAU * s.determinant().sqrt()).ln();
+    let velocity_cov = Matrix2::new(now.cov[(1, 1)], now.cov[(1, 3)], now.cov[(3, 1)], now.cov[(3, 3)]);
+    let velocity = Vector2::new(now.mean[1], now.mean[3]);
+    let at_rest = -0.5 * velocity.dot(&velocity_cov.cholesky()?.solve(&velocity))
+        - (std::f64::consts::TAU * velocity_cov.determinant().sqrt()).ln();
+    let straight = (1.0 - TURNED - RESTED).ln() + straight;
+    let (turned, rested) = (TURNED.ln() + place + any_velocity, RESTED.ln() + place + at_rest);
     let grown = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
-    let likelier = straight.max(turned);
-    let same = likelier + (-(straight - turned).abs()).exp().ln_1p() - 0.5 * grown * grown;
-    let new = (field.n_targets / field.area_px2).ln() + any_velocity;
+    let same = log_sum([straight, turned, rested]) - 0.5 * grown * grown;
+    let new = log_sum([
+        (field.n_targets / field.area_px2).ln() + any_velocity,
+        (field.n_still / field.area_px2).ln() + at_rest,
+    ]);
     (same - new).is_finite().then_some(same - new)
+}
+
+/// Logarithm of the sum of exponentials.
+fn log_sum<const N: usize>(terms: [f64; N]) -> f64 {
+    let most = terms.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    if most.is_finite() { most + terms.iter().map(|t| (t - most).exp()).sum::<f64>().ln() } else { most }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::track::{ReidentificationConfig, Tracker, TrackerConfig, Tracking};
+    use crate::track::{ReidentificationConfig, Report, Tracker, TrackerConfig, Tracking};
     use crate::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
     use nalgebra::{Matrix2, Vector2};
 
-    /// The ids of confirmed tracks in the last scan: a target that flies at 30 px/s, hidden between two times, and comes back displaced.
-    fn ids(hidden_s: [f64; 2], displaced_px: f64, max_gap_s: f64) -> Vec<u64> {
-        let config = TrackerConfig {
+    fn config(max_gap_s: f64) -> TrackerConfig {
+        TrackerConfig {
             reidentification: ReidentificationConfig { max_gap_s },
             field_px: Some([640.0, 512.0]),
             ..TrackerConfig::default()
-        };
-        let mut tracker = Tracker::new(&config).unwrap();
+        }
+    }
+
+    /// The ids of confirmed tracks in the last of `n` scans, 25 a second, of things at these x (px) at a time (s).
+    fn last_ids(config: &TrackerConfig, n: u64, x: impl Fn(f64) -> Vec<f64>) -> Vec<u64> {
+        let mut tracker = Tracker::new(config).unwrap();
         let mut seen = Vec::new();
-        for k in 0..150u64 {
+        for k in 0..n {
             let t = k as f64 * 0.04;
-            let hidden = t > hidden_s[0] && t < hidden_s[1];
-            let x = 100.0 + 30.0 * t + if t >= hidden_s[1] { displaced_px } else { 0.0 };
-            let at = Vector2::new(x, 200.0);
-            let d = Detection::at(at, Matrix2::identity() * 0.1).with_extent(Extent::around(at, 5.0, 5.0));
-            let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(t)).with_detections(if hidden {
-                vec![]
-            } else {
-                vec![d]
-            });
+            let detection = |x: f64| {
+                let at = Vector2::new(x, 200.0);
+                Detection::at(at, Matrix2::identity() * 0.1).with_extent(Extent::around(at, 5.0, 5.0))
+            };
+            let all = x(t).into_iter().map(detection).collect();
+            let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(t)).with_detections(all);
             seen = tracker.step(&scan).unwrap().to_vec();
         }
         seen.iter().filter(|s| s.status == TrackStatus::Confirmed).map(|s| s.id.0).collect()
+    }
+
+    /// Of a target that flies at 30 px/s, hidden between two times, and comes back displaced.
+    fn ids(hidden_s: [f64; 2], displaced_px: f64, max_gap_s: f64) -> Vec<u64> {
+        last_ids(&config(max_gap_s), 150, |t| {
+            let x = 100.0 + 30.0 * t + if t >= hidden_s[1] { displaced_px } else { 0.0 };
+            if t > hidden_s[0] && t < hidden_s[1] { vec![] } else { vec![x] }
+        })
     }
 
     #[test]
     fn a_target_that_turns_back_out_of_sight_keeps_its_id_and_another_place_does_not() {
         // Seen to x = 160 px at 2 s at 30 px/s, then from 0.6 s later on flying back at 30 px/s from where it would have been after 0.3 s.
         let back = |from_px: f64| {
-            let config = TrackerConfig {
-                reidentification: ReidentificationConfig { max_gap_s: 2.0 },
-                field_px: Some([640.0, 512.0]),
-                ..TrackerConfig::default()
-            };
-            let mut tracker = Tracker::new(&config).unwrap();
-            let mut seen = Vec::new();
-            for k in 0..120u64 {
-                let t = k as f64 * 0.04;
-                let x = if t <= 2.0 { 100.0 + 30.0 * t } else { from_px - 30.0 * (t - 2.6) };
-                let at = Vector2::new(x, 200.0);
-                let d = Detection::at(at, Matrix2::identity() * 0.1).with_extent(Extent::around(at, 5.0, 5.0));
-                let d = if t > 2.0 && t < 2.6 { vec![] } else { vec![d] };
-                let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(t)).with_detections(d);
-                seen = tracker.step(&scan).unwrap().to_vec();
-            }
-            seen.iter().filter(|s| s.status == TrackStatus::Confirmed).map(|s| s.id.0).collect::<Vec<_>>()
+            last_ids(&config(2.0), 120, |t| match t {
+                t if t <= 2.0 => vec![100.0 + 30.0 * t],
+                t if t < 2.6 => vec![],
+                t => vec![from_px - 30.0 * (t - 2.6)],
+            })
         };
         assert_eq!(back(160.0), [1], "it turned at 169 px");
         assert_eq!(back(350.0), [2], "nothing of 30 px/s gets there");
+    }
+
+    #[test]
+    fn a_target_that_stops_at_once_keeps_its_id_and_is_still_reported() {
+        // 120 px/s, then at rest within a frame: the old track runs on, and what rests would be scenery.
+        let last = |max_gap_s: f64| {
+            let config =
+                TrackerConfig { report: Report::Moving, acceleration_density_px2_per_s3: 1.0, ..config(max_gap_s) };
+            last_ids(&config, 120, |t| vec![100.0 + 120.0 * t.min(2.0)])
+        };
+        assert_eq!(last(2.0), [1]);
+        assert!(last(0.0).is_empty(), "switched off: nothing has moved since");
+    }
+
+    #[test]
+    fn a_track_that_begins_beside_one_and_takes_its_detections_in_turns_is_the_same_target() {
+        // It jumps by 6 px for good. Two detections in one scan are two targets; one now for this, now for that track is one.
+        let ids = |both: bool| {
+            last_ids(&config(2.0), 80, |t| {
+                let x = 100.0 + 10.0 * t;
+                if t < 1.6 - 1e-9 { vec![x] } else { [x + 6.0, x][..1 + usize::from(both)].to_vec() }
+            })
+        };
+        assert_eq!(ids(false), [1]);
+        assert_eq!(ids(true), [1, 2]);
     }
 
     #[test]

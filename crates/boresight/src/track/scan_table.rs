@@ -4,6 +4,7 @@
 //! out what lies in a rectangle.
 //! Limits: [`MOST_LOOKED_AT`] detections are looked at for one track, so that 10⁵ detections in one pixel cost bounded time.
 
+use super::score_likelihood::ScanScores;
 use crate::associate::UniformGrid;
 use crate::camera::CameraPath;
 use crate::{Detection, Error, ErrorKind, Result, Scan};
@@ -56,6 +57,8 @@ pub struct ScanTable {
     pub largest_half_px: [f64; 2],
     /// What the camera did over all scans so far.
     pub camera: CameraPath,
+    /// Scores, read by the tracker where they say something.
+    pub(super) scores: ScanScores,
     grid: UniformGrid,
 }
 

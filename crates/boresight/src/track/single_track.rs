@@ -25,6 +25,10 @@ pub(super) struct Track {
     pub last_place: [f64; 3],
     /// Whether it was ever reported as confirmed.
     pub reported: bool,
+    /// Whether it was asked whose it is since its rule confirmed it.
+    pub identified: bool,
+    /// Mean of the logarithm of its score; unknown before its first detection, and where scores say nothing.
+    pub log_score: Option<f64>,
     /// What it has shown of its motion.
     pub motion: MotionProgress,
 }
@@ -45,10 +49,13 @@ pub(super) struct Outcome {
 }
 
 impl Track {
-    /// Takes in the box and place of a detection that is (most likely) its own.
+    /// Takes in the box, place and score of a detection that is (most likely) its own.
     #[inline]
-    pub(super) fn follow(&mut self, d: &Detection, noise: &Cov2, appearance_gain: f64) {
+    pub(super) fn follow(&mut self, d: &Detection, noise: &Cov2, log_score: Option<f64>, appearance_gain: f64) {
         self.appearance.follow(d, appearance_gain);
+        if let Some(now) = log_score {
+            self.log_score = Some(self.log_score.map_or(now, |mean| mean + appearance_gain * (now - mean)));
+        }
         self.last_place = place_of(d, noise);
         self.motion.add_size([d.extent.width_px, d.extent.height_px]);
     }

@@ -14,8 +14,9 @@ use super::clock::Clock;
 use super::clutter::Clutter;
 use super::config::TrackerConfig;
 use super::confirm::history::{Decision, Evidence};
+use super::confirm::status::status;
 use super::merged_measurements::MergedMeasurements;
-use super::reidentify::{Field, Reidentification};
+use super::reidentify::{Field, Identity, Reidentification};
 use super::scan_table::{Predicted, ScanTable};
 use super::single_track::{BATCH, Outcome, Track};
 use super::step::associate::{Association, associate, gate_confirmed};
@@ -111,7 +112,7 @@ impl Tracker {
     fn predict_and_gate(&mut self, scan: &Scan, dt_s: f64) -> Result<()> {
         let Self { config, tracks, table, predicted, association, cost, gate, .. } = self;
         let context = Context { scan, table, config, gate: *gate };
-        let plain = config.two_stage.is_none() && !config.association_cost.any();
+        let plain = config.two_stage.is_none() && config.score_likelihood.is_none() && !config.association_cost.any();
         let survival = config.confirmation.survival(dt_s);
         predicted.clear();
         for (batch, tracks) in tracks.chunks_mut(BATCH).enumerate() {
@@ -155,6 +156,7 @@ impl Tracker {
         let now = scan.time;
         let coast_s = coast_budget_s(config, &self.clock.interval);
         let secondary_s = config.merged_measurements.max_secondary_s;
+        lost.next_scan();
         states.clear();
         new.clear();
         owned.clear();
@@ -175,6 +177,7 @@ impl Tracker {
             }
             let evidence = Evidence { hit: outcome.hit, likelihood_ratio: outcome.likelihood_ratio };
             save_time_alone(&mut t.history, &outcome, now, coast_s, secondary_s);
+            t.history.note_alone(outcome.hit && !outcome.merged);
             let deleted = config.confirmation.decide(&mut t.history, evidence, now.ns) == Decision::Delete
                 || budget_is_over(&t.history, outcome.secondary, now, coast_s)
                 || (self.is_soft && is_lasting_duplicate(t, owned, &outcome, now, config.duplicate_s));
@@ -182,7 +185,8 @@ impl Tracker {
                 lost.remember(&config.reidentification, t, now);
             } else {
                 let state = report(t, &outcome, config, table.camera);
-                if state.status != TrackStatus::Tentative && !t.reported {
+                let is_reported = state.status != TrackStatus::Tentative;
+                if (t.history.accepted && !t.identified) || (is_reported && !t.reported) {
                     new.push(states.len() as u32);
                 }
                 states.push(state);
@@ -191,28 +195,39 @@ impl Tracker {
         });
     }
 
-    /// Gives tracks that were confirmed in this scan the id of a lost one that they continue; states and tracks lie in one order.
-    /// Those from `first_begun` on were begun in it.
+    /// Gives tracks that their rule confirmed in this scan, or that are reported for the first time, the id of a lost one that they continue; states and
+    /// tracks lie in one order. Those from `first_begun` on were begun in it.
     fn reidentify(&mut self, now: Timestamp, first_begun: usize) {
         let Self { config, tracks, states, lost, new, .. } = self;
-        let begun = (first_begun..states.len()).filter(|&i| states[i].status != TrackStatus::Tentative);
-        new.extend(begun.map(|i| i as u32));
+        let is_reported = |s: &TrackState| s.status != TrackStatus::Tentative;
+        new.extend((first_begun..states.len()).filter(|&i| tracks[i].history.accepted).map(|i| i as u32));
         lost.forget(&config.reidentification, now);
         if new.is_empty() {
             return;
         }
         if config.reidentification.max_gap_s <= 0.0 {
-            new.iter().for_each(|&i| tracks[i as usize].reported = true);
+            for &i in new.iter() {
+                let track = &mut tracks[i as usize];
+                (track.identified, track.reported) = (true, track.reported || is_reported(&states[i as usize]));
+            }
             return;
         }
         let n_reported = tracks.iter().filter(|t| t.reported).count();
-        let field = Field::new(config.field_px, config.max_speed_px_per_s, n_reported);
+        let n_still = tracks.iter().filter(|t| t.history.accepted && !t.reported).count();
+        let field = Field::new(config.field_px, config.max_speed_px_per_s, n_reported, n_still);
         for k in 0..new.len() {
             let i = new[k] as usize;
-            tracks[i].reported = true;
-            let replaced = lost.identify(&config.reidentification, tracks, i, now, &field);
-            states[i].id = TrackId(tracks[i].id);
-            if let Some(r) = replaced {
+            tracks[i].identified = true;
+            let has_moved = is_reported(&states[i]);
+            tracks[i].reported |= has_moved;
+            let identity = lost.identify(&config.reidentification, tracks, i, has_moved, now, &field);
+            if !matches!(identity, Identity::New) {
+                tracks[i].motion.pass();
+                tracks[i].reported = true;
+                states[i].id = TrackId(tracks[i].id);
+                states[i].status = status(&tracks[i].history, true, states[i].detection.is_some());
+            }
+            if let Identity::Replaces(r) = identity {
                 tracks.remove(r);
                 states.remove(r);
                 // It was reported before, so it is none of those still to come.
@@ -230,6 +245,7 @@ impl Tracking for Tracker {
         }
         let c = &self.config;
         self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
+        self.table.scores.read(c.score_likelihood.as_ref(), &scan.detections);
 
         match step_s {
             None => from_initial_tracks(&self.config, scan.time, &mut self.tracks, &mut self.next_id)?,
@@ -242,7 +258,7 @@ impl Tracking for Tracker {
             return Ok(&self.states);
         }
         self.table.sort(scan);
-        self.association.begin(scan, &self.clutter);
+        self.association.begin(scan, &self.clutter, &self.table.scores);
         self.predict_and_gate(scan, dt_s)?;
         let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate };
         let (association, merged) = (&mut self.association, &mut self.merged);

@@ -116,8 +116,9 @@ fn every_room_uses_only_the_rooms_it_may() {
 fn every_file_starts_by_saying_what_it_is() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut files = Vec::new();
-    let dirs = ["boresight", "boresight-filters", "boresight-reproduce", "boresight-cli", "boresight-py"]
-        .map(|c| format!("crates/{c}/src"));
+    let dirs =
+        ["boresight", "boresight-filters", "boresight-reproduce", "boresight-live", "boresight-cli", "boresight-py"]
+            .map(|c| format!("crates/{c}/src"));
     for dir in dirs.iter().map(String::as_str).chain(["peers/src", "xtask/src"]) {
         rust_files(&root.join(dir), &mut files);
     }

@@ -7,7 +7,7 @@
 
 use super::number::{push_f64, push_seconds};
 use crate::io::atomic::Output;
-use crate::{MotionBasis, Result, Sink, View};
+use crate::{Result, Sink, View};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -54,7 +54,8 @@ impl Sink for CameraCsv {
                 out.extend(std::iter::repeat_n(',', 16));
             }
             Some(m) => {
-                out.push_str(if m.basis == MotionBasis::Held { ",held" } else { ",measured" });
+                out.push(',');
+                out.push_str(m.basis.word());
                 let (shift, by) = (m.shift_px(), m.now_from_before);
                 for v in [m.centre_px.x, m.centre_px.y, shift.x, shift.y, by.angle_rad(), by.zoom()] {
                     out.push(',');
@@ -80,7 +81,7 @@ impl Sink for CameraCsv {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CameraMotion, FrameIndex, Scan, Timestamp};
+    use crate::{CameraMotion, FrameIndex, MotionBasis, Scan, Timestamp};
     use nalgebra::Vector2;
 
     #[test]

@@ -8,6 +8,8 @@
 pub struct History {
     /// Hits (1) and misses (0), the newest in the lowest bit.
     pub(super) hits: u64,
+    /// Scans with a detection of its own, not merged with another track's (1), the newest in the lowest bit.
+    pub(super) alone: u64,
     /// Track score (ln Λ summed), or the odds that the target exists; by the rule.
     pub(super) value: f64,
     /// Largest score so far (sequential test), or ln odds that it ever was a target (existence).
@@ -36,11 +38,26 @@ impl History {
         (self.accepted, self.was_accepted) = (true, true);
     }
 
+    /// Notes whether the newest scan gave it a detection of its own, not merged with another track's.
+    #[inline]
+    pub fn note_alone(&mut self, alone: bool) {
+        self.alone = (self.alone << 1) | u64::from(alone);
+    }
+
+    /// Scans with a detection of its own since its initiation, the newest in the lowest bit.
+    pub fn alone_since_initiation(&self) -> u64 {
+        self.alone & newest(u32::from(self.scans))
+    }
+
+    /// Scans with a detection, its own or merged, the newest in the lowest bit.
+    pub fn hits(&self) -> u64 {
+        self.hits
+    }
+
     /// Number of hits in the newest `n` scans.
     #[inline]
     pub(super) fn hits_in(&self, n: u32) -> u32 {
-        let newest = if n >= 64 { u64::MAX } else { (1 << n) - 1 };
-        (self.hits & newest).count_ones()
+        (self.hits & newest(n)).count_ones()
     }
 
     /// Takes one scan in.
@@ -55,6 +72,12 @@ impl History {
             self.misses = self.misses.saturating_add(1);
         }
     }
+}
+
+/// The lowest `n` bits.
+#[inline]
+fn newest(n: u32) -> u64 {
+    if n >= 64 { u64::MAX } else { (1 << n) - 1 }
 }
 
 /// What one scan says of a track.

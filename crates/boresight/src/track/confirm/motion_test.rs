@@ -103,6 +103,11 @@ impl MotionProgress {
         Self { moved: true, ..Self::default() }
     }
 
+    /// It continues a target that has moved.
+    pub fn pass(&mut self) {
+        self.moved = true;
+    }
+
     /// Takes the size of a detection of the track in, px.
     #[inline]
     pub fn add_size(&mut self, size: [f64; 2]) {

@@ -60,6 +60,7 @@ impl ConfirmationConfig {
         };
         History {
             hits: (1 << n_points) - 1,
+            alone: (1 << n_points) - 1,
             scans: n_points as u8,
             accepted,
             was_accepted: accepted,

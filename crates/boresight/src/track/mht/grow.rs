@@ -100,7 +100,10 @@ fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut
 
     gates.reset(scan.detections.len(), 1.0);
     let p = &leaf.predicted;
-    let cost = |j: u32| growth.cost.cost(p.x, p.y, &leaf.track.appearance, &scan.detections[j as usize]);
+    let look = &leaf.track.appearance;
+    let cost = |j: u32| {
+        growth.cost.cost(p.x, p.y, look, &scan.detections[j as usize]) + growth.context.score_cost(&leaf.track, j)
+    };
     let low = config.two_stage.as_ref().map_or(f32::NEG_INFINITY, |t| t.low_score);
     let free = |j: u32| scan.detections[j as usize].score >= low;
     gate_row(table, p, gate, config.max_gated as usize, true, free, cost, gates);
@@ -123,14 +126,14 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
     let measurement = Measurement { position: d.position, cov: noise.matrix() };
     child.track.filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
     let log_ratio = config.p_detection(leaf.track.history.misses).ln() + pair.log_likelihood
-        - growth.clutter.at(d.position.x, d.position.y).max(1e-200).ln();
+        - (growth.clutter.at(d.position.x, d.position.y) * table.scores.clutter(pair.detection)).max(1e-200).ln();
     child.score += log_ratio;
     let likelihood_ratio = log_ratio.clamp(-100.0, 100.0).exp();
     let evidence = Evidence { hit: true, likelihood_ratio };
     if config.confirmation.decide(&mut child.track.history, evidence, scan.time.ns) == Decision::Delete {
         return None;
     }
-    child.track.follow(d, &noise, config.appearance_gain);
+    child.track.follow(d, &noise, table.scores.log_score(pair.detection), config.appearance_gain);
     child.outcome = Outcome {
         hit: true,
         detection: Some(pair.detection),
@@ -158,7 +161,8 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
             None => from_one_point(&d.position, &noise.matrix(), velocity, variance),
         };
         let Ok(filter) = config.start_filter(&start, d.extent.height_px) else { continue };
-        let density = growth.clutter.at(d.position.x, d.position.y).max(1e-200);
+        let score_ratio = growth.context.new_target_score_ratio(None, j as u32);
+        let density = (growth.clutter.at(d.position.x, d.position.y) / score_ratio).max(1e-200);
         let mut path = [NONE; WINDOW];
         path[0] = j as u32;
         let leaf = Hypothesis {
@@ -170,6 +174,8 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
                 duplicate_since_ns: None,
                 last_place: place_of(d, &noise),
                 reported: false,
+                identified: false,
+                log_score: table.scores.log_score(j as u32),
                 motion: motion_of(d, &noise, table.camera, config.report),
             },
             score: (growth.mht.new_target_density_per_px2 / density).ln(),

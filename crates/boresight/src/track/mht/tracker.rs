@@ -115,6 +115,7 @@ impl Tracking for Mht {
         let step_s = self.clock.step_s(scan)?;
         let c = &self.config;
         self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
+        self.table.scores.read(c.score_likelihood.as_ref(), &scan.detections);
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
         }

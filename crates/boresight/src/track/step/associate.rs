@@ -11,11 +11,12 @@ use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
 use super::super::merged_measurements::MergedMeasurements;
 use super::super::scan_table::Predicted;
+use super::super::score_likelihood::ScanScores;
 use super::super::single_track::Track;
 use super::context::Context;
 use super::stage::Stage;
 use crate::Scan;
-use crate::associate::AssociatorConfig;
+use crate::associate::{AssociatorConfig, CostKind, GlobalNearestConfig};
 
 /// No track took it.
 const NONE: u32 = u32::MAX;
@@ -42,7 +43,9 @@ pub(in crate::track) struct Association {
 
 impl Association {
     pub fn new(config: &TrackerConfig) -> Self {
-        let (hard, budget) = (AssociatorConfig::default(), config.association_cost.budget());
+        let cost = if config.score_likelihood.is_some() { CostKind::Likelihood } else { CostKind::Distance };
+        let hard = AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost });
+        let budget = config.association_cost.budget();
         Self {
             stages: [Stage::new(&config.associator, budget), Stage::new(&hard, budget), Stage::new(&hard, budget)],
             used: Vec::new(),
@@ -54,12 +57,12 @@ impl Association {
     }
 
     /// Begins a scan.
-    pub fn begin(&mut self, scan: &Scan, clutter: &Clutter) {
+    pub fn begin(&mut self, scan: &Scan, clutter: &Clutter, scores: &ScanScores) {
         self.used.clear();
         self.used.resize(scan.detections.len(), false);
         self.tentative.clear();
         for stage in &mut self.stages {
-            stage.begin(scan, clutter);
+            stage.begin(scan, clutter, scores);
         }
     }
 
@@ -97,7 +100,7 @@ pub(in crate::track) fn gate_confirmed(
         } else {
             let detections = &context.scan.detections;
             let strong = |j: u32| detections[j as usize].score >= high;
-            let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
+            let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
             stage.add(first + k, p, existence, p_detection, context, strong, extra);
         }
     }
@@ -176,7 +179,7 @@ fn add_later(
 ) {
     let (t, p, detections) = (&tracks[i], &predicted[i], &context.scan.detections);
     let free = |j: u32| !used[j as usize] && detections[j as usize].score >= min_score;
-    let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]);
+    let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
     let existence = context.config.confirmation.existence(&t.history);
     let p_detection = context.config.p_detection(t.history.misses);
     stage.add(i, p, existence, p_detection, context, free, extra);

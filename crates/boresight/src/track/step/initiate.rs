@@ -26,6 +26,7 @@ use nalgebra::Vector2;
 struct Unassociated {
     position: Vector2<f64>,
     noise: Cov2,
+    log_score: Option<f64>,
 }
 
 /// What waits for a second point.
@@ -89,7 +90,11 @@ pub(in crate::track) fn initiate(
     pending.unassociated.clear();
     for (j, d) in scan.detections.iter().enumerate() {
         if !used[j] && config.may_initiate(d.score) {
-            pending.unassociated.push(Unassociated { position: d.position, noise: table.noise(j as u32) });
+            pending.unassociated.push(Unassociated {
+                position: d.position,
+                noise: table.noise(j as u32),
+                log_score: table.scores.log_score(j as u32),
+            });
         }
     }
     pending.time = scan.time;
@@ -120,6 +125,8 @@ pub(in crate::track) fn from_initial_tracks(
             duplicate_since_ns: None,
             last_place: [k.mean[0], k.mean[2], spread],
             reported: true,
+            identified: true,
+            log_score: None,
             motion: MotionProgress::passed(),
         });
         *next_id += 1;
@@ -141,6 +148,8 @@ fn begin(
     let d = &scan.detections[detection];
     let noise = table.noise(detection as u32);
     let Some((filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else { return };
+    let likelihood_ratio =
+        likelihood_ratio * context.new_target_score_ratio(first.and_then(|f| f.log_score), detection as u32);
     let n_points = if first.is_some() { 2 } else { 1 };
     let clutter_density = clutter.at(d.position.x, d.position.y);
     let mut track = Track {
@@ -151,6 +160,8 @@ fn begin(
         duplicate_since_ns: None,
         last_place: place_of(d, &noise),
         reported: false,
+        identified: false,
+        log_score: table.scores.log_score(detection as u32),
         motion: motion_of(d, &noise, table.camera, config.report),
     };
     let outcome = Outcome { hit: true, detection: Some(detection as u32), ..Outcome::default() };

@@ -5,6 +5,7 @@
 
 use super::super::clutter::Clutter;
 use super::super::scan_table::Predicted;
+use super::super::score_likelihood::ScanScores;
 use super::context::Context;
 use super::gate::gate_row;
 use crate::Scan;
@@ -58,10 +59,11 @@ impl Stage {
     }
 
     /// Begins a scan.
-    pub fn begin(&mut self, scan: &Scan, clutter: &Clutter) {
+    pub fn begin(&mut self, scan: &Scan, clutter: &Clutter, scores: &ScanScores) {
         self.gates.reset(scan.detections.len(), clutter.density());
-        if clutter.is_map() {
-            self.gates.set_clutter(scan.detections.iter().map(|d| clutter.at(d.position.x, d.position.y)));
+        if clutter.is_map() || !scores.is_empty() {
+            let places = scan.detections.iter().map(|d| clutter.at(d.position.x, d.position.y));
+            self.gates.set_clutter(places.enumerate().map(|(j, at)| at * scores.clutter(j as u32)));
         }
         self.rows.clear();
         self.cursor = 0;
@@ -86,7 +88,8 @@ impl Stage {
         self.gates.end_row(Prior {
             p_detection,
             p_gate: config.gate_probability,
-            existence,
+            // A hard choice is what the target would have chosen if it exists; whether it does is what its likelihood then tells.
+            existence: if self.soft { existence } else { 1.0 },
             miss_cost: gate + self.cost_budget,
         });
     }

@@ -69,8 +69,10 @@ fn hard(
     }
     let innovation = innovation_of(&detection.position, predicted, &innovation_cov(predicted, &noise));
     let clutter = gates.clutter(share.detection);
-    let density = (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());
-    track.follow(detection, &noise, context.config.appearance_gain);
+    let score = (-0.5 * context.score_cost(track, share.detection)).exp();
+    let density = score * (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());
+    let log_score = context.table.scores.log_score(share.detection);
+    track.follow(detection, &noise, log_score, context.config.appearance_gain);
     Outcome {
         hit: true,
         detection: Some(share.detection),
@@ -128,7 +130,8 @@ fn soft(
     let hit = matches!(context.config.confirmation, ConfirmationConfig::MOfN(_)) || seen >= 0.5;
     if hit {
         let (d, noise) = (&context.scan.detections[best.detection as usize], context.table.noise(best.detection));
-        track.follow(d, &noise, context.config.appearance_gain);
+        let log_score = context.table.scores.log_score(best.detection);
+        track.follow(d, &noise, log_score, context.config.appearance_gain);
     }
     Outcome {
         hit,

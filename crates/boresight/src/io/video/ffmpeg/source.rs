@@ -3,22 +3,24 @@
 //! The program decodes and converts nothing that need not be: it is asked for the nearest of the layouts read here, so
 //! that luma stays what the video holds, and for times in nanoseconds. It is started without a shell; its messages are
 //! drained on a thread of their own; it is killed when the source is dropped.
-//! Limits: how many frames there are is not known beforehand; a live stream that is silent for 30 s is given up.
+//! Limits: how many frames there are is not known beforehand; a live stream that is silent for 30 s, or that is told to stop, is given up.
 
 use super::log::Log;
 use super::pictures::{Message, read_all};
-use crate::io::options::{Colour, OpenOptions};
+use crate::io::options::{Colour, OpenOptions, StopFlag};
 use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Pixels, Result, SourceInfo};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Frames read ahead of the caller.
 const AHEAD: usize = 4;
 /// How long a live source may be silent.
 const SILENCE: Duration = Duration::from_secs(30);
+/// How often a live source looks whether it shall stop.
+const LOOK_AROUND: Duration = Duration::from_millis(50);
 /// Layouts whose first plane is luma, or that are RGB: every other one is converted to the nearest of these.
 const NATIVE: &str = "format=gray|gray10le|gray12le|gray14le|gray16le|yuv420p|yuvj420p|yuv422p|yuvj422p|yuv444p|\
 yuvj444p|yuv440p|yuvj440p|yuv411p|yuv410p|yuv420p10le|yuv422p10le|yuv444p10le|yuv420p12le|yuv422p12le|yuv444p12le|\
@@ -36,6 +38,7 @@ struct FfmpegSource {
     child: Child,
     log: Log,
     live: bool,
+    stop: StopFlag,
     n_read: u64,
 }
 
@@ -113,6 +116,7 @@ fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str)
         child,
         log,
         live,
+        stop: options.stop.clone().unwrap_or_default(),
         n_read: 0,
     });
     spawned.map_err(|e| Error::new(ErrorKind::NotFound, "no thread can be started").because(e))?;
@@ -190,9 +194,22 @@ impl FfmpegSource {
         if !self.live {
             return Ok(messages.recv().ok());
         }
-        match messages.recv_timeout(SILENCE) {
+        let silent_at = Instant::now() + SILENCE;
+        let message = loop {
+            let message = messages.recv_timeout(LOOK_AROUND);
+            let waits = matches!(message, Err(RecvTimeoutError::Timeout)) && Instant::now() < silent_at;
+            if !waits || self.stop.is_stopped() {
+                break message;
+            }
+        };
+        match message {
             Ok(message) => Ok(Some(message)),
             Err(RecvTimeoutError::Disconnected) => Ok(None),
+            Err(RecvTimeoutError::Timeout) if self.stop.is_stopped() => {
+                self.messages = None;
+                let _ = self.child.kill();
+                Ok(None)
+            }
             Err(RecvTimeoutError::Timeout) => {
                 self.messages = None;
                 let _ = self.child.kill();
@@ -273,5 +290,33 @@ impl FrameSource for FfmpegSource {
 
     fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn a_stream_that_is_told_to_stop_ends_its_program_while_it_is_silent() {
+        let dir = tempfile::tempdir().unwrap();
+        let (program, pid) = (dir.path().join("silent"), dir.path().join("pid"));
+        std::fs::write(&program, format!("#!/bin/sh\necho $$ > {}\nexec sleep 600\n", pid.display())).unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let stop = StopFlag::default();
+        let options = OpenOptions { stop: Some(stop.clone()), ..OpenOptions::default() };
+        let began = Instant::now();
+        let waits = std::thread::spawn(move || open(program.as_os_str(), "udp://127.0.0.1:9", &options).is_err());
+        let written = || std::fs::read_to_string(&pid).is_ok_and(|text| text.ends_with('\n'));
+        while !written() && began.elapsed() < SILENCE {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        stop.stop();
+        assert!(waits.join().unwrap(), "it gave no frame");
+        assert!(began.elapsed() < SILENCE, "it was not waited for");
+        let process = std::fs::read_to_string(&pid).unwrap();
+        let alive = Command::new("kill").args(["-0", process.trim()]).stderr(Stdio::null()).status().unwrap().success();
+        assert!(!alive, "its program has ended");
     }
 }
