@@ -241,10 +241,11 @@ fn overlap(shift: i32, width: usize) -> std::ops::Range<usize> {
 widest! {
     fn join_row(newer: &[i16], older: &[i16], shift: i32, width: usize, out: &mut [i16]) {
         out.copy_from_slice(newer);
-        if older.is_empty() {
+        let inside = if older.is_empty() { 0..0 } else { overlap(shift, width) };
+        // A shift may be longer than the row: then nothing of it is met, and its start is no place in the row.
+        if inside.is_empty() {
             return;
         }
-        let inside = overlap(shift, width);
         let from = (inside.start as i64 + i64::from(shift)).max(0) as usize;
         let older = &older[from..][..inside.len()];
         for (o, &v) in out[inside].iter_mut().zip(older) {

@@ -36,6 +36,19 @@ fn direct(sums: &Sums, of: &Velocities, times_s: &[f64], phi: &Phi) -> Extremes 
     e
 }
 
+/// A path that leaves a narrow frame within half the memory has nothing to be joined with, in either direction.
+#[test]
+fn a_shift_longer_than_the_row_joins_nothing() {
+    let geometry = Geometry { width: 1, height: 2, stride: CELL };
+    let (newer, older) = (vec![3i16; 2 * CELL], vec![5i16; 2 * CELL]);
+    for shift in [(1 + CELL as i32, 0), (-1 - CELL as i32, 0), (CELL as i32, 1), (i32::MAX, 0), (i32::MIN, 0), (0, i32::MAX)] {
+        let mut out = vec![0; 2 * CELL];
+        join(&newer, &older, shift, geometry, &mut out);
+        let met = i16::from(shift.0 == 0 && shift.1 == 0) * 5;
+        assert!((0..2).all(|y| out[y * CELL] == 3 + met), "{shift:?}: {out:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
