@@ -23,6 +23,9 @@ struct Cli {
 enum Command {
     /// Track what moves in a video, an image sequence or a table of detections.
     Track(commands::track::Args),
+    /// Track what a camera or a stream shows while it happens: on a page, on a wire, in a record.
+    #[cfg(feature = "live")]
+    Live(Box<commands::live::Args>),
     /// Track many videos, each in a process of its own; go on after a kill; verify.
     Batch(commands::batch::Args),
     /// Detect what stands out in a video or an image sequence.
@@ -54,6 +57,8 @@ fn main() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Track(args) => commands::track::run(args),
+        #[cfg(feature = "live")]
+        Command::Live(args) => commands::live::run_live(&args),
         Command::Batch(args) => commands::batch::run(args),
         Command::Detect(args) => commands::detect::run(args),
         Command::Evaluate(args) => commands::evaluate::run(*args),

@@ -3,7 +3,8 @@
 //! Blocks fenced as `sh` hold commands, a line each; blocks fenced as `console` hold commands after `$ ` and what they print
 //! (`...` stands for anything). A chapter's blocks run in order in one folder, in which `samples/` and `configs/` lie.
 //! A block of any kind with `file=NAME` is written to that file first (a scene, a configuration).
-//! After `sh` or `console` may stand: `needs=data` (or any other need: not run here, shown as ignored), `exit=2` (the code expected).
+//! After `sh` or `console` may stand: `needs=data` (or any other need: not run here, shown as ignored; `needs=live` is run in a build with
+//! that feature), `exit=2` (the code expected).
 //! Lines whose command is not `boresight` (cargo, .ci/run) are left to `.ci/run`.
 
 use libtest_mimic::{Arguments, Trial};
@@ -53,7 +54,7 @@ fn blocks(text: &str) -> Vec<Block> {
             open = Some(Block {
                 line: k + 1,
                 console: kind == "console",
-                needs: get("needs"),
+                needs: get("needs").filter(|needs| needs != "live" || !cfg!(feature = "live")),
                 file,
                 exit: get("exit").map_or(0, |e| e.parse().expect("exit=NUMBER")),
                 lines: Vec::new(),

@@ -8,6 +8,8 @@ pub mod convert;
 pub mod detect;
 pub mod evaluate;
 pub mod fuse;
+#[cfg(feature = "live")]
+pub mod live;
 pub mod reproduce;
 mod run_folder;
 mod run_options;

@@ -1,0 +1,106 @@
+//! `boresight live` as a program: lines in and out, a record that outlives SIGKILL, refusals.
+
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, Command, Output, Stdio};
+
+fn boresight(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_boresight"));
+    command.args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// A target that goes right, a scan each 40 ms.
+fn line(k: u32) -> String {
+    let (time_s, x) = (0.04 * f64::from(k), 10.0 + 0.5 * f64::from(k));
+    format!("{{\"time_s\":{time_s:.2},\"detections\":[{{\"x_px\":{x},\"y_px\":20,\"cov_px2\":[0.04,0,0.04]}}]}}\n")
+}
+
+fn fed(mut child: Child, text: &str) -> Output {
+    child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn lines_of_detections_become_lines_of_events() {
+    let text: String = (0..100).map(line).collect();
+    let out = fed(boresight(&["live", "-", "--publish", "-", "--updates-hz", "1000"]).spawn().unwrap(), &text);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    let events: Vec<serde_json::Value> =
+        String::from_utf8(out.stdout).unwrap().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let of = |event: &str| events.iter().filter(|e| e["event"] == event).count();
+    assert_eq!((of("start"), of("end")), (1, 1), "{said}");
+    let end = events.iter().find(|e| e["event"] == "end").unwrap();
+    assert!((end["x_px"].as_f64().unwrap() - 59.5).abs() < 0.5, "{end}");
+    assert_eq!(events.last().unwrap()["state"], "ended");
+}
+
+#[test]
+fn a_record_is_whole_after_a_kill() {
+    let dir = tempfile::tempdir().unwrap();
+    let kept = dir.path().join("kept").display().to_string();
+    let mut child =
+        boresight(&["live", "-", "--publish", "-", "--updates-hz", "1000", "--record", &kept, "--learn-s", "0.2"])
+            .spawn()
+            .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let mut events = BufReader::new(child.stdout.take().unwrap()).lines();
+    (0..200).for_each(|k| input.write_all(line(k).as_bytes()).unwrap());
+    input.flush().unwrap();
+    // What was published was recorded before.
+    let seen =
+        |text: &str| -> u64 { serde_json::from_str::<serde_json::Value>(text).unwrap()["frame"].as_u64().unwrap_or(0) };
+    assert!(events.by_ref().any(|event| seen(&event.unwrap()) >= 150));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let read = |ending: &str| std::fs::read_to_string(format!("{kept}/000001.{ending}")).unwrap();
+    let lines = read("jsonl");
+    assert!(lines.ends_with('\n') && lines.lines().count() > 150);
+    assert!(lines.lines().all(|l| serde_json::from_str::<serde_json::Value>(l).is_ok()));
+    for table in ["tracks.csv", "detections.csv"] {
+        let text = read(table);
+        let columns = text.lines().next().unwrap().split(',').count();
+        assert!(text.ends_with('\n') && text.lines().all(|l| l.split(',').count() == columns), "{table}");
+    }
+    let manifest: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(format!("{kept}/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["segments"][0]["open"], true, "{manifest}");
+    // And it replays with the tables' own command.
+    let (table, config) = (format!("{kept}/000001.detections.csv"), format!("{kept}/000001.config.toml"));
+    let offline = dir.path().join("offline").display().to_string();
+    let out =
+        boresight(&["track", &table, "--config", &config, "-o", &offline, "--quiet", "--no-report"]).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    // The kill may fall between the files: one of them may hold a frame more.
+    let (again, kept_tracks) = (std::fs::read_to_string(format!("{offline}/tracks.csv")).unwrap(), read("tracks.csv"));
+    let (short, long) = if again.len() < kept_tracks.len() { (&again, &kept_tracks) } else { (&kept_tracks, &again) };
+    assert!(long.starts_with(short.as_str()) && long.lines().count() <= short.lines().count() + 1);
+    assert!(short.lines().count() > 140);
+    // The next run goes on with the next number.
+    let text: String = (0..50).map(line).collect();
+    assert!(fed(boresight(&["live", "-", "--record", &kept, "--quiet"]).spawn().unwrap(), &text).status.success());
+    assert!(std::path::Path::new(&format!("{kept}/000002.jsonl")).exists());
+}
+
+#[test]
+fn what_cannot_be_is_said_with_its_mend_and_code() {
+    let out = fed(boresight(&["live", "-"]).spawn().unwrap(), "{\"detections\":7}\n{}\n");
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.code() == Some(3) && said.contains("line 1 is left out") && said.contains("gave nothing"),
+        "{said}"
+    );
+    for (args, code, words) in [
+        (&["live", "-", "--publish", "ftp://x/y"][..], 2, "hint: give -"),
+        (&["live", "-", "--serve", "nowhere"], 2, "127.0.0.1:8090"),
+        (&["live", "-", "--detector", "colour"], 2, "config.toml"),
+        (&["live", "gone.mp4"], 3, "no such file"),
+        (&["live", "-"], 3, "nothing came"),
+        (&["live"], 2, "SOURCE"),
+    ] {
+        let out = boresight(args).stdin(Stdio::null()).output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{args:?}: {said}");
+        assert!(said.contains(words), "{args:?}: {said}");
+    }
+}

@@ -1,0 +1,201 @@
+//! What a run says of itself while it goes on: its state and its counts, written by every thread, read by page and metrics.
+
+use crate::histogram::Histogram;
+use serde::Serialize;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// What the run is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum State {
+    /// Waits for the source.
+    #[default]
+    Connecting,
+    /// Gathers the first frames and chooses a configuration by them.
+    Choosing,
+    /// Tracks.
+    Running,
+    /// The source gives nothing; tracks coast.
+    Lost,
+    /// The source ended, or the run was stopped.
+    Ended,
+}
+
+impl State {
+    /// Its word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Connecting => "connecting",
+            Self::Choosing => "choosing",
+            Self::Running => "running",
+            Self::Lost => "lost",
+            Self::Ended => "ended",
+        }
+    }
+}
+
+/// Numbers that only grow, or that hold the newest value.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Frames or scans that came from the source.
+    pub arrived: AtomicU64,
+    /// Those that went through detector and tracker.
+    pub tracked: AtomicU64,
+    /// Those that a newer one replaced before they were taken.
+    pub dropped: AtomicU64,
+    /// Scans whose time ran back, that the tracker refused, or frames that the detector refused.
+    pub refused: AtomicU64,
+    /// Lines of detections that could not be read.
+    pub bad_lines: AtomicU64,
+    /// Times that the source was lost.
+    pub lost: AtomicU64,
+    /// Detections so far.
+    pub detections: AtomicU64,
+    /// Tracks that were confirmed so far.
+    pub tracks: AtomicU64,
+    /// Confirmed tracks now.
+    pub now: AtomicU64,
+    /// Events that went to the wire.
+    pub events: AtomicU64,
+    /// Events that an output could not take.
+    pub events_dropped: AtomicU64,
+    /// Times that the record could not be written.
+    pub record_failures: AtomicU64,
+    /// Viewers of the page now.
+    pub viewers: AtomicU64,
+    /// Requests that were refused.
+    pub requests_refused: AtomicU64,
+}
+
+/// Adds to a count.
+pub fn add(count: &AtomicU64, n: u64) {
+    count.fetch_add(n, Ordering::Relaxed);
+}
+
+/// Reads a count.
+pub fn read(count: &AtomicU64) -> u64 {
+    count.load(Ordering::Relaxed)
+}
+
+/// What is said of the state.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Said {
+    /// The state.
+    pub state: State,
+    /// Why, for people; empty if there is nothing to say.
+    pub why: String,
+}
+
+#[derive(Debug, Default)]
+struct Told {
+    said: Said,
+    reasons: Vec<String>,
+    config: String,
+    nis: (f64, u64),
+    rate: Option<(Instant, f64)>,
+}
+
+/// The board.
+#[derive(Debug)]
+pub struct Board {
+    /// Name of the source, as events show it.
+    pub source: String,
+    /// Counts.
+    pub counts: Counts,
+    /// Time from arrival to the last output, s.
+    pub latency: Histogram,
+    told: Mutex<Told>,
+    say: fn(&str),
+}
+
+impl Board {
+    /// A board for a source of this name; `say` takes a line for people.
+    pub fn new(source: impl Into<String>, say: fn(&str)) -> Self {
+        let latency = Histogram::default();
+        Self { source: source.into(), counts: Counts::default(), latency, told: Mutex::default(), say }
+    }
+
+    fn told(&self) -> std::sync::MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says a line to people.
+    pub fn say(&self, line: &str) {
+        (self.say)(line);
+    }
+
+    /// Sets the state and says it, if it or its reason is new; returns whether it is.
+    pub fn set(&self, state: State, why: &str) -> bool {
+        let said = Said { state, why: why.to_string() };
+        let is_new = std::mem::replace(&mut self.told().said, said.clone()) != said;
+        if is_new {
+            let colon = if why.is_empty() { "" } else { ": " };
+            self.say(&format!("{}: {}{colon}{why}", self.source, state.word()));
+        }
+        is_new
+    }
+
+    /// The state.
+    pub fn said(&self) -> Said {
+        self.told().said.clone()
+    }
+
+    /// Notes the configuration of the run, and why it is what it is.
+    pub fn configured(&self, config: String, reasons: Vec<String>) {
+        let mut told = self.told();
+        (told.config, told.reasons) = (config, reasons);
+    }
+
+    /// The configuration as TOML, empty before it is chosen, and its reasons.
+    pub fn configuration(&self) -> (String, Vec<String>) {
+        let told = self.told();
+        (told.config.clone(), told.reasons.clone())
+    }
+
+    /// Notes the normalised squares of a scan's innovations, and that a scan was tracked now.
+    pub fn scan_done(&self, nis: impl Iterator<Item = f64>) {
+        let mut told = self.told();
+        nis.filter(|v| v.is_finite()).for_each(|v| told.nis = (told.nis.0 + v, told.nis.1 + 1));
+        let now = Instant::now();
+        let rate = match told.rate {
+            Some((before, rate)) => {
+                let dt = now.saturating_duration_since(before).as_secs_f64().max(1e-6);
+                // Follows within about a second, whatever the rate.
+                let share = dt.min(1.0);
+                (1.0 - share) * rate + share / dt
+            }
+            None => 0.0,
+        };
+        told.rate = Some((now, rate));
+    }
+
+    /// Scans a second lately; 0 where none came for two seconds.
+    pub fn rate_hz(&self) -> f64 {
+        self.told().rate.filter(|(at, _)| at.elapsed().as_secs_f64() < 2.0).map_or(0.0, |(_, rate)| rate)
+    }
+
+    /// Mean of the normalised squared innovations, and their number; 2 where the filters are consistent.
+    pub fn mean_nis(&self) -> Option<(f64, u64)> {
+        let (sum, n) = self.told().nis;
+        (n > 0).then(|| (sum / n as f64, n))
+    }
+}
+
+/// Seconds since 1970 of a time of the system's clock.
+pub fn unix_s(at: SystemTime) -> f64 {
+    at.duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_is_said_once() {
+        let board = Board::new("cam", |_| {});
+        assert!(board.set(State::Lost, "no answer") && !board.set(State::Lost, "no answer"));
+        assert!(board.set(State::Running, "") && board.said().state.word() == "running");
+    }
+}

@@ -1,0 +1,32 @@
+//! A camera in, tracks out while it happens: on a page, on a wire, in a record.
+//!
+//! The stages are those of `boresight track` ([`boresight::auto`], [`boresight::vision`], [`boresight::track`]); here stand what differs: a source that
+//! may be lost, a clock, and outputs that must never keep the run waiting.
+
+mod board;
+mod choose;
+mod event;
+mod histogram;
+mod lives;
+mod measure;
+mod motion;
+mod output;
+mod publish;
+mod queue;
+mod record;
+mod run;
+mod serve;
+mod slot;
+mod source;
+mod timeline;
+
+pub use board::{Board, Counts, Said, State};
+pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
+pub use histogram::Histogram;
+pub use measure::{Latency, Sample, Soak, latency, soak};
+pub use output::{LiveOutput, Shown};
+pub use publish::{Broker, Lines, Mqtt, Target, Udp, publisher};
+pub use record::{Record, RecordOptions};
+pub use run::{RunOptions, run};
+pub use serve::{Page, PageOptions, resident_bytes};
+pub use source::{Address, Connect, Content, Feed, Frames, Paced, Pauses};

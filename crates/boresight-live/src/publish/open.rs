@@ -1,0 +1,21 @@
+//! From a target to what takes its events.
+
+use super::address::Target;
+use super::lines::Lines;
+use super::mqtt::Mqtt;
+use super::udp::Udp;
+use crate::board::Board;
+use crate::output::LiveOutput;
+use boresight::Result;
+use std::sync::Arc;
+
+/// Opens what takes the events of a target.
+/// # Errors
+/// A name that is not known; a system without threads. A broker that is away is no error.
+pub fn publisher(target: &Target, board: &Arc<Board>) -> Result<Box<dyn LiveOutput>> {
+    Ok(match target {
+        Target::Standard => Box::new(Lines::start(std::io::stdout())?),
+        Target::Udp { address } => Box::new(Udp::open(address)?),
+        Target::Mqtt(broker) => Box::new(Mqtt::start(broker, Arc::clone(board))?),
+    })
+}

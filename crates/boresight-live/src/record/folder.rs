@@ -1,0 +1,242 @@
+//! The folder of a record: rolling segments, limits of size and age, one manifest.
+//!
+//! One run at a time writes a folder (a locked file keeps others out); the next one goes on with the next number. `manifest.json` appears whole at
+//! every change of segments. Only files with the names of segments are ever removed.
+
+use super::segment::{ENDINGS, Entry, Segment, path};
+use crate::output::{LiveOutput, Shown};
+use boresight::{Config, Error, ErrorKind, Result, io};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+/// A manifest larger than this is none of ours, bytes.
+const MAX_MANIFEST: u64 = 64 << 20;
+/// How long a record that cannot be written rests before it is tried again.
+const REST: Duration = Duration::from_secs(10);
+
+/// Sizes and ages of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordOptions {
+    /// A segment is closed when it is this large, bytes.
+    pub segment_bytes: u64,
+    /// Or this old.
+    pub segment_age: Duration,
+    /// The oldest segments go when all together are larger than this, bytes.
+    pub most_bytes: u64,
+    /// Segments older than this go.
+    pub most_age: Duration,
+}
+
+impl Default for RecordOptions {
+    fn default() -> Self {
+        Self {
+            segment_bytes: 64 << 20,
+            segment_age: Duration::from_secs(3600),
+            most_bytes: 8 << 30,
+            most_age: Duration::from_secs(30 * 24 * 3600),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Manifest {
+    schema: String,
+    segments: Vec<Entry>,
+}
+
+const SCHEMA: &str = "boresight.record/1";
+
+/// A record being written.
+pub struct Record {
+    dir: PathBuf,
+    options: RecordOptions,
+    config: String,
+    _lock: File,
+    open: Option<(Segment, Instant)>,
+    /// Closed segments by their number.
+    closed: BTreeMap<u64, Entry>,
+    rests_until: Option<Instant>,
+}
+
+impl Record {
+    /// Makes or goes on with a folder.
+    /// # Errors
+    /// [`ErrorKind::Output`] if it cannot be written, or another run is writing it.
+    pub fn create(dir: impl Into<PathBuf>, options: RecordOptions) -> Result<Self> {
+        let dir = dir.into();
+        let failed =
+            |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").at(dir.display()).because(e);
+        std::fs::create_dir_all(&dir).map_err(failed)?;
+        let lock = File::create(dir.join("lock")).map_err(failed)?;
+        if matches!(lock.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(Error::new(ErrorKind::Output, "another run is recording here")
+                .at(dir.display())
+                .hint("give each run a folder of its own"));
+        }
+        let mut closed = on_disk(&dir).map_err(failed)?;
+        for known in read_manifest(&dir.join("manifest.json")) {
+            if let Some(entry) = closed.get_mut(&known.number) {
+                *entry = Entry { bytes: entry.bytes, open: false, ..known };
+            }
+        }
+        Ok(Self { dir, options, config: String::new(), _lock: lock, open: None, closed, rests_until: None })
+    }
+
+    fn roll(&mut self) -> Result<()> {
+        self.close();
+        let number = self.closed.last_key_value().map_or(1, |(n, _)| n + 1);
+        // A number that was begun and failed is passed over.
+        self.closed.insert(number, Entry { number, ..Entry::default() });
+        let segment = Segment::create(&self.dir, number, &self.config)?;
+        self.closed.remove(&number);
+        self.open = Some((segment, Instant::now()));
+        self.enforce();
+        self.write_manifest()
+    }
+
+    fn close(&mut self) {
+        if let Some((segment, _)) = self.open.take() {
+            self.closed.insert(segment.entry.number, Entry { open: false, ..segment.entry });
+        }
+    }
+
+    /// Removes the oldest segments beyond the limits.
+    fn enforce(&mut self) {
+        let is_old = |number: u64| {
+            let modified = std::fs::metadata(path(&self.dir, number, ENDINGS[0])).and_then(|m| m.modified());
+            let age = modified.ok().and_then(|m| SystemTime::now().duration_since(m).ok());
+            age.is_some_and(|age| age > self.options.most_age)
+        };
+        let open = self.open.as_ref().map_or(0, |(s, _)| s.entry.bytes);
+        while let Some((&oldest, _)) = self.closed.first_key_value() {
+            let bytes = open + self.closed.values().map(|e| e.bytes).sum::<u64>();
+            if bytes <= self.options.most_bytes && !is_old(oldest) {
+                return;
+            }
+            self.closed.remove(&oldest);
+            // One that is gone already is as gone as it shall be.
+            ENDINGS.iter().for_each(|ending| drop(std::fs::remove_file(path(&self.dir, oldest, ending))));
+        }
+    }
+
+    fn write_manifest(&self) -> Result<()> {
+        let open = self.open.as_ref().map(|(s, _)| s.entry.clone());
+        let segments = self.closed.values().cloned().chain(open).collect();
+        let manifest = Manifest { schema: SCHEMA.into(), segments };
+        let text = serde_json::to_vec_pretty(&manifest).unwrap_or_default();
+        io::write_whole(self.dir.join("manifest.json"), &text)
+    }
+
+    fn write(&mut self, shown: &Shown<'_>) -> Result<()> {
+        let is_full = |(segment, since): &(Segment, Instant)| {
+            segment.entry.bytes >= self.options.segment_bytes || since.elapsed() >= self.options.segment_age
+        };
+        if self.open.as_ref().is_none_or(is_full) {
+            self.roll()?;
+        }
+        match &mut self.open {
+            Some((segment, _)) => segment.put(shown),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The segments that lie in a folder, by their number.
+fn on_disk(dir: &Path) -> std::io::Result<BTreeMap<u64, Entry>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(dir)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let Some((number, ending)) = name.to_str().and_then(|n| n.split_once('.')) else { continue };
+        if number.len() >= 6
+            && ENDINGS.contains(&ending)
+            && let Ok(number) = number.parse::<u64>()
+            && number < u64::MAX
+        {
+            let known = found.entry(number).or_insert(Entry { number, ..Entry::default() });
+            known.bytes += entry.metadata()?.len();
+        }
+    }
+    Ok(found)
+}
+
+fn read_manifest(path: &Path) -> Vec<Entry> {
+    // One that is damaged only loses the times; the files are what is recorded.
+    let small = std::fs::metadata(path).is_ok_and(|m| m.len() <= MAX_MANIFEST);
+    let text = if small { std::fs::read(path).unwrap_or_default() } else { Vec::new() };
+    serde_json::from_slice::<Manifest>(&text).map(|m| m.segments).unwrap_or_default()
+}
+
+impl LiveOutput for Record {
+    fn configured(&mut self, config: &Config) {
+        self.config = config.to_toml().unwrap_or_default();
+    }
+
+    fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
+        if self.rests_until.is_some_and(|until| Instant::now() < until) {
+            return Err(
+                Error::new(ErrorKind::Output, "the record rests: it could not be written").at(self.dir.display())
+            );
+        }
+        let outcome = self.write(shown);
+        self.rests_until = outcome.is_err().then(|| Instant::now() + REST);
+        if outcome.is_err() {
+            // What is half written stays readable; the next try begins a segment of its own.
+            self.close();
+        }
+        outcome
+    }
+
+    fn finish(&mut self) {
+        self.close();
+        let _ = self.write_manifest();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::When;
+    use boresight::{Detection, FrameIndex, Scan, Timestamp, View};
+
+    fn put(record: &mut Record, k: u64) -> Result<()> {
+        let time = Timestamp::from_ns(k as i64 * 40_000_000);
+        let scan = Scan::at(FrameIndex(k), time).with_detections(vec![Detection::point(1.5, 2.0, 0.5)]);
+        let when = When { frame: k, time, arrived_unix_s: 1e9 + k as f64 };
+        record.put(&Shown { view: View { frame: None, scan: &scan, tracks: &[] }, when, tracks: &[], events: &[] })
+    }
+
+    #[test]
+    fn segments_roll_old_ones_go_and_nothing_else_does() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("notes.csv"), "mine").unwrap();
+        let options = RecordOptions { segment_bytes: 4000, most_bytes: 20_000, ..RecordOptions::default() };
+        let mut record = Record::create(dir.path(), options).unwrap();
+        assert!(Record::create(dir.path(), options).err().unwrap().to_string().contains("another run"));
+        (0..500).for_each(|k| put(&mut record, k).unwrap());
+        // As after a kill: the manifest is of the last roll, the files are whole.
+        let segments = read_manifest(&dir.path().join("manifest.json"));
+        drop(record);
+        let (first, last) = (segments[0].number, segments.last().unwrap());
+        assert!(first > 1 && last.number > first + 2 && last.open, "{segments:?}");
+        assert!(!path(dir.path(), 1, "jsonl").exists() && dir.path().join("notes.csv").exists());
+        let bytes: u64 = on_disk(dir.path()).unwrap().values().map(|e| e.bytes).sum();
+        assert!(bytes < 25_000, "{bytes}");
+        let text = std::fs::read_to_string(path(dir.path(), last.number, "jsonl")).unwrap();
+        assert!(text.ends_with("}\n") && text.lines().all(|l| serde_json::from_str::<serde_json::Value>(l).is_ok()));
+        // The next run goes on.
+        let mut again = Record::create(dir.path(), options).unwrap();
+        put(&mut again, 0).unwrap();
+        again.finish();
+        let segments = read_manifest(&dir.path().join("manifest.json"));
+        assert_eq!(segments.last().unwrap().number, last.number + 1);
+        assert_eq!(
+            segments[0].frames.unwrap()[1] + 1,
+            segments[1].frames.unwrap()[0],
+            "no frame is lost between segments"
+        );
+    }
+}

@@ -1,0 +1,6 @@
+//! What is kept of a run: rolling tables and lines.
+
+mod folder;
+mod segment;
+
+pub use folder::{Record, RecordOptions};

@@ -1,0 +1,145 @@
+//! One segment of a record: JSON lines, two tables and the configuration, each written line by line so that a kill loses nothing.
+//!
+//! `000001.jsonl` holds every scan with its detections and tracks, and can be given to `boresight live` again; `000001.detections.csv` and
+//! `000001.tracks.csv` are the tables of `boresight track`, `000001.config.toml` is the run's configuration.
+
+use crate::motion::MotionLine;
+use crate::output::Shown;
+use boresight::io::{DetectionsCsv, JsonLines, Output, TracksCsv};
+use boresight::{Error, ErrorKind, Result, Sink};
+use serde::{Deserialize, Serialize};
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Endings of a segment's files.
+pub const ENDINGS: [&str; 4] = ["jsonl", "detections.csv", "tracks.csv", "config.toml"];
+
+/// What the manifest says of a segment.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Its number.
+    pub number: u64,
+    /// Bytes of its files.
+    pub bytes: u64,
+    /// Whether it is still written.
+    pub open: bool,
+    /// First and last frame and time of the run; absent if nothing is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<[u64; 2]>,
+    /// See `frames`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub times_s: Option<[f64; 2]>,
+    /// When its first and last frame arrived, s since 1970.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arrived_unix_s: Option<[f64; 2]>,
+}
+
+/// The file of a segment.
+pub fn path(dir: &Path, number: u64, ending: &str) -> PathBuf {
+    dir.join(format!("{number:06}.{ending}"))
+}
+
+/// Memory that a sink of the library writes to.
+#[derive(Clone, Default)]
+struct Memory(Arc<Mutex<Vec<u8>>>);
+
+impl Memory {
+    fn with<T>(&self, f: impl FnOnce(&mut Vec<u8>) -> T) -> T {
+        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Write for Memory {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.with(|memory| memory.extend_from_slice(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+struct Part {
+    sink: Box<dyn Sink>,
+    memory: Memory,
+    file: File,
+    path: PathBuf,
+}
+
+/// A segment that is being written.
+pub struct Segment {
+    parts: Vec<Part>,
+    /// What the manifest says.
+    pub entry: Entry,
+}
+
+impl Segment {
+    /// Creates the files of a number that is not taken.
+    /// # Errors
+    /// [`ErrorKind::Output`] if they cannot be written.
+    pub fn create(dir: &Path, number: u64, config: &str) -> Result<Self> {
+        let config_path = path(dir, number, "config.toml");
+        let failed =
+            |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").at(config_path.display()).because(e);
+        std::fs::write(&config_path, config).map_err(failed)?;
+        let mut parts = Vec::new();
+        for ending in &ENDINGS[..3] {
+            let memory = Memory::default();
+            let output = Output::Stream(Box::new(memory.clone()));
+            let sink: Box<dyn Sink> = match *ending {
+                "jsonl" => Box::new(JsonLines::to(output)),
+                "tracks.csv" => Box::new(TracksCsv::to(output)?),
+                _ => Box::new(DetectionsCsv::to(output)?),
+            };
+            let path = path(dir, number, ending);
+            let opened = OpenOptions::new().append(true).create_new(true).open(&path);
+            let file =
+                opened.map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
+            parts.push(Part { sink, memory, file, path });
+        }
+        let entry = Entry { number, open: true, bytes: config.len() as u64, ..Entry::default() };
+        let mut segment = Self { parts, entry };
+        segment.write_out("")?;
+        Ok(segment)
+    }
+
+    /// Writes a frame: each file by one write, so that a kill leaves whole lines.
+    /// # Errors
+    /// [`ErrorKind::Output`] if it cannot be written.
+    pub fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
+        for part in &mut self.parts {
+            part.sink.put(&shown.view)?;
+        }
+        let (frame, time_s, at) = (shown.when.frame, shown.when.time.as_secs_f64(), shown.when.arrived_unix_s);
+        let blind = if shown.view.scan.blind { "\"blind\":true," } else { "" };
+        let motion = shown.view.scan.camera_motion.as_ref().and_then(MotionLine::of);
+        let motion = motion.and_then(|m| serde_json::to_string(&m).ok());
+        let motion = motion.map_or(String::new(), |m| format!("\"camera_motion\":{m},"));
+        self.write_out(&format!("{{\"arrived_unix_s\":{at},{blind}{motion}"))?;
+        let entry = &mut self.entry;
+        entry.frames = Some([entry.frames.map_or(frame, |f| f[0]), frame]);
+        entry.times_s = Some([entry.times_s.map_or(time_s, |t| t[0]), time_s]);
+        entry.arrived_unix_s = Some([entry.arrived_unix_s.map_or(at, |a| a[0]), at]);
+        Ok(())
+    }
+
+    /// Hands what the sinks made to the files; the line of JSON begins with `head` instead of its brace.
+    fn write_out(&mut self, head: &str) -> Result<()> {
+        for part in &mut self.parts {
+            part.memory.with(|memory| {
+                if !head.is_empty() && memory.first() == Some(&b'{') {
+                    memory.splice(..1, head.bytes());
+                }
+                let written = part.file.write_all(memory);
+                self.entry.bytes += memory.len() as u64;
+                memory.clear();
+                let failed = |e| Error::new(ErrorKind::Output, "cannot be written").at(part.path.display()).because(e);
+                written.map_err(failed)
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,13 @@
+//! The page: what a browser sees of the run, and what programs ask of it.
+
+mod access;
+mod hub;
+mod metrics;
+mod page_output;
+mod picture;
+mod routes;
+mod server;
+mod viewer;
+
+pub use metrics::resident_bytes;
+pub use server::{Page, PageOptions};

@@ -1,0 +1,125 @@
+//! The addresses of the page: the page itself, its picture, the tracks, the events, the metrics. Nothing of the file system is served.
+
+use super::access::{Access, Verdict};
+use super::hub::Hub;
+use super::{metrics, viewer};
+use crate::board::add;
+use axum::Router;
+use axum::extract::{Request, State, WebSocketUpgrade};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use futures_util::stream;
+use std::convert::Infallible;
+use std::sync::Arc;
+use tokio::sync::broadcast::error::RecvError;
+
+const HTML: &str = include_str!("page.html");
+const CSS: &str = include_str!("page.css");
+const JS: &str = include_str!("page.js");
+
+/// What every answer says to the browser: run nothing of others, stand in no frame, guess no type, keep nothing.
+const HEADERS: [(&str, &str); 6] = [
+    (
+        "content-security-policy",
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    ("x-content-type-options", "nosniff"),
+    ("x-frame-options", "DENY"),
+    ("referrer-policy", "no-referrer"),
+    ("cross-origin-resource-policy", "same-origin"),
+    ("cache-control", "no-store"),
+];
+
+/// What the handlers share.
+#[derive(Clone)]
+pub struct Shared {
+    /// What is shown.
+    pub hub: Arc<Hub>,
+    /// Who may see it.
+    pub access: Arc<Access>,
+    /// Viewers at once.
+    pub most_viewers: u64,
+}
+
+/// All addresses, behind the guard.
+pub fn router(shared: Shared) -> Router {
+    let text =
+        |kind: &'static str, body: &'static str| get(move || async move { ([(header::CONTENT_TYPE, kind)], body) });
+    Router::new()
+        .route("/", text("text/html; charset=utf-8", HTML))
+        .route("/page.css", text("text/css; charset=utf-8", CSS))
+        .route("/page.js", text("text/javascript; charset=utf-8", JS))
+        .route("/api/tracks", get(tracks))
+        .route("/api/config", get(config))
+        .route("/api/stream", get(events))
+        .route("/api/view", get(view))
+        .route("/metrics", get(numbers))
+        .layer(from_fn_with_state(shared.clone(), guard))
+        .with_state(shared)
+}
+
+/// Refuses what may not be answered, and puts the headers on everything.
+async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let verdict = shared.access.judge(request.method(), request.uri(), request.headers());
+    let mut response = match verdict {
+        Verdict::Pass => next.run(request).await,
+        Verdict::Welcome(cookie) => {
+            // On to the address without the token, so that it stays in no history.
+            let headers = [(header::SET_COOKIE, cookie), (header::LOCATION, "/".to_string())];
+            (StatusCode::SEE_OTHER, headers).into_response()
+        }
+        Verdict::Refuse(code, why) => {
+            add(&shared.hub.board.counts.requests_refused, 1);
+            let mut refused = (code, why).into_response();
+            // What a refused request goes on to say is not read.
+            refused.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+            refused
+        }
+    };
+    let headers: &mut HeaderMap = response.headers_mut();
+    for (name, value) in HEADERS {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn tracks(State(shared): State<Shared>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], shared.hub.latest().to_string()).into_response()
+}
+
+async fn config(State(shared): State<Shared>) -> Response {
+    let (toml, reasons) = shared.hub.board.configuration();
+    let json = serde_json::json!({ "toml": toml, "reasons": reasons });
+    ([(header::CONTENT_TYPE, "application/json")], json.to_string()).into_response()
+}
+
+async fn numbers(State(shared): State<Shared>) -> Response {
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], metrics::text(&shared.hub.board))
+        .into_response()
+}
+
+/// Events as they come; one who lags too far behind is told how many are lost.
+async fn events(State(shared): State<Shared>) -> Response {
+    let receiver = shared.hub.events.subscribe();
+    let lines = stream::unfold(receiver, |mut receiver| async move {
+        let event = match receiver.recv().await {
+            Ok(json) => Event::default().data(&*json),
+            Err(RecvError::Lagged(n)) => Event::default().event("lost").data(n.to_string()),
+            Err(RecvError::Closed) => return None,
+        };
+        Some((Ok::<_, Infallible>(event), receiver))
+    });
+    Sse::new(lines).keep_alive(KeepAlive::default()).into_response()
+}
+
+async fn view(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
+    let Some(seat) = viewer::enter(&shared.hub, shared.most_viewers) else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "all places are taken\n").into_response();
+    };
+    let upgrade = upgrade.max_message_size(viewer::MAX_WORD).max_frame_size(viewer::MAX_WORD);
+    upgrade.on_upgrade(move |socket| viewer::serve(socket, seat))
+}

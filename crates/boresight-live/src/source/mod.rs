@@ -1,0 +1,12 @@
+//! Where frames or detections come from while they happen.
+
+mod address;
+mod detection_lines;
+mod feed;
+mod pace;
+mod reader;
+
+pub use address::Address;
+pub use feed::{Connect, Content, Feed, Frames};
+pub use pace::Paced;
+pub use reader::{Arrived, Pauses, start};
