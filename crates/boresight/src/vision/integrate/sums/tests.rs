@@ -41,7 +41,9 @@ fn direct(sums: &Sums, of: &Velocities, times_s: &[f64], phi: &Phi) -> Extremes 
 fn a_shift_longer_than_the_row_joins_nothing() {
     let geometry = Geometry { width: 1, height: 2, stride: CELL };
     let (newer, older) = (vec![3i16; 2 * CELL], vec![5i16; 2 * CELL]);
-    for shift in [(1 + CELL as i32, 0), (-1 - CELL as i32, 0), (CELL as i32, 1), (i32::MAX, 0), (i32::MIN, 0), (0, i32::MAX)] {
+    for shift in
+        [(1 + CELL as i32, 0), (-1 - CELL as i32, 0), (CELL as i32, 1), (i32::MAX, 0), (i32::MIN, 0), (0, i32::MAX)]
+    {
         let mut out = vec![0; 2 * CELL];
         join(&newer, &older, shift, geometry, &mut out);
         let met = i16::from(shift.0 == 0 && shift.1 == 0) * 5;
