@@ -91,6 +91,22 @@ pub fn clips(data: &Path) -> Result<Vec<Clip>> {
     Ok(out)
 }
 
+/// A user's own clips: every `NAME.csv` of points (frame, id, x, y, from 0, below a header) with `NAME.y4m`, `NAME.mp4`, `NAME.avi` or a folder `NAME`.
+pub fn own(dir: &Path, near_px: f64) -> Result<Vec<Clip>> {
+    let entries = std::fs::read_dir(dir).with_context(|| format!("{}", dir.display()))?;
+    let mut tables: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();
+    tables.retain(|p| p.extension().is_some_and(|e| e == "csv"));
+    tables.sort();
+    let clip = |truth: PathBuf| {
+        let inputs = ["y4m", "mp4", "avi", ""].map(|e| truth.with_extension(e));
+        let input = inputs.into_iter().find(|p| p.exists())?;
+        let name = truth.file_stem()?.to_string_lossy().into_owned();
+        let near = Near::Px(near_px);
+        Some(Clip { kind: "own", name, input, truth, columns: POINTS, near, whole: true, contrast: None })
+    };
+    Ok(tables.into_iter().filter_map(clip).collect())
+}
+
 /// Name and median contrast of each clip in an index, where it has such columns.
 fn contrasts(index: &Path) -> Result<Vec<(String, f64)>> {
     let Ok(mut reader) = csv::Reader::from_path(index) else { return Ok(Vec::new()) };

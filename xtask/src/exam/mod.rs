@@ -35,6 +35,13 @@ pub struct Args {
     /// A detector by its name, as with `boresight track`; nothing is written then.
     #[arg(long)]
     detector: Option<boresight::auto::DetectorKind>,
+    /// A folder of one's own clips in the place of the public ones: `NAME.y4m`, `.mp4`, `.avi` or a folder `NAME`, each with its points `NAME.csv` (frame,id,x,y);
+    /// nothing is written then.
+    #[arg(long)]
+    own: Option<PathBuf>,
+    /// How near a track must be to a target of one's own clips, px.
+    #[arg(long, default_value_t = 5.0)]
+    own_near_px: f64,
     /// Folder with SORT's tracks (`MOT17-02.txt` ...), made by `scripts/sort_peer.py`.
     #[arg(long)]
     sort: Option<PathBuf>,
@@ -107,8 +114,10 @@ pub fn run(args: &Args) -> Result<()> {
     print!("{HEAD}");
     let folder = std::env::temp_dir().join(format!("boresight_exam_{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
-    let mut all = clips::clips(&data)?;
-    all.extend(scenes::clips(&folder, &args.only)?);
+    let all = match &args.own {
+        Some(dir) => clips::own(dir, args.own_near_px)?,
+        None => [clips::clips(&data)?, scenes::clips(&folder, &args.only)?].into_iter().flatten().collect(),
+    };
     for clip in all {
         n_of_kind = if clip.kind == kind { n_of_kind + 1 } else { 0 };
         kind = clip.kind;
@@ -119,7 +128,7 @@ pub fn run(args: &Args) -> Result<()> {
         let s = score(&clip, &args.sets, &request)?;
         let row = row(&clip, half, &s);
         print!("{row}");
-        if !args.only.is_empty() {
+        if !args.only.is_empty() || args.own.is_some() {
             println!("    {}", s.chosen);
         }
         if args.list_false {
@@ -147,6 +156,9 @@ pub fn run(args: &Args) -> Result<()> {
     let mut closing = String::new();
     writeln!(closing, "\nMean NIS within 1.6 to 2.4 on {n_honest} of {} clips.", done.len())?;
     print!("\n{head}{closing}");
+    if args.own.is_some() {
+        return Ok(());
+    }
     let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
     print!("\n{tables}");
     if !asked {

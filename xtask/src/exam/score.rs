@@ -91,8 +91,8 @@ pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until:
     let ms_a_frame = 1e3 * started.elapsed().as_secs_f64() / summary.frames.max(1) as f64;
     let mut seen = std::mem::take(&mut *seen.lock().unwrap_or_else(PoisonError::into_inner));
     // Beyond the last frame of the truth nothing is known.
-    let last = truth.iter().map(|r| r.frame).max().unwrap_or(0);
-    seen.rows.retain(|r| r.frame <= last);
+    let last = truth.iter().map(|r| r.frame).max();
+    seen.rows.retain(|r| last.is_none_or(|last| r.frame <= last));
     let near = nearness(&truth, &seen.rows, clip.near);
     let n_targets = truth.iter().map(|r| r.id).collect::<BTreeSet<_>>().len().max(1);
     Ok(Score {
