@@ -6,13 +6,13 @@
 //! Detections of a target are a Markov chain: P_D after a detection, another after a miss, since what hides a target lasts. Both count the scans between a
 //! track's first and last detection, in which it was there for sure. Counts of zero are half a count (Jeffreys' prior).
 //! Symbols: λ false detections per px² and scan, β new targets per px² and scan, τ mean time a target stays, s.
-//! Limits: one density for the whole field; a target that is never confirmed counts as false detections.
+//! Limits: a target that is never confirmed counts as false detections.
 
 use super::digits::round;
 use super::first_scans::{Shares, first};
 use super::score_statistics::{self, Held};
 use crate::associate::{AssociatorConfig, CostKind, GlobalNearestConfig};
-use crate::track::{ClutterConfig, ConfirmationConfig, ExistenceConfig};
+use crate::track::{ClutterConfig, ClutterMapConfig, ConfirmationConfig, ExistenceConfig};
 use crate::{Config, Result, Scan, TrackStatus};
 use std::collections::BTreeMap;
 
@@ -37,6 +37,8 @@ const MOST_P_DETECTION: f64 = 0.99;
 const LEAST_LIFE_S: f64 = 2.0;
 /// A thing at rest is not taken for moving more often than this.
 const MOST_FALSE_MOTION: f64 = 0.01;
+/// A target may be hidden for so long and keep its id, s: now that it is known how long targets stay, likelihoods decide, and this bounds memory alone.
+const LONGEST_HIDDEN_S: f64 = 3600.0;
 /// Fewer scans than this tell nothing.
 const LEAST_SCANS: usize = 8;
 
@@ -126,7 +128,11 @@ pub fn learn(
         t.detection_probability = round(after_hit.clamp(0.1, MOST_P_DETECTION));
         t.redetection_probability = Some(round(after_miss.clamp(0.01, MOST_P_DETECTION)));
         t.clutter_density_per_px2 = round(false_density);
-        t.clutter = ClutterConfig::Given;
+        // Glitter on water, a tree in the wind: there a detection says less.
+        t.clutter = ClutterConfig::Map(ClutterMapConfig::default());
+        if t.reidentification.max_gap_s > 0.0 {
+            t.reidentification.max_gap_s = LONGEST_HIDDEN_S;
+        }
         t.score_likelihood = score_statistics::of(scans, &held, t.appearance_gain);
         if t.score_likelihood.is_some() {
             t.associator = AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Likelihood });
@@ -143,7 +149,8 @@ pub fn learn(
     let new_per_hour = e.new_target_density_per_px2 * area_px2 * 3600.0 / interval_s;
     reasons.push(format!(
         "In {n_scans} scans a target is detected with {:.0} %, after a miss with {:.0} %; {:.2} detections a scan are false, {:.1} targets a minute are new and stay {:.1} s: a track is reported from a \
-         probability of {} on, about {:.2} false ones an hour (--false-tracks-per-hour).",
+         probability of {} on, about {:.2} false ones an hour (--false-tracks-per-hour). A lost one that is found again keeps its id if that is likelier than a new target, however long it was \
+         hidden.",
         100.0 * t.detection_probability,
         100.0 * t.redetection_probability.unwrap_or(t.detection_probability),
         t.clutter_density_per_px2 * area_px2,

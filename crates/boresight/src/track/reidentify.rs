@@ -10,7 +10,11 @@
 //! it stops: with the probability [`RESTED`] the new velocity is 0 within its own covariance. A new track that has not moved yet may also be scenery, at rest, as
 //! often as such tracks are. One that continues a target which has moved needs not show it again.
 //! It decides once and looks back only: a stream's ids, the annotated video's and the table's are the same.
-//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of reported targets: a new one has the density n / A, and so with things at rest.
+//! How long ago it was lost has no limit of its own: the covariance of the prediction grows with the time, the target has stayed in view with the probability
+//! e^(−T/τ) (τ the mean time that targets stay, where the rule of confirmation knows it), and with the probability [`ALIKE`] a new target has the lost one's
+//! speed, in any direction: what is only as slow is not surely the same.
+//! Symbols: A the field's area (px²), v the largest speed (px/s), n the number of new targets that come while one is hidden, where the rule of confirmation
+//! knows it, at least one and at most as many as are reported: a new one has the density n / A; things at rest that of their number.
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
 
 use super::filter::TrackedFilter;
@@ -28,6 +32,8 @@ const CONFIRM_S: f64 = 10.0;
 const TURNED: f64 = 0.1;
 /// Share of losses where the target had stopped. Chosen as the one of turns.
 const RESTED: f64 = 0.1;
+/// Share of new targets that have the speed of the lost one, in any direction: birds of a flock. Chosen as those.
+const ALIKE: f64 = 0.1;
 /// Lost tracks remembered.
 const MOST_LOST: usize = 256;
 /// Deviation of the logarithm of a target's height between its loss and its return: a third larger or smaller.
@@ -41,7 +47,8 @@ const UNKNOWN_AREA_PX2: f64 = 1e6;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ReidentificationConfig {
-    /// Longest time between its last detection and the first of the new track, s, 0 or more; 0 gives every track an id of its own.
+    /// Longest time between its last detection and the first of the new track, s, 0 or more; 0 gives every track an id of its own. A long one costs memory only
+    /// where the confirmation rule knows how long targets stay: likelihoods decide.
     pub max_gap_s: f64,
 }
 
@@ -184,13 +191,33 @@ pub(super) struct Field {
     max_speed_px_per_s: f64,
     n_targets: f64,
     n_still: f64,
+    stay: Stay,
+}
+
+/// How long targets stay and how often new ones come.
+#[derive(Clone, Copy)]
+pub(super) struct Stay {
+    /// Probability to stay in view for a second.
+    pub survival_per_s: f64,
+    /// New targets a second in the field, if that is known.
+    pub new_per_s: Option<f64>,
 }
 
 impl Field {
-    /// The field of an image of that size, px, if it is known.
-    pub fn new(size_px: Option<[f64; 2]>, max_speed_px_per_s: f64, n_targets: usize, n_still: usize) -> Self {
-        let area_px2 = size_px.map_or(UNKNOWN_AREA_PX2, |[w, h]| w * h);
-        Self { area_px2, max_speed_px_per_s, n_targets: n_targets.max(1) as f64, n_still: n_still as f64 }
+    /// The field of an image of that size, px, if it is known, with so many targets and things at rest.
+    pub fn new(
+        size_px: Option<[f64; 2]>,
+        max_speed_px_per_s: f64,
+        stay: Stay,
+        [n_targets, n_still]: [usize; 2],
+    ) -> Self {
+        Self {
+            area_px2: size_px.map_or(UNKNOWN_AREA_PX2, |[w, h]| w * h),
+            max_speed_px_per_s,
+            n_targets: n_targets.max(1) as f64,
+            n_still: n_still as f64,
+            stay,
+        }
     }
 }
 
@@ -212,6 +239,10 @@ fn log_ratio(
     let speed2 = |g: &Gaussian<4>| g.mean[1].powi(2) + g.mean[3].powi(2);
     // Of a velocity that says nothing of the one before.
     let any_velocity = -(std::f64::consts::TAU * speed_var).ln() - 0.5 * speed2(now) / speed_var;
+    // Of one of the speed of the one before, in any direction, as sure as both are known.
+    let alike_var = (0.5 * speed2(before) + 0.25 * (cov[(1, 1)] + cov[(3, 3)])).min(speed_var);
+    let alike = -(std::f64::consts::TAU * alike_var).ln() - 0.5 * speed2(now) / alike_var;
+    let new_velocity = log_sum([(1.0 - ALIKE).ln() + any_velocity, ALIKE.ln() + alike]);
     let reach2 = 0.5 * (speed2(before) + speed2(now)) * gap_s * gap_s;
     let apart = Vector2::new(difference[0], difference[2]);
     let s = Matrix2::new(cov[(0, 0)] + reach2, cov[(0, 2)], cov[(0, 2)], cov[(2, 2)] + reach2);
@@ -223,11 +254,9 @@ fn log_ratio(
     let straight = (1.0 - TURNED - RESTED).ln() + straight;
     let (turned, rested) = (TURNED.ln() + place + any_velocity, RESTED.ln() + place + at_rest);
     let grown = if height > 0.0 && height_before > 0.0 { (height / height_before).ln() / SIZE_LOG_STD } else { 0.0 };
-    let same = log_sum([straight, turned, rested]) - 0.5 * grown * grown;
-    let new = log_sum([
-        (field.n_targets / field.area_px2).ln() + any_velocity,
-        (field.n_still / field.area_px2).ln() + at_rest,
-    ]);
+    let same = log_sum([straight, turned, rested]) - 0.5 * grown * grown + gap_s * field.stay.survival_per_s.ln();
+    let n_new = field.stay.new_per_s.map_or(field.n_targets, |n| (n * gap_s).clamp(1.0, field.n_targets));
+    let new = log_sum([(n_new / field.area_px2).ln() + new_velocity, (field.n_still / field.area_px2).ln() + at_rest]);
     (same - new).is_finite().then_some(same - new)
 }
 
@@ -320,6 +349,23 @@ mod tests {
         assert_eq!(ids([2.0, 3.2], 0.0, 2.0), [1]);
         assert_eq!(ids([2.0, 3.2], 0.0, 0.0), [2], "switched off");
         assert_eq!(ids([2.0, 4.5], 0.0, 2.0), [2], "too long");
+        assert_eq!(ids([2.0, 4.5], 0.0, 3600.0), [1], "it is where it must be");
+        assert_eq!(ids([2.0, 4.5], 180.0, 3600.0), [2], "it cannot be there");
+    }
+
+    #[test]
+    fn after_long_what_is_only_as_slow_is_another_target() {
+        // Seen at rest for two seconds; half a minute later something as slow is far from there.
+        let ids = |away_px: f64| {
+            let config = TrackerConfig { acceleration_density_px2_per_s3: 0.01, ..config(3600.0) };
+            last_ids(&config, 875, |t| match t {
+                t if t <= 2.0 => vec![100.0 + t],
+                t if t < 32.0 => vec![],
+                t => vec![100.0 + away_px + t],
+            })
+        };
+        assert_eq!(ids(2.0), [1]);
+        assert_eq!(ids(400.0), [2]);
     }
 
     #[test]

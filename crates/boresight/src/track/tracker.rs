@@ -16,7 +16,7 @@ use super::config::TrackerConfig;
 use super::confirm::history::{Decision, Evidence};
 use super::confirm::status::status;
 use super::merged_measurements::MergedMeasurements;
-use super::reidentify::{Field, Identity, Reidentification};
+use super::reidentify::{Field, Identity, Reidentification, Stay};
 use super::scan_table::{Predicted, ScanTable};
 use super::single_track::{BATCH, Outcome, Track};
 use super::step::associate::{Association, associate, gate_confirmed};
@@ -198,7 +198,7 @@ impl Tracker {
     /// Gives tracks that their rule confirmed in this scan, or that are reported for the first time, the id of a lost one that they continue; states and
     /// tracks lie in one order. Those from `first_begun` on were begun in it.
     fn reidentify(&mut self, now: Timestamp, first_begun: usize) {
-        let Self { config, tracks, states, lost, new, .. } = self;
+        let Self { config, tracks, states, lost, new, clock, .. } = self;
         let is_reported = |s: &TrackState| s.status != TrackStatus::Tentative;
         new.extend((first_begun..states.len()).filter(|&i| tracks[i].history.accepted).map(|i| i as u32));
         lost.forget(&config.reidentification, now);
@@ -214,7 +214,11 @@ impl Tracker {
         }
         let n_reported = tracks.iter().filter(|t| t.reported).count();
         let n_still = tracks.iter().filter(|t| t.history.accepted && !t.reported).count();
-        let field = Field::new(config.field_px, config.max_speed_px_per_s, n_reported, n_still);
+        let scans_per_s = 1.0 / clock.interval.interval_s().max(1e-9);
+        let density = config.confirmation.new_target_density_per_px2();
+        let new_per_s = config.field_px.zip(density).map(|([w, h], d)| d * w * h * scans_per_s);
+        let stay = Stay { survival_per_s: config.confirmation.survival(1.0), new_per_s };
+        let field = Field::new(config.field_px, config.max_speed_px_per_s, stay, [n_reported, n_still]);
         for k in 0..new.len() {
             let i = new[k] as usize;
             tracks[i].identified = true;

@@ -81,6 +81,14 @@ impl ConfirmationConfig {
         }
     }
 
+    /// New targets per px² and scan; none where the rule knows none.
+    pub(crate) fn new_target_density_per_px2(&self) -> Option<f64> {
+        match self {
+            Self::Existence(c) => Some(c.new_target_density_per_px2),
+            _ => None,
+        }
+    }
+
     /// Predicts existence to the scan; `survival` is the probability to have stayed in view since the last.
     #[inline]
     pub(crate) fn predict_existence(&self, history: &mut History, survival: f64) {
