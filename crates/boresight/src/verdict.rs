@@ -2,13 +2,15 @@
 //!
 //! Source: our own. A sink counts while the run goes on; the first of these that holds is said:
 //! nothing was detected; nothing was tracked; only things at rest were tracked; the boxes are as large as a ground; tracks last for moments; the innovations
-//! are not as large as the filter says. Otherwise the tracks are believed.
+//! are not as large as the filter says. Otherwise the tracks are believed, and their covariances called right if the innovations are as large as stated and each is
+//! a surprise: of a filter that lags, or of errors that last, they are alike from scan to scan, whatever their size.
 //! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
 
 use crate::pipeline::Summary;
 use crate::track::{ConfirmationConfig, Report};
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Result, Sink, TrackStatus, View};
+use nalgebra::Vector2;
 use std::collections::BTreeMap;
 
 /// A thing that was followed for so many detections and never reported stands still, or nearly.
@@ -23,6 +25,8 @@ const SHORT_TRACKS: u64 = 10;
 const HONEST_NIS: [f64; 2] = [1.0, 4.0];
 /// Within these they are called right: a fifth off.
 const RIGHT_NIS: [f64; 2] = [1.6, 2.4];
+/// Correlation of innovations of scans in a row (0 expected) up to which they are surprises: 0.2 changes the variance of a mean of many by half.
+const WHITE: f64 = 0.2;
 /// Fewer innovations say nothing.
 const LEAST_NIS: u64 = 50;
 
@@ -33,6 +37,8 @@ struct Life {
     first_ns: Option<i64>,
     last_ns: i64,
     seen_at: u64,
+    /// Innovation in the frame `seen_at`, in its deviations.
+    innovation: Option<Vector2<f64>>,
 }
 
 /// What is counted of a run beside its [`Summary`], in memory that does not grow with it.
@@ -46,6 +52,10 @@ pub struct Observed {
     followed: u64,
     rows: u64,
     large_rows: u64,
+    /// Products of innovations in a row and squares, both axes, in their deviations; number of the products.
+    products: f64,
+    squares: f64,
+    n_products: u64,
 }
 
 /// What is thought of a run.
@@ -77,6 +87,16 @@ impl Observed {
         let mut is_there = false;
         for t in view.tracks {
             let life = self.lives.entry(t.id.0).or_default();
+            let innovation = t.innovation.as_ref().filter(|_| t.status != TrackStatus::Tentative);
+            let innovation = innovation.map(|i| i.innovation.component_div(&i.cov.diagonal().map(f64::sqrt)));
+            if let Some(now) = innovation.filter(|i| i.iter().all(|v| v.is_finite())) {
+                self.squares += now.norm_squared();
+                if let Some(before) = life.innovation.filter(|_| life.seen_at + 1 == self.frames) {
+                    self.products += now.dot(&before);
+                    self.n_products += 1;
+                }
+            }
+            life.innovation = innovation;
             (life.seen_at, life.hits) = (self.frames, life.hits + u32::from(t.detection.is_some()));
             if t.status == TrackStatus::Tentative {
                 continue;
@@ -99,6 +119,11 @@ impl Observed {
             lives
         });
         self.lives = gone;
+    }
+
+    /// Correlation of innovations of frames in a row; none of too few.
+    fn correlation(&self) -> Option<f64> {
+        (self.n_products >= LEAST_NIS && self.squares > 0.0).then(|| self.products / self.squares)
     }
 
     fn end(&mut self, life: &Life) {
@@ -174,7 +199,14 @@ impl Observed {
                 n if n > RIGHT_NIS[1] => "somewhat too small",
                 _ => "right",
             };
-            format!("; the covariances are {words} (mean NIS {n:.2}, 2 is honest)")
+            let alike = all.correlation().filter(|c| c.abs() > WHITE);
+            match (alike, words) {
+                (Some(c), "right") => format!(
+                    "; the innovations are as large as stated (mean NIS {n:.2}, 2 is honest) but alike from frame to frame (correlation {c:.2}, 0 is honest): the \
+                     covariances of the means are not to be trusted"
+                ),
+                _ => format!("; the covariances are {words} (mean NIS {n:.2}, 2 is honest)"),
+            }
         });
         Verdict { sentence: format!("{}{honest}.", self.found(mean_s, summary)), is_doubtful: false, next: None }
     }
@@ -241,7 +273,7 @@ mod tests {
         Detection, Extent, Frame, FrameIndex, Image, Pixels, Scan, Timestamp, TrackId, TrackInnovation, TrackState,
     };
     use boresight_filters::Gaussian;
-    use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+    use nalgebra::{Matrix2, SMatrix, SVector};
 
     /// A run of 100 frames of 100 x 80 px at 10 a second: `tracks` tells (id, reported, side of the box in px, NIS) of each.
     fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, bool, f64, f64)>) -> Verdict {
@@ -322,6 +354,36 @@ mod tests {
             "up to 1 target at once, one or more in 50 % of the frames, followed for 4.9 s in the mean; the covariances are right (mean NIS 1.90, 2 is honest)."
         );
         assert!(!v.is_doubtful && v.next.is_none());
+    }
+
+    #[test]
+    fn innovations_that_go_on_are_no_surprise_however_large() {
+        let sentence = |innovation: &dyn Fn(usize) -> f64| {
+            let mut seen = Observed::default();
+            for k in 0..200 {
+                let state = TrackState {
+                    id: TrackId(1),
+                    status: TrackStatus::Confirmed,
+                    kinematics: Gaussian { mean: SVector::zeros(), cov: SMatrix::identity() },
+                    extent: Extent::default(),
+                    detection: Some(0),
+                    innovation: Some(TrackInnovation {
+                        innovation: Vector2::new(innovation(k), -innovation(k)),
+                        cov: Matrix2::identity(),
+                        nis: 2.0,
+                    }),
+                    score: 1.0,
+                };
+                let scan = Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(0.1 * k as f64));
+                seen.put(&View { frame: None, scan: &scan, tracks: &[state] });
+            }
+            let summary = Summary { frames: 200, detections: 200, mean_nis: Some((2.0, 200)), ..Summary::default() };
+            seen.verdict(&isolated(Report::All), &summary).sentence
+        };
+        // Signs of a pair in turns: + + - - + + ..., of which half of the neighbours are alike; and of four, three quarters.
+        let signs = |of: usize| move |k: usize| if (k / of).is_multiple_of(2) { 1.0 } else { -1.0 };
+        assert!(sentence(&signs(2)).contains("the covariances are right (mean NIS 2.00"), "{}", sentence(&signs(2)));
+        assert!(sentence(&signs(4)).contains("alike from frame to frame (correlation 0.5"), "{}", sentence(&signs(4)));
     }
 
     #[test]
