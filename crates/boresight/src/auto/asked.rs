@@ -28,13 +28,13 @@ pub fn configure(
 ) -> Result<()> {
     reasons.push(format!("The detector is the one asked for: {kind}, for {}.", kind.purpose()));
     match kind {
-        DetectorKind::Isolated => spots::configure(&spots::look(frames, info)?, info, config, reasons),
+        DetectorKind::Isolated => spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, reasons),
         DetectorKind::Cfar => {
-            spots::configure(&spots::look(frames, info)?, info, config, &mut Vec::new());
-            faint::configure_asked(&faint::count(frames, info)?.0, config, reasons);
+            spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, &mut Vec::new());
+            faint::configure_asked(&faint::better(faint::count(frames, &scene.ground, info)?.0), config, reasons);
         }
         DetectorKind::Integrate => {
-            spots::configure(&spots::look(frames, info)?, info, config, &mut Vec::new());
+            spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, &mut Vec::new());
             summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Moving => moving::configure(&seen_or_assumed(scene, info, reasons), info, config, reasons),

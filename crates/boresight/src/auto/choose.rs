@@ -7,11 +7,13 @@ use super::asked;
 use super::interval::interval_s;
 use super::request::DetectorKind;
 use super::scene::{self, Scene};
+use super::spots::Seen;
 use super::{cells, colour, faint, moving, particles, spots};
 use crate::io::Colour;
+use crate::vision::threshold::Polarity;
 use crate::{Config, Frame, Result, SourceInfo};
 
-/// How long a target may be hidden and keep its id, s: someone behind a lamp post, an aircraft behind a tree.
+/// How long a target may be hidden and keep its id, s, where it is not known how long targets stay: someone behind a lamp post.
 pub(super) const REIDENTIFY_S: f64 = 2.0;
 
 /// A proposed configuration and why.
@@ -58,7 +60,10 @@ pub(super) fn choose_seen(
         if n_looked == 1 { "frame" } else { "frames" },
     ));
     if let Some(frame) = second.first() {
+        // The ground is that of the first frames, whose order and gaps motion is told by.
+        let ground = std::mem::take(&mut scene.ground);
         scene = scene::look(second, &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
+        scene.ground = ground;
     }
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
@@ -70,20 +75,26 @@ pub(super) fn choose_seen(
         moving::configure(&scene, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, &scene, info)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
-    } else if let Some(seen) = cells::look(frames, info)? {
-        cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
-        let evidence = spots::look(frames, info)?;
-        spots::configure(&evidence, info, &mut config, &mut reasons);
-        if evidence.is_poor()
-            && let Some(seen) = faint::look(frames, info)?
-        {
-            faint::configure(&seen, &mut config, &mut reasons);
+        let cells = cells::look(frames, info)?;
+        // Cells are bright: where dark ones move beside them, both are looked for.
+        let are_alone = cells.is_some() && !spots::dark_moves(frames, &scene.ground, info)?;
+        let evidence = if are_alone { Seen::default() } else { spots::look(frames, &scene.ground, info)? };
+        if let Some(seen) = cells.filter(|_| evidence.polarity() != Polarity::Both) {
+            cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
+        } else {
+            spots::configure(&evidence, info, &mut config, &mut reasons);
+            if (evidence.is_poor() || !evidence.moves())
+                && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info)?
+            {
+                faint::configure(&seen, &mut config, &mut reasons);
+            }
         }
     }
     config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
     reasons.push(format!(
-        "A target that is lost and found again within {REIDENTIFY_S} s keeps its id (--no-stitch gives every track its own)."
+        "A target that is lost and found again keeps its id, within {REIDENTIFY_S} s where it is not known how long targets stay (--no-stitch gives every track its \
+         own)."
     ));
     Ok(Choice { config, reasons })
 }

@@ -4,11 +4,14 @@
 //! Source: our own; the test is Poisson's. Over the frames looked at, the number of false alarms has at most the mean and the variance 3 × rate × frames.
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
-use super::spread::spread;
+use super::evidence::{Evidence, SURE_GAIN};
+use super::sightings::Sightings;
+use super::spots::{self, Seen};
+use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, Scan, SourceInfo};
+use crate::{Config, Frame, Result, Scan, Similarity, SourceInfo};
 
 /// False alarms a frame that the tracker can bear: at 320 x 240 px and 5 px a frame, three within five frames and a gate of 50 px² meet by
 /// chance in some 3e-6 of the frames, twice in eight hours.
@@ -17,16 +20,16 @@ const FALSE_ALARMS_PER_FRAME: f64 = 1.0;
 const REAL_FACTOR: f64 = 3.0;
 /// Deviations by which the number found must exceed the number of false alarms.
 const SURE_STDS: f64 = 5.0;
-/// Frames looked at.
-const LOOKS: usize = 12;
 
 /// Faint targets of one polarity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Faint {
     /// Brighter or darker than the ground.
     pub polarity: Polarity,
     /// Detections a frame.
     pub per_frame: f64,
+    /// Chains of these.
+    pub chains: Evidence,
 }
 
 fn detector(polarity: Polarity) -> DetectorConfig {
@@ -34,36 +37,65 @@ fn detector(polarity: Polarity) -> DetectorConfig {
     DetectorConfig { threshold: ThresholdConfig::Cfar(cfar), max_detections: Some(5000), ..DetectorConfig::default() }
 }
 
-/// Counts the detections at that rate in the frames: those of the polarity of which there are more, and the frames looked at.
+/// What is found at that rate in the frames, with bright targets and with dark ones, and the number of frames looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Faint, f64)> {
-    let mut best = Faint { polarity: Polarity::Bright, per_frame: 0.0 };
-    let mut looks = 0.0;
-    for polarity in [Polarity::Bright, Polarity::Dark] {
-        let mut detector = crate::vision::build(&detector(polarity), info)?;
-        let (mut scan, mut n) = (Scan::default(), 0.0);
-        looks = 0.0;
-        for frame in spread(frames, LOOKS) {
-            detector.detect(frame, &mut scan)?;
-            n += scan.detections.len() as f64;
-            looks += 1.0;
-        }
-        let per_frame = n / f64::max(looks, 1.0);
-        if per_frame > best.per_frame {
-            best = Faint { polarity, per_frame };
-        }
-    }
-    Ok((best, looks))
+pub fn count(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<([Faint; 2], f64)> {
+    let places = growing(frames.len());
+    let side = |polarity| look_at(frames, &places, ground, polarity, info);
+    Ok(([side(Polarity::Bright)?, side(Polarity::Dark)?], places.len() as f64))
 }
 
-/// Faint targets, if there are more detections than false alarms.
+fn look_at(
+    frames: &[Frame],
+    places: &[usize],
+    ground: &[Similarity],
+    polarity: Polarity,
+    info: &SourceInfo,
+) -> Result<Faint> {
+    let mut detector = crate::vision::build(&detector(polarity), info)?;
+    let (mut scan, mut n) = (Scan::default(), 0usize);
+    let mut sightings = Vec::with_capacity(places.len());
+    for &k in places {
+        detector.detect(&frames[k], &mut scan)?;
+        n += scan.detections.len();
+        sightings.push(Sightings::of(&scan, ground.get(k)));
+    }
+    let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
+    Ok(Faint { polarity, per_frame: n as f64 / places.len().max(1) as f64, chains })
+}
+
+/// Of both polarities the one whose chains gain more, or both if the lesser one's go beside those; where neither moves, that of which there are more.
+pub fn better([bright, dark]: [Faint; 2]) -> Faint {
+    let of_dark = match bright.chains.is_sure() || dark.chains.is_sure() {
+        true => dark.chains.gain() > bright.chains.gain(),
+        false => dark.per_frame > bright.per_frame,
+    };
+    let (most, other) = if of_dark { (dark, bright) } else { (bright, dark) };
+    let beside = other.chains.gain_beside(&most.chains) > SURE_GAIN;
+    let polarity = if most.chains.is_sure() && beside { Polarity::Both } else { most.polarity };
+    Faint { polarity, ..most }
+}
+
+/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if nothing moves and there are more detections than false alarms.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Faint>> {
-    let (seen, looks) = count(frames, info)?;
-    let expected: f64 = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * looks;
-    Ok((seen.per_frame * looks > expected + SURE_STDS * expected.sqrt()).then_some(seen))
+pub fn look(frames: &[Frame], ground: &[Similarity], isolated: &Seen, info: &SourceInfo) -> Result<Option<Faint>> {
+    let (seen, looks) = count(frames, ground, info)?;
+    let seen = better(seen);
+    let (polarity, chains) = isolated.most();
+    if !seen.chains.is_sure() && !chains.is_sure() {
+        let expected: f64 = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * looks;
+        return Ok((seen.per_frame * looks > expected + SURE_STDS * expected.sqrt()).then_some(seen));
+    }
+    let mut more = seen.chains.is_surely_more_than(chains);
+    if !more && !chains.is_surely_more_than(&seen.chains) {
+        // What is gone after a second shows in few of the frames looked at.
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let of_isolated = spots::look_at(frames, &all, ground, polarity, info)?;
+        more = look_at(frames, &all, ground, seen.polarity, info)?.chains.is_surely_more_than(&of_isolated.chains);
+    }
+    Ok(more.then_some(seen))
 }
 
 /// Puts the detector for faint targets in the place of that for isolated ones; scores are now -log10 of a number of false alarms.
@@ -74,13 +106,21 @@ fn replace(faint: &Faint, config: &mut Config) {
     config.tracker.min_initiation_score = 0.0;
 }
 
+fn word(polarity: Polarity) -> &'static str {
+    match polarity {
+        Polarity::Bright => "bright",
+        Polarity::Dark => "dark",
+        Polarity::Both => "bright and dark",
+    }
+}
+
 /// Writes the detector where it was asked for.
 pub fn configure_asked(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
     replace(faint, config);
     reasons.push(format!(
         "{:.1} {} things a frame are found at {FALSE_ALARMS_PER_FRAME} false alarm a frame (detector.threshold.cfar.false-alarms-per-frame).",
         faint.per_frame,
-        if faint.polarity == Polarity::Dark { "dark" } else { "bright" },
+        word(faint.polarity),
     ));
 }
 
@@ -88,10 +128,10 @@ pub fn configure_asked(faint: &Faint, config: &mut Config, reasons: &mut Vec<Str
 pub fn configure(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
     replace(faint, config);
     reasons.push(format!(
-        "But {:.1} {} things a frame exceed the one false alarm a frame that is allowed: so faint targets are looked for \
-         (detector.threshold.cfar).",
+        "But at one false alarm a frame {:.1} {} things a frame are found, {}: so faint targets are looked for (detector.threshold.cfar).",
         faint.per_frame,
-        if faint.polarity == Polarity::Dark { "dark" } else { "bright" },
+        word(faint.polarity),
+        faint.chains.words(),
     ));
 }
 
@@ -136,10 +176,32 @@ mod tests {
     #[test]
     fn spots_of_five_deviations_are_seen_and_noise_alone_is_not() {
         let (spots, info) = frames(10);
-        let seen = look(&spots, &info).unwrap().expect("ten spots");
+        let seen = look(&spots, &[], &Seen::default(), &info).unwrap().expect("ten spots");
         assert_eq!(seen.polarity, Polarity::Bright);
         assert!((8.0..13.0).contains(&seen.per_frame), "{seen:?}");
         let (noise, info) = frames(0);
-        assert_eq!(look(&noise, &info).unwrap(), None);
+        assert_eq!(look(&noise, &[], &Seen::default(), &info).unwrap(), None);
+    }
+
+    #[test]
+    fn a_few_that_move_are_told_from_false_alarms_by_their_motion() {
+        let (mut few, info) = frames(0);
+        for (k, frame) in few.iter_mut().enumerate() {
+            let Pixels::Gray8(image) = &mut frame.pixels else { unreachable!() };
+            frame.time = Timestamp::from_secs_f64(0.04 * k as f64);
+            for (x0, y0) in [(20.0, 40.0), (60.0, 110.0)] {
+                let (cx, cy) = (x0 + 5.0 * k as f64, y0 + 1.0 * k as f64);
+                for y in 0..160 {
+                    for (x, p) in image.row_mut(y).iter_mut().enumerate() {
+                        let d2 = (x as f64 - cx).powi(2) + (y as f64 - cy).powi(2);
+                        *p = p.saturating_add((48.0 * (-0.5 * d2 / 1.69).exp()).round() as u8);
+                    }
+                }
+            }
+        }
+        let seen = look(&few, &[], &Seen::default(), &info).unwrap().expect("two spots");
+        // Three a frame are no more than twelve frames of false alarms may have.
+        assert!(seen.polarity == Polarity::Bright && seen.per_frame < 5.0, "{seen:?}");
+        assert!(seen.chains.moving.len() >= 2 && seen.chains.is_sure());
     }
 }

@@ -6,14 +6,17 @@
 
 mod asked;
 mod cells;
+mod chains;
 mod choose;
 mod colour;
 mod detection_statistics;
 mod detections;
 mod digits;
+mod evidence;
 mod faint;
 mod first_pass;
 mod first_scans;
+mod fixed_blocks;
 mod interval;
 mod moving;
 mod noise;
@@ -24,6 +27,9 @@ mod request;
 mod scene;
 mod score_statistics;
 mod second_look;
+mod sighting_density;
+mod sightings;
+mod speed;
 mod spots;
 mod spread;
 mod summed;

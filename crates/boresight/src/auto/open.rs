@@ -14,7 +14,7 @@ use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
 use super::spots::{INITIATION_SCORE, WEAK_INITIATION_SCORE};
-use super::{first_scans, noise};
+use super::{first_scans, noise, speed};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
@@ -120,6 +120,7 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
         k += 1;
     }
     let area_px2 = (info.width * info.height).max(1) as f64;
+    speed::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
     let nothing = |found: Option<Found>| found.is_some_and(|f| f.n_targets == 0);

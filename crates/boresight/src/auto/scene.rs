@@ -9,6 +9,9 @@
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
+use super::evidence::Evidence;
+use super::fixed_blocks;
+use super::sightings::{MOST_A_SCAN, Sighting, Sightings};
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage};
@@ -68,6 +71,10 @@ pub struct Scene {
     pub novelty: f64,
     /// Share of the regions that an isolated blob explains.
     pub explained: f64,
+    /// Chains of the moving regions.
+    pub chains: Evidence,
+    /// Where the first frame's ground lies in each frame, px; none before a fixed camera.
+    pub ground: Vec<Similarity>,
 }
 
 /// A moving region, px of the frame.
@@ -124,9 +131,10 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     }
     let stay = edges_moved as f64 / (edges.len() * grids.len()).max(1) as f64;
     let enough_edges = edges.len() * 1000 > grids[0].as_slice().len();
-    scene.camera = camera(frames, enough_edges.then_some(stay));
+    (scene.camera, scene.ground) = camera(frames, &grids, enough_edges.then_some(stay));
     scene.novelty = ever.count() as f64 / all.max(1) as f64;
     measure(&mut scene, &moved, info);
+    scene.chains = chains(frames, &moved, step as f64, info);
     if scene.camera == Camera::Fixed {
         scene.explained = explained(frames, &moved, info)?;
     }
@@ -166,11 +174,12 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
         .collect()
 }
 
-/// Whether the camera stands still; `edges_moved` is the share of edge pixels that move, if there are edges.
-fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
+/// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
+/// edges.
+fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Similarity>) {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
-    let mut moved = Similarity::identity();
+    let (mut moved, mut ground) = (Similarity::identity(), Vec::with_capacity(frames.len()));
     let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     for frame in frames {
         if let Some(step) = motion.step(&frame.pixels) {
@@ -184,17 +193,42 @@ fn camera(frames: &[Frame], edges_moved: Option<f64>) -> Camera {
                 still += u32::from(corners.iter().all(|&far| far <= STILL_SHARE * w));
             }
         }
+        ground.push(moved);
     }
     // Strong edges would show the smallest shift.
     let edges_stand = edges_moved.is_some_and(|share| share <= 0.03);
     if edges_stand || (2 * said >= n_steps && still == said) {
-        return Camera::Fixed;
+        return (Camera::Fixed, Vec::new());
     }
-    if 2 * said >= n_steps {
-        return Camera::Moving;
+    // Patches that are followed may be the targets' own; the ground is most of the frame.
+    let stands = fixed_blocks::stands(grids);
+    if 2 * said >= n_steps && !stands {
+        return (Camera::Moving, ground);
     }
     // Too little texture to follow: that targets cross the edges is no motion of the camera.
-    if edges_moved.is_some_and(|share| share < 0.2) { Camera::Fixed } else { Camera::Unknown }
+    let edges_stay = edges_moved.is_some_and(|share| share < 0.2);
+    if edges_stay || stands {
+        return (Camera::Fixed, Vec::new());
+    }
+    (Camera::Unknown, ground)
+}
+
+/// The chains of what moves; a region's middle is known to a pixel of the grid.
+fn chains(frames: &[Frame], moved: &[Vec<Moved>], step: f64, info: &SourceInfo) -> Evidence {
+    let sighting = |m: &Moved| {
+        let [w, h] = [m.right - m.left, m.bottom - m.top];
+        let at = Vector2::new(m.left + 0.5 * w - 0.5, m.top + 0.5 * h - 0.5);
+        Sighting::of_box(at, step * step / 12.0, w.max(h))
+    };
+    let sightings: Vec<Sightings> = frames
+        .iter()
+        .zip(moved)
+        .map(|(f, m)| Sightings {
+            time_s: f.time.ns as f64 * 1e-9,
+            all: m.iter().take(MOST_A_SCAN).map(sighting).collect(),
+        })
+        .collect();
+    Evidence::of(&sightings, (info.width * info.height) as f64)
 }
 
 fn median(values: &mut [f64]) -> f64 {

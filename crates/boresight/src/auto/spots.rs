@@ -1,14 +1,16 @@
 //! Evidence of isolated targets, bright or dark, and the configuration that follows from it.
 
 use super::digits::round;
-use super::spread::spread;
+use super::evidence::{Evidence, SURE_GAIN};
+use super::sightings::Sightings;
+use super::spread::growing;
 use crate::camera::CameraConfig;
 use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::vision::{self};
-use crate::{Config, Frame, Result, Scan, SourceInfo};
+use crate::{Config, Frame, Result, Scan, Similarity, SourceInfo};
 
 /// A score from which a blob is surely a thing and not noise.
 const SURE: f64 = 8.0;
@@ -20,8 +22,10 @@ const LARGE_PX: f64 = 24.0;
 const SPEED_CHANGE: f64 = 0.08;
 /// The same for the changing outline of a large one, px/s for each px above [`LARGE_PX`].
 const OUTLINE_JERK: f64 = 3.75;
-/// Frames looked at; they are spread over those given.
-const LOOKS: usize = 12;
+/// In fewer of the frames nothing stands clear.
+const POOR: f64 = 0.1;
+/// Least score of a detection that continues a track.
+const MIN_SCORE: f64 = 2.5;
 
 /// What was seen of one polarity.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,51 +36,99 @@ pub struct Side {
     pub mean_score: f64,
     /// Median and 95 % point of the longer side of their boxes, px.
     pub side_px: [f64; 2],
+    /// Chains of all, sure or not.
+    pub chains: Evidence,
 }
 
 /// What was seen of both polarities.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Evidence {
+pub struct Seen {
     /// Targets brighter than their surroundings.
     pub bright: Side,
     /// Targets darker than their surroundings.
     pub dark: Side,
 }
 
-impl Evidence {
+impl Seen {
     /// Whether in hardly one frame of ten anything stands clear.
     pub fn is_poor(&self) -> bool {
-        self.bright.per_frame + self.dark.per_frame < 0.1
+        self.bright.per_frame + self.dark.per_frame < POOR
+    }
+
+    /// Whether anything moves as a target would.
+    pub fn moves(&self) -> bool {
+        self.bright.chains.is_sure() || self.dark.chains.is_sure()
+    }
+
+    /// The polarity whose chains gain more, and these.
+    pub fn most(&self) -> (Polarity, &Evidence) {
+        let (bright, dark) = (&self.bright.chains, &self.dark.chains);
+        if dark.gain() > bright.gain() { (Polarity::Dark, dark) } else { (Polarity::Bright, bright) }
+    }
+
+    /// The polarity of the targets: that of what stands clear and, of what hardly does, that of what moves; both if the lesser one's moves beside the greater
+    /// one's and not with it.
+    pub fn polarity(&self) -> Polarity {
+        let weight = |s: &Side| s.per_frame * s.mean_score;
+        let dark_weighs = match self.is_poor() && self.moves() {
+            true => self.dark.chains.gain() > self.bright.chains.gain(),
+            false => weight(&self.dark) > 2.0 * weight(&self.bright),
+        };
+        let (polarity, most, other) = match dark_weighs {
+            true => (Polarity::Dark, &self.dark, &self.bright),
+            false => (Polarity::Bright, &self.bright, &self.dark),
+        };
+        let counts = self.is_poor() || other.per_frame >= POOR;
+        let beside = other.chains.gain_beside(&most.chains) > SURE_GAIN;
+        if counts && most.chains.is_sure() && beside { Polarity::Both } else { polarity }
     }
 }
 
-/// Looks for isolated blobs in the frames.
-pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Evidence> {
-    let side = |polarity: Polarity| -> Result<Side> {
-        let isolated = IsolatedConfig { polarity, min_score: SURE, max_side_px: max_side(info), ..Default::default() };
-        let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..Default::default() };
-        config.cluster.min_area_px = Some(3);
-        let mut detector = vision::build(&config, info)?;
-        let mut scan = Scan::default();
-        let (mut n, mut sum, mut sides, mut looks) = (0usize, 0.0, Vec::new(), 0usize);
-        for frame in spread(frames, LOOKS) {
-            detector.detect(frame, &mut scan)?;
-            looks += 1;
-            n += scan.detections.len();
-            for d in &scan.detections {
-                sum += f64::from(d.score).min(100.0);
-                sides.push(d.extent.width_px.max(d.extent.height_px));
-            }
+/// Looks for isolated blobs in the frames; `ground` is the first one's in each, none where it stands.
+pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
+    let places = growing(frames.len());
+    let side = |polarity| look_at(frames, &places, ground, polarity, info);
+    Ok(Seen { bright: side(Polarity::Bright)?, dark: side(Polarity::Dark)? })
+}
+
+/// Whether anything dark moves.
+pub fn dark_moves(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<bool> {
+    let dark = look_at(frames, &growing(frames.len()), ground, Polarity::Dark, info)?;
+    Ok(dark.chains.is_sure())
+}
+
+/// What is seen of one polarity in the frames at these places.
+pub fn look_at(
+    frames: &[Frame],
+    places: &[usize],
+    ground: &[Similarity],
+    polarity: Polarity,
+    info: &SourceInfo,
+) -> Result<Side> {
+    let isolated = IsolatedConfig { polarity, min_score: MIN_SCORE, max_side_px: max_side(info), ..Default::default() };
+    let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..Default::default() };
+    config.cluster.min_area_px = Some(3);
+    let mut detector = vision::build(&config, info)?;
+    let mut scan = Scan::default();
+    let (mut n, mut sum, mut sides) = (0usize, 0.0, Vec::new());
+    let mut sightings = Vec::with_capacity(places.len());
+    for &k in places {
+        detector.detect(&frames[k], &mut scan)?;
+        sightings.push(Sightings::of(&scan, ground.get(k)));
+        for d in scan.detections.iter().filter(|d| f64::from(d.score) >= SURE) {
+            n += 1;
+            sum += f64::from(d.score).min(100.0);
+            sides.push(d.extent.width_px.max(d.extent.height_px));
         }
-        sides.sort_by(f64::total_cmp);
-        let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
-        Ok(Side {
-            per_frame: n as f64 / looks.max(1) as f64,
-            mean_score: sum / n.max(1) as f64,
-            side_px: [at(0.5), at(0.95)],
-        })
-    };
-    Ok(Evidence { bright: side(Polarity::Bright)?, dark: side(Polarity::Dark)? })
+    }
+    sides.sort_by(f64::total_cmp);
+    let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
+    Ok(Side {
+        per_frame: n as f64 / places.len().max(1) as f64,
+        mean_score: sum / n.max(1) as f64,
+        side_px: [at(0.5), at(0.95)],
+        chains: Evidence::of(&sightings, (info.width * info.height) as f64),
+    })
 }
 
 /// The longest side looked for: two fifths of the frame's shorter side.
@@ -90,32 +142,39 @@ pub const INITIATION_SCORE: f64 = 6.0;
 pub const WEAK_INITIATION_SCORE: f64 = 4.0;
 
 /// Writes detector and tracker for isolated targets.
-pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
-    let weight = |s: &Side| s.per_frame * s.mean_score;
-    let (bright, dark) = (weight(&evidence.bright), weight(&evidence.dark));
-    let polarity = if dark > 2.0 * bright { Polarity::Dark } else { Polarity::Bright };
+pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+    let polarity = evidence.polarity();
     let seen = if polarity == Polarity::Dark { &evidence.dark } else { &evidence.bright };
-    if seen.per_frame == 0.0 {
-        reasons.push(
-            "Nothing stands clear of its surroundings in these frames: small bright targets are looked for (dark ones: --set \
-             detector.threshold.isolated.polarity=dark)."
-                .to_string(),
-        );
-    }
-    reasons.extend((seen.per_frame > 0.0).then(|| format!(
-        "Isolated {} targets: {:.1} bright (mean score {:.0}) and {:.1} dark ones (mean score {:.0}) a frame stand clear of their \
-         surroundings; median side {:.0} px.",
-        if polarity == Polarity::Dark { "dark" } else { "bright" },
-        evidence.bright.per_frame,
-        evidence.bright.mean_score,
-        evidence.dark.per_frame,
-        evidence.dark.mean_score,
-        seen.side_px[0]
-    )));
+    let per_frame = match polarity {
+        Polarity::Both => evidence.bright.per_frame + evidence.dark.per_frame,
+        _ => seen.per_frame,
+    };
+    reasons.push(if evidence.is_poor() && !evidence.moves() {
+        "Nothing stands clear of its surroundings in these frames and nothing in them moves as a target would: small bright targets are looked for \
+         (dark ones: --set detector.threshold.isolated.polarity=dark)."
+            .to_string()
+    } else {
+        format!(
+            "Isolated {} targets: {:.1} bright (mean score {:.0}) and {:.1} dark ones (mean score {:.0}) a frame stand clear of their \
+             surroundings; median side {:.0} px. Bright: {}. Dark: {}.",
+            match polarity {
+                Polarity::Bright => "bright",
+                Polarity::Dark => "dark",
+                Polarity::Both => "bright and dark",
+            },
+            evidence.bright.per_frame,
+            evidence.bright.mean_score,
+            evidence.dark.per_frame,
+            evidence.dark.mean_score,
+            seen.side_px[0],
+            evidence.bright.chains.words(),
+            evidence.dark.chains.words(),
+        )
+    });
     config.detector = DetectorConfig {
         threshold: ThresholdConfig::Isolated(IsolatedConfig {
             polarity,
-            min_score: 2.5,
+            min_score: MIN_SCORE,
             max_side_px: max_side(info),
             ..Default::default()
         }),
@@ -138,7 +197,7 @@ pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, re
         MergedMeasurementsConfig { max_secondary_s: tracker.coast_s, ..MergedMeasurementsConfig::default() };
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.min_initiation_score = INITIATION_SCORE;
-    if seen.per_frame > MANY {
+    if per_frame > MANY {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
         );
@@ -151,4 +210,36 @@ pub fn configure(evidence: &Evidence, info: &SourceInfo, config: &mut Config, re
          still is taken for scenery. Report that too with --set tracker.report=all."
             .to_string(),
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::auto::sightings::Sighting;
+    use nalgebra::Vector2;
+
+    /// A side with the chains of one thing that moves along a row from `x0`, px, in steps of so many px.
+    fn side(per_frame: f64, mean_score: f64, x0: f64, y: f64, step_px: f64) -> Side {
+        let scans: Vec<Sightings> = (0..12)
+            .map(|k| {
+                let at = Vector2::new(x0 + step_px * f64::from(k), y);
+                Sightings { time_s: 0.04 * f64::from(k), all: vec![Sighting::of_box(at, 0.1, 6.0)] }
+            })
+            .collect();
+        Side { per_frame, mean_score, side_px: [6.0; 2], chains: Evidence::of(&scans, 76_800.0) }
+    }
+
+    #[test]
+    fn the_polarity_is_that_of_what_moves_where_nothing_stands_clear() {
+        let seen = |bright, dark| Seen { bright, dark }.polarity();
+        let still = || side(0.0, 0.0, 50.0, 50.0, 0.0);
+        let moving = |y| side(0.0, 0.0, 50.0, y, 4.0);
+        assert_eq!(seen(still(), moving(50.0)), Polarity::Dark);
+        assert_eq!(seen(moving(50.0), still()), Polarity::Bright);
+        assert_eq!(seen(moving(50.0), moving(150.0)), Polarity::Both);
+        assert_ne!(seen(moving(50.0), moving(56.0)), Polarity::Both, "a thing and its dark edge");
+        // What stands clear decides where there is any.
+        assert_eq!(seen(moving(50.0), side(1.0, 20.0, 90.0, 150.0, 0.0)), Polarity::Dark);
+        assert_eq!(seen(still(), still()), Polarity::Bright);
+    }
 }

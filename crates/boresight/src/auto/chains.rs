@@ -1,0 +1,188 @@
+//! Chains: detections of scans in the order of time that one target explains and chance does not.
+//!
+//! Source: our own. A chain begins with two detections of neighbouring scans and goes on with the nearest detection within the gate of
+//! a constant-velocity filter, one scan without any being allowed. It gains, in nats, the logarithm of what its detections are likelier as one target's than
+//! as clutter of the density λ that the scans have there; the first step costs what a neighbour as near costs by chance, so no largest speed is assumed. Of chains that share a
+//! detection the one that gains most counts. It moves if its ends lie apart beyond their covariances.
+//! Symbols: λ detections per px² and scan, of [`Density`]; S innovation variance per axis, px²; r length of the first step, px.
+//! Limits: the [`super::sightings::MOST_A_SCAN`] strongest detections of a scan; targets that overtake their own velocity within [`TURN_S`] are lost to it.
+
+use super::sighting_density::Density;
+use super::sightings::{Sighting, Sightings};
+use nalgebra::Vector2;
+
+/// Within this time a target may change its velocity by as much as it is, s.
+const TURN_S: f64 = 1.0;
+/// χ² with 2 degrees of freedom: a true detection in a thousand lies outside.
+const GATE: f64 = 13.8;
+/// χ² with 2 degrees of freedom: a thing at rest in ten thousand seems to have moved as far.
+const MOVED: f64 = 18.4;
+/// Cost of a first step, nats, up to which a chain begins: some seven neighbours as near by chance.
+const MOST_FIRST_COST: f64 = 2.0;
+/// Detections of the shortest chain.
+const LEAST_HITS: usize = 3;
+/// Chains of clutter that are expected in all scans together, at most: e to the minus gain.
+const FALSE_CHAINS: f64 = 0.01;
+
+/// A chain that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// Scan and place of each of its detections.
+    pub hits: Vec<(usize, Sighting)>,
+    /// What it gains, nats.
+    pub gain: f64,
+    /// Speeds of its steps, px/s.
+    pub speeds_px_per_s: Vec<f64>,
+    /// Whether it moves.
+    pub moves: bool,
+}
+
+impl Chain {
+    /// Whether it goes with another one, as a thing's edge or shadow goes with the thing: in most of the scans with both they touch.
+    pub fn goes_with(&self, other: &Self) -> bool {
+        let (mut both, mut near) = (0usize, 0usize);
+        for (k, a) in &self.hits {
+            if let Some((_, b)) = other.hits.iter().find(|h| h.0 == *k) {
+                both += 1;
+                near += usize::from((a.at - b.at).norm() <= a.side_px + b.side_px + 2.0);
+            }
+        }
+        2 * near > both
+    }
+}
+
+/// A chain that may go on: place and velocity with the covariance of one axis (the axes are alike).
+#[derive(Clone)]
+struct Open {
+    hits: Vec<(usize, usize)>,
+    at: Vector2<f64>,
+    velocity: Vector2<f64>,
+    /// Variance of the place (px²), covariance (px²/s), variance of the velocity (px²/s²).
+    p: [f64; 3],
+    time_s: f64,
+    gain: f64,
+    missed: bool,
+}
+
+impl Open {
+    /// From two sightings where the density is so; none if chance gives many as near as the second.
+    fn begin(scans: &[Sightings], k: [usize; 2], i: [usize; 2], density: f64) -> Option<Self> {
+        let (a, b) = (scans[k[0]].all[i[0]], scans[k[1]].all[i[1]]);
+        let dt = scans[k[1]].time_s - scans[k[0]].time_s;
+        let step = b.at - a.at;
+        // What a neighbour as near, or one within the errors, costs by chance.
+        let reach2 = step.norm_squared() + a.variance + b.variance;
+        let gain = -(density * std::f64::consts::PI * reach2).ln();
+        let p = [b.variance, b.variance / dt, (a.variance + b.variance) / (dt * dt)];
+        (dt > 0.0 && gain > -MOST_FIRST_COST).then(|| Self {
+            hits: vec![(k[0], i[0]), (k[1], i[1])],
+            at: b.at,
+            velocity: step / dt,
+            p,
+            time_s: scans[k[1]].time_s,
+            gain,
+            missed: false,
+        })
+    }
+
+    fn predict(&mut self, time_s: f64) {
+        let dt = time_s - self.time_s;
+        let q = self.velocity.norm_squared() / TURN_S;
+        let [a, b, c] = self.p;
+        self.at += self.velocity * dt;
+        self.p = [a + 2.0 * dt * b + dt * dt * c + q * dt.powi(3) / 3.0, b + dt * c + q * dt * dt / 2.0, c + q * dt];
+        self.time_s = time_s;
+    }
+
+    /// Takes a sighting whose d² and S are known.
+    fn update(&mut self, hit: (usize, usize), s: &Sighting, d2: f64, variance: f64, density: f64) {
+        let gain = [self.p[0] / variance, self.p[1] / variance];
+        let innovation = s.at - self.at;
+        self.at += innovation * gain[0];
+        self.velocity += innovation * gain[1];
+        let [a, b, c] = self.p;
+        self.p = [a - gain[0] * a, b - gain[0] * b, c - gain[1] * b];
+        self.gain += -0.5 * d2 - (std::f64::consts::TAU * variance * density).ln();
+        self.hits.push(hit);
+        self.missed = false;
+    }
+}
+
+/// All chains, none sharing a detection with another.
+pub fn chains(scans: &[Sightings], area_px2: f64) -> Vec<Chain> {
+    let n_all: usize = scans.iter().map(|s| s.all.len()).sum();
+    let map = Density::of(scans, area_px2);
+    let by_x: Vec<Vec<(f64, usize)>> = scans.iter().map(sorted).collect();
+    // As many starts as there are detections; each may be of clutter.
+    let start = -(n_all.max(1) as f64 / FALSE_CHAINS).ln();
+    let (mut open, mut done): (Vec<Open>, Vec<Open>) = (Vec::new(), Vec::new());
+    for k in 1..scans.len() {
+        let mut next = Vec::with_capacity(open.len());
+        for mut c in open.drain(..) {
+            c.predict(scans[k].time_s);
+            let reach = |v: f64| (GATE * (c.p[0] + v)).sqrt();
+            let far = reach(scans[k].all.iter().map(|s| s.variance).fold(0.0, f64::max));
+            let (x, y) = (c.at.x, c.at.y);
+            let from = by_x[k].partition_point(|e| e.0 < x - far);
+            let mut best: Option<(f64, f64, usize)> = None;
+            for &(_, i) in by_x[k][from..].iter().take_while(|e| e.0 <= x + far) {
+                let s = &scans[k].all[i];
+                let variance = c.p[0] + s.variance;
+                let d2 = (s.at - Vector2::new(x, y)).norm_squared() / variance;
+                let cost = d2 + 2.0 * variance.ln();
+                if d2 <= GATE && best.is_none_or(|b| cost < b.0 + 2.0 * b.1.ln()) {
+                    best = Some((d2, variance, i));
+                }
+            }
+            match best {
+                Some((d2, variance, i)) => {
+                    let s = scans[k].all[i];
+                    c.update((k, i), &s, d2, variance, map.at(s.at));
+                    next.push(c);
+                }
+                None if c.missed || c.hits.len() < LEAST_HITS => done.push(c),
+                None => {
+                    c.missed = true;
+                    next.push(c);
+                }
+            }
+        }
+        for (i, first) in scans[k - 1].all.iter().enumerate() {
+            let density = map.at(first.at);
+            let far = (MOST_FIRST_COST.exp() / (std::f64::consts::PI * density)).sqrt();
+            let from = by_x[k].partition_point(|e| e.0 < first.at.x - far);
+            for &(_, j) in by_x[k][from..].iter().take_while(|e| e.0 <= first.at.x + far) {
+                next.extend(Open::begin(scans, [k - 1, k], [i, j], density));
+            }
+        }
+        open = next;
+    }
+    done.append(&mut open);
+    done.retain(|c| c.hits.len() >= LEAST_HITS && c.gain + start > 0.0);
+    done.sort_by(|a, b| b.gain.total_cmp(&a.gain).then_with(|| a.hits.cmp(&b.hits)));
+    let mut used: Vec<Vec<bool>> = scans.iter().map(|s| vec![false; s.all.len()]).collect();
+    let mut out = Vec::new();
+    for c in done {
+        if c.hits.iter().any(|h| used[h.0][h.1]) {
+            continue;
+        }
+        c.hits.iter().for_each(|h| used[h.0][h.1] = true);
+        let hits: Vec<(usize, Sighting)> = c.hits.iter().map(|h| (h.0, scans[h.0].all[h.1])).collect();
+        let [a, b] = [hits[0].1, hits[hits.len() - 1].1];
+        let speed =
+            |w: &[(usize, Sighting)]| (w[1].1.at - w[0].1.at).norm() / (scans[w[1].0].time_s - scans[w[0].0].time_s);
+        out.push(Chain {
+            gain: c.gain + start,
+            speeds_px_per_s: hits.windows(2).map(speed).collect(),
+            moves: (b.at - a.at).norm_squared() > MOVED * (a.variance + b.variance),
+            hits,
+        });
+    }
+    out
+}
+
+fn sorted(s: &Sightings) -> Vec<(f64, usize)> {
+    let mut v: Vec<(f64, usize)> = s.all.iter().enumerate().map(|(i, s)| (s.at.x, i)).collect();
+    v.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    v
+}

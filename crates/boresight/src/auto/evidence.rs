@@ -1,0 +1,212 @@
+//! The evidence that something moves: what detections gain by being told as chains, beside what the same scans gain in another order; what a choice is made by.
+//!
+//! Source: our own; the surrogate is that of J. Theiler et al., Physica D 58, 1992: the same scans in another order keep all that stands and all that
+//! comes and goes, and lose what moves. A gain in nats is the logarithm of a likelihood ratio: by chance one larger than g comes once in e^g choices.
+//! Limits: those of [`super::chains`].
+
+use super::chains::{Chain, chains};
+use super::sightings::Sightings;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// Orders of the scans in which chains are counted for comparison.
+const SURROGATES: usize = 4;
+/// By chance a gain is larger once in a thousand choices: e to the minus gain.
+pub const SURE_GAIN: f64 = 6.9;
+/// Deviations by which a number of steps, or a gain, is surely more than another.
+const STDS: f64 = 3.0;
+/// Share of the steps that may be faster than the speed called fastest.
+const FASTER_SHARE: f64 = 0.01;
+
+/// The chains of scans beside those of the same scans in other orders.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// The chains in the order of time that move.
+    pub moving: Vec<Chain>,
+    /// Mean number and gain (nats) of a surrogate's moving chains.
+    pub by_chance: [f64; 2],
+    /// Speeds of the steps of all surrogates' moving chains, px/s.
+    speeds_by_chance: Vec<f64>,
+}
+
+impl Evidence {
+    /// Looks for chains in a field of that area, px².
+    pub fn of(scans: &[Sightings], area_px2: f64) -> Self {
+        let mut out = Self { moving: chains(scans, area_px2), by_chance: [0.0; 2], speeds_by_chance: Vec::new() };
+        out.moving.retain(|c| c.moves);
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        for _ in 0..SURROGATES {
+            let mut order: Vec<usize> = (0..scans.len()).collect();
+            order.shuffle(&mut rng);
+            let shuffled: Vec<Sightings> = scans
+                .iter()
+                .zip(order)
+                .map(|(s, from)| Sightings { time_s: s.time_s, all: scans[from].all.clone() })
+                .collect();
+            for chain in chains(&shuffled, area_px2).into_iter().filter(|c| c.moves) {
+                out.by_chance[0] += 1.0 / SURROGATES as f64;
+                out.by_chance[1] += chain.gain / SURROGATES as f64;
+                out.speeds_by_chance.extend(chain.speeds_px_per_s);
+            }
+        }
+        out
+    }
+
+    /// Gain of what moves beyond that of the surrogates, nats.
+    pub fn gain(&self) -> f64 {
+        self.moving.iter().map(|c| c.gain).sum::<f64>() - self.by_chance[1]
+    }
+
+    /// Gain of those chains that go with none of `other`, nats, beyond that of the surrogates.
+    pub fn gain_beside(&self, other: &Self) -> f64 {
+        let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o)));
+        own.map(|c| c.gain).sum::<f64>() - self.by_chance[1]
+    }
+
+    /// Whether the order of the scans means something, surely.
+    pub fn is_sure(&self) -> bool {
+        self.gain() > SURE_GAIN
+    }
+
+    /// Whether these chains surely gain more than the other ones of the same targets.
+    ///
+    /// The gain of a detection has the variance of χ²/2, 1: that of n of them deviates by √n.
+    pub fn is_surely_more_than(&self, other: &Self) -> bool {
+        let hits = |e: &Self| e.moving.iter().map(|c| c.hits.len()).sum::<usize>() as f64;
+        let luck = if other.is_sure() { STDS * (hits(self) + hits(other)).sqrt() } else { 0.0 };
+        self.gain() > other.gain().max(0.0) + SURE_GAIN + luck
+    }
+
+    /// The speed that one in a hundred of the steps exceeds which chance does not explain, px/s; none where nothing moves surely.
+    pub fn fastest_px_per_s(&self) -> Option<f64> {
+        let mut ordered: Vec<f64> = self.moving.iter().flat_map(|c| c.speeds_px_per_s.iter().copied()).collect();
+        ordered.sort_by(|a, b| b.total_cmp(a));
+        let mut chance = self.speeds_by_chance.clone();
+        chance.sort_by(|a, b| b.total_cmp(a));
+        // From the fastest down: as soon as so many more steps than by chance are as fast.
+        let excess = |n: usize| {
+            let by_chance = chance.partition_point(|c| *c >= ordered[n]) as f64 / SURROGATES as f64;
+            let more = (n + 1) as f64 - by_chance;
+            (more > STDS * (by_chance + 1.0).sqrt()).then_some(more)
+        };
+        let all = ordered.len() as f64 - chance.len() as f64 / SURROGATES as f64;
+        let fast = |n: &usize| excess(*n).is_some_and(|more| more >= FASTER_SHARE * all);
+        (0..ordered.len()).find(fast).filter(|_| self.is_sure()).map(|n| ordered[n])
+    }
+
+    /// In words, for the reasons of a choice.
+    pub fn words(&self) -> String {
+        let n = self.moving.len();
+        format!(
+            "{n} chain{} in motion that gain{} {:.0} nats, {:.1} that gain {:.0} in another order",
+            if n == 1 { "" } else { "s" },
+            if n == 1 { "s" } else { "" },
+            self.gain() + self.by_chance[1],
+            self.by_chance[0],
+            self.by_chance[1]
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sightings::Sighting;
+    use super::*;
+    use nalgebra::Vector2;
+    use rand::RngExt;
+    use rand_distr::StandardNormal;
+
+    const SIDE_PX: f64 = 300.0;
+
+    /// Twelve scans of 25 a second of `n` targets of a speed (px a scan), each detected with 0.8, and of `n_false` false detections and `n_still` things.
+    fn scans(seed: u64, n: usize, speed: f64, n_false: usize, n_still: usize) -> Vec<Sightings> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let place = |rng: &mut ChaCha8Rng| Vector2::from_fn(|_, _| SIDE_PX * rng.random::<f64>());
+        let targets: Vec<(Vector2<f64>, f64)> =
+            (0..n).map(|_| (place(&mut rng), std::f64::consts::TAU * rng.random::<f64>())).collect();
+        let still: Vec<Vector2<f64>> = (0..n_still).map(|_| place(&mut rng)).collect();
+        (0..12)
+            .map(|k| {
+                let mut all: Vec<Vector2<f64>> = Vec::new();
+                for (at, angle) in &targets {
+                    let at = at + speed * k as f64 * Vector2::new(angle.cos(), angle.sin());
+                    all.extend((rng.random::<f64>() < 0.8).then_some(at));
+                }
+                all.extend(&still);
+                let noisy = |at: Vector2<f64>, rng: &mut ChaCha8Rng| {
+                    at + Vector2::from_fn(|_, _| 0.3 * rng.sample::<f64, _>(StandardNormal))
+                };
+                let mut all: Vec<Vector2<f64>> = all.into_iter().map(|at| noisy(at, &mut rng)).collect();
+                all.extend((0..n_false).map(|_| place(&mut rng)));
+                let sighting = |at| Sighting { at, variance: 0.09, side_px: 2.0 };
+                Sightings { time_s: 0.04 * f64::from(k), all: all.into_iter().map(sighting).collect() }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn what_moves_is_told_from_what_stands_and_from_what_comes_and_goes() {
+        for speed in [1.0, 4.0, 12.0] {
+            let e = Evidence::of(&scans(1, 4, speed, 10, 20), SIDE_PX * SIDE_PX);
+            assert!((3..=5).contains(&e.moving.len()) && e.gain() > 30.0, "{speed}: {e:?}");
+            let mut speeds: Vec<f64> = e.moving.iter().flat_map(|c| c.speeds_px_per_s.clone()).collect();
+            speeds.sort_by(f64::total_cmp);
+            let median = speeds[speeds.len() / 2];
+            assert!((median / (25.0 * speed) - 1.0).abs() < 0.3, "{speed}: {median}");
+            // The error of a step between two places of 0.3 px is 0.42 px: three of them.
+            let fastest = e.fastest_px_per_s().unwrap() / 25.0;
+            assert!(fastest >= speed && fastest < speed + 1.3, "{speed}: {fastest}");
+        }
+    }
+
+    #[test]
+    fn chance_gains_no_more_than_it_is_allowed_to() {
+        for n_false in [2, 25, 100] {
+            let gains = (0..60).map(|seed| Evidence::of(&scans(seed, 0, 0.0, n_false, 10), SIDE_PX * SIDE_PX).gain());
+            // By chance e^-7 of the choices: none of 60.
+            let most = gains.fold(f64::NEG_INFINITY, f64::max);
+            assert!(most < 7.0, "{n_false}: {most}");
+        }
+    }
+
+    #[test]
+    fn glitter_in_one_corner_gains_nothing() {
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let scans: Vec<Sightings> = (0..40)
+                .map(|k| {
+                    let mut glint = || Vector2::from_fn(|_, _| 60.0 * rng.random::<f64>());
+                    let all = (0..40).map(|_| Sighting { at: glint(), variance: 0.09, side_px: 2.0 }).collect();
+                    Sightings { time_s: 0.04 * f64::from(k), all }
+                })
+                .collect();
+            let e = Evidence::of(&scans, SIDE_PX * SIDE_PX);
+            assert!(!e.is_sure() && e.fastest_px_per_s().is_none(), "{seed}: {}", e.words());
+        }
+    }
+
+    #[test]
+    fn a_shadow_goes_with_its_thing_and_another_thing_does_not() {
+        let line = |from: [f64; 2], step: f64, side_px: f64| -> Vec<Sightings> {
+            (0..12)
+                .map(|k| {
+                    let at = Vector2::new(from[0] + step * f64::from(k), from[1]);
+                    Sightings { time_s: 0.04 * f64::from(k), all: vec![Sighting::of_box(at, 0.1, side_px)] }
+                })
+                .collect()
+        };
+        let [thing, shadow, other] =
+            [line([20.0, 50.0], 4.0, 6.0), line([26.0, 54.0], 4.0, 6.0), line([90.0, 200.0], -3.0, 6.0)]
+                .map(|scans| Evidence::of(&scans, SIDE_PX * SIDE_PX));
+        assert!(shadow.gain() > 30.0 && shadow.gain_beside(&thing) <= 0.0);
+        assert!(other.gain_beside(&thing) > 30.0);
+    }
+
+    #[test]
+    fn nothing_comes_of_nothing() {
+        let none = Evidence::of(&[], 100.0);
+        assert_eq!((none.moving.len(), none.gain()), (0, 0.0));
+        assert_eq!(Evidence::of(&vec![Sightings::default(); 5], 100.0).gain(), 0.0);
+    }
+}

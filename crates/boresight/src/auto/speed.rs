@@ -1,0 +1,79 @@
+//! How fast targets are, before any tracker has run: the steps of chains of detections beyond those that chance makes.
+//!
+//! Source: our own; the chains are those of [`super::chains`], in the detections of the first pass, on steady ground. A tracker that is told too small a largest
+//! speed never begins a track, and nothing that is learnt from its tracks can mend that.
+//! Limits: raises the largest speed only: that none was seen so fast is no reason that none comes.
+
+use super::digits::round;
+use super::evidence::Evidence;
+use super::first_scans::first;
+use super::sightings::Sightings;
+use crate::camera::SteadyGround;
+use crate::{Config, Scan};
+
+/// Scans looked at, and their detections at most: a guard of time.
+const MOST_SCANS: usize = 250;
+const MOST_DETECTIONS: usize = 20_000;
+/// The largest speed over that which hardly a step exceeds: a target speeds up, another one is faster.
+const RESERVE: f64 = 1.5;
+
+/// Raises the largest speed to what the detections show.
+pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut Vec<String>) {
+    let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
+    let (mut sightings, mut n_seen) = (Vec::new(), 0);
+    for scan in first(scans).iter().take(MOST_SCANS) {
+        ground = ground.after(scan);
+        if scan.blind {
+            continue;
+        }
+        ground.scan_on_ground(scan, &mut on_ground);
+        sightings.push(Sightings::of(&on_ground, None));
+        n_seen += on_ground.detections.len();
+        if n_seen > MOST_DETECTIONS {
+            break;
+        }
+    }
+    let Some(fastest) = Evidence::of(&sightings, area_px2).fastest_px_per_s() else { return };
+    let speed = round(RESERVE * fastest);
+    if speed > config.tracker.max_speed_px_per_s {
+        reasons.push(format!(
+            "Chains of detections move by up to {fastest:.0} px/s: the largest speed is {speed} px/s, not {}.",
+            config.tracker.max_speed_px_per_s
+        ));
+        config.tracker.max_speed_px_per_s = speed;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detection, FrameIndex, Timestamp};
+    use nalgebra::{Matrix2, Vector2};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The largest speed after 60 scans of 25 a second of a target that crosses at so many px a scan every 20 scans, with five false detections a scan.
+    fn learnt(step_px: f64) -> (f64, usize) {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let scans: Vec<Scan> = (0..60u64)
+            .map(|k| {
+                let mut at = vec![Vector2::new(5.0 + step_px * (k % 20) as f64, 120.0)];
+                at.extend((0..5).map(|_| Vector2::new(320.0 * rng.random::<f64>(), 240.0 * rng.random::<f64>())));
+                let all = at.into_iter().map(|at| Detection::at(at, Matrix2::identity() * 0.05)).collect();
+                Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * k as f64)).with_detections(all)
+            })
+            .collect();
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        config.tracker.max_speed_px_per_s = 160.0;
+        learn(&scans, 320.0 * 240.0, &mut config, &mut reasons);
+        (config.tracker.max_speed_px_per_s, reasons.len())
+    }
+
+    #[test]
+    fn what_is_faster_than_assumed_raises_the_largest_speed_and_what_is_slower_leaves_it() {
+        let (fast, said) = learnt(14.0);
+        // 350 px/s and half as much in reserve; its velocity is not known to less than 10 px/s from places of 0.3 px.
+        assert!((525.0..560.0).contains(&fast) && said == 1, "{fast}");
+        assert_eq!(learnt(2.0), (160.0, 0));
+    }
+}
