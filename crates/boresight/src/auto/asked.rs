@@ -37,7 +37,10 @@ pub fn configure(
             spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, &mut Vec::new());
             summed::configure(scene, interval_s, config, reasons);
         }
-        DetectorKind::Moving => moving::configure(&seen_or_assumed(scene, info, reasons), info, config, reasons),
+        DetectorKind::Moving => {
+            let explained = scene.explained(if looked.is_empty() { frames } else { looked }, info)?;
+            moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
+        }
         DetectorKind::Spot => {
             let seen = particles::count(frames, info)?.0;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));

@@ -71,8 +71,8 @@ pub(super) fn choose_seen(
         asked::configure(kind, frames, second, &scene, interval_s, info, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
-    } else if moving::fits(&scene, info) {
-        moving::configure(&scene, info, &mut config, &mut reasons);
+    } else if let Some(explained) = moving::look(looked, &scene, info)? {
+        moving::configure(&scene, explained, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, &scene, info)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {

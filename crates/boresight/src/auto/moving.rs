@@ -9,7 +9,7 @@ use crate::track::{
 use crate::vision::background::{BackgroundConfig, ShadowConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, SourceInfo};
+use crate::{Config, Frame, Result, SourceInfo};
 
 /// Share of the frames in which something must move.
 const SHARE_OF_FRAMES: f64 = 0.2;
@@ -26,8 +26,18 @@ const MOST_EXPLAINED: f64 = 0.5;
 /// Fewer frames than this show no background.
 const LEAST_FRAMES: usize = 12;
 
-/// Whether what moves before a fixed camera is what should be tracked.
-pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
+/// Whether what moves before a fixed camera is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option<f64>> {
+    if !fits(scene, info) {
+        return Ok(None);
+    }
+    Ok(Some(scene.explained(frames, info)?).filter(|e| *e <= MOST_EXPLAINED))
+}
+
+/// Whether what moves is large, lasting and new enough.
+fn fits(scene: &Scene, info: &SourceInfo) -> bool {
     let side = scene.size_px[0].max(scene.size_px[1]);
     scene.camera == Camera::Fixed
         && scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
@@ -37,11 +47,10 @@ pub fn fits(scene: &Scene, info: &SourceInfo) -> bool {
         && scene.regions <= MOST_REGIONS
         && scene.share <= 0.35
         && scene.n_frames >= LEAST_FRAMES
-        && scene.explained <= MOST_EXPLAINED
 }
 
 /// Writes detector and tracker.
-pub fn configure(scene: &Scene, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let [w, h] = scene.size_px;
     let camera = match scene.camera {
         Camera::Fixed => "Fixed camera",
@@ -54,7 +63,7 @@ pub fn configure(scene: &Scene, info: &SourceInfo, config: &mut Config, reasons:
         scene.n_moving,
         scene.n_frames,
         scene.regions,
-        100.0 * scene.explained
+        100.0 * explained
     ));
     let least = round((0.35 * scene.area_px).max(9.0)) as u32;
     // Measured on vtest.avi: dark clothes are darker than 0.6 of the ground, shadows are not.

@@ -5,13 +5,11 @@
 //!    the median frame must stay where they are;
 //! 2. what moves: the median of all frames is the background ([`Background::prime`], on a grid of at most 400 px), and what differs from it
 //!    in a frame, without shadows and changes of light, is joined to regions;
-//! 3. which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
+//! 3. where it is asked for, which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
-use super::evidence::Evidence;
 use super::fixed_blocks;
-use super::sightings::{MOST_A_SCAN, Sighting, Sightings};
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage};
@@ -69,16 +67,14 @@ pub struct Scene {
     /// Ground that moves in any frame, as a share of what moves in all frames together: 1 for things that go on, little for leaves
     /// and water, which stay in their places.
     pub novelty: f64,
-    /// Share of the regions that an isolated blob explains.
-    pub explained: f64,
-    /// Chains of the moving regions.
-    pub chains: Evidence,
+    /// The regions of each frame.
+    moved: Vec<Vec<Moved>>,
     /// Where the first frame's ground lies in each frame, px; none before a fixed camera.
     pub ground: Vec<Similarity>,
 }
 
 /// A moving region, px of the frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Moved {
     left: f64,
     top: f64,
@@ -134,10 +130,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     (scene.camera, scene.ground) = camera(frames, &grids, enough_edges.then_some(stay));
     scene.novelty = ever.count() as f64 / all.max(1) as f64;
     measure(&mut scene, &moved, info);
-    scene.chains = chains(frames, &moved, step as f64, info);
-    if scene.camera == Camera::Fixed {
-        scene.explained = explained(frames, &moved, info)?;
-    }
+    scene.moved = moved;
     Ok(scene)
 }
 
@@ -213,24 +206,6 @@ fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (
     (Camera::Unknown, ground)
 }
 
-/// The chains of what moves; a region's middle is known to a pixel of the grid.
-fn chains(frames: &[Frame], moved: &[Vec<Moved>], step: f64, info: &SourceInfo) -> Evidence {
-    let sighting = |m: &Moved| {
-        let [w, h] = [m.right - m.left, m.bottom - m.top];
-        let at = Vector2::new(m.left + 0.5 * w - 0.5, m.top + 0.5 * h - 0.5);
-        Sighting::of_box(at, step * step / 12.0, w.max(h))
-    };
-    let sightings: Vec<Sightings> = frames
-        .iter()
-        .zip(moved)
-        .map(|(f, m)| Sightings {
-            time_s: f.time.ns as f64 * 1e-9,
-            all: m.iter().take(MOST_A_SCAN).map(sighting).collect(),
-        })
-        .collect();
-    Evidence::of(&sightings, (info.width * info.height) as f64)
-}
-
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
@@ -249,35 +224,40 @@ fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
     scene.share = all().map(|m| m.area).sum::<f64>() / (n * (info.width * info.height).max(1) as f64);
 }
 
-/// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle.
-fn explained(frames: &[Frame], moved: &[Vec<Moved>], info: &SourceInfo) -> Result<f64> {
-    let moving: Vec<usize> = (0..moved.len()).filter(|&i| !moved[i].is_empty()).collect();
-    let isolated = IsolatedConfig {
-        polarity: Polarity::Both,
-        min_score: BLOB_SCORE,
-        max_side_px: super::spots::max_side(info),
-        ..IsolatedConfig::default()
-    };
-    let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..DetectorConfig::default() };
-    config.cluster.min_area_px = Some(3);
-    let Some(first) = frames.first() else { return Ok(0.0) };
-    // A second look may have another kind of pixels than the source announced.
-    let seen = SourceInfo { kind: first.pixels.kind(), ..info.clone() };
-    let mut detector = crate::vision::build(&config, &seen)?;
-    let mut scan = Scan::default();
-    let (mut n, mut hits) = (0usize, 0usize);
-    for &i in spread(&moving, LOOKS) {
-        detector.detect(&frames[i], &mut scan)?;
-        for m in &moved[i] {
-            let area = (m.right - m.left) * (m.bottom - m.top);
-            let hit = scan.detections.iter().any(|d| {
-                let (x, y) = (d.position.x, d.position.y);
-                let within = x >= m.left - 2.0 && x <= m.right + 1.0 && y >= m.top - 2.0 && y <= m.bottom + 1.0;
-                within && 4.0 * d.extent.width_px * d.extent.height_px >= area
-            });
-            n += 1;
-            hits += usize::from(hit);
+impl Scene {
+    /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
+    /// # Errors
+    /// Frames of more than one size or pixel type.
+    pub fn explained(&self, frames: &[Frame], info: &SourceInfo) -> Result<f64> {
+        let moved = &self.moved;
+        let moving: Vec<usize> = (0..moved.len()).filter(|&i| !moved[i].is_empty()).collect();
+        let isolated = IsolatedConfig {
+            polarity: Polarity::Both,
+            min_score: BLOB_SCORE,
+            max_side_px: super::spots::max_side(info),
+            ..IsolatedConfig::default()
+        };
+        let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..DetectorConfig::default() };
+        config.cluster.min_area_px = Some(3);
+        let Some(first) = frames.first() else { return Ok(0.0) };
+        // A second look may have another kind of pixels than the source announced.
+        let seen = SourceInfo { kind: first.pixels.kind(), ..info.clone() };
+        let mut detector = crate::vision::build(&config, &seen)?;
+        let mut scan = Scan::default();
+        let (mut n, mut hits) = (0usize, 0usize);
+        for &i in spread(&moving, LOOKS) {
+            detector.detect(&frames[i], &mut scan)?;
+            for m in &moved[i] {
+                let area = (m.right - m.left) * (m.bottom - m.top);
+                let hit = scan.detections.iter().any(|d| {
+                    let (x, y) = (d.position.x, d.position.y);
+                    let within = x >= m.left - 2.0 && x <= m.right + 1.0 && y >= m.top - 2.0 && y <= m.bottom + 1.0;
+                    within && 4.0 * d.extent.width_px * d.extent.height_px >= area
+                });
+                n += 1;
+                hits += usize::from(hit);
+            }
         }
+        Ok(hits as f64 / n.max(1) as f64)
     }
-    Ok(hits as f64 / n.max(1) as f64)
 }
