@@ -242,9 +242,7 @@ fn log_ratio(
     // Of one of the speed of the one before, in any direction, as sure as both are known.
     let alike_var = (0.5 * speed2(before) + 0.25 * (cov[(1, 1)] + cov[(3, 3)])).min(speed_var);
     let alike = -(std::f64::consts::TAU * alike_var).ln() - 0.5 * speed2(now) / alike_var;
-    // Where nothing is known of how long targets stay, gaps are short and places decide.
-    let share = if field.stay.new_per_s.is_some() { ALIKE } else { 0.0 };
-    let new_velocity = log_sum([(1.0 - share).ln() + any_velocity, share.ln() + alike]);
+    let new_velocity = log_sum([(1.0 - ALIKE).ln() + any_velocity, ALIKE.ln() + alike]);
     let reach2 = 0.5 * (speed2(before) + speed2(now)) * gap_s * gap_s;
     let apart = Vector2::new(difference[0], difference[2]);
     let s = Matrix2::new(cov[(0, 0)] + reach2, cov[(0, 2)], cov[(0, 2)], cov[(2, 2)] + reach2);
