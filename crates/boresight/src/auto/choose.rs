@@ -78,8 +78,11 @@ pub(super) fn choose_seen(
     } else {
         let cells = cells::look(frames, info)?;
         // Cells are bright: where dark ones move beside them, both are looked for.
-        let are_alone = cells.is_some() && !spots::dark_moves(frames, &scene.ground, info)?;
-        let evidence = if are_alone { Seen::default() } else { spots::look(frames, &scene.ground, info)? };
+        let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info)?;
+        let evidence = match cells.is_some() && !dark.chains.is_sure() {
+            true => Seen::default(),
+            false => spots::look_beside(dark, frames, &scene.ground, info)?,
+        };
         if let Some(seen) = cells.filter(|_| evidence.polarity() != Polarity::Both) {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {

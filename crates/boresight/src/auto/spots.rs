@@ -86,15 +86,18 @@ impl Seen {
 
 /// Looks for isolated blobs in the frames; `ground` is the first one's in each, none where it stands.
 pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
-    let places = growing(frames.len());
-    let side = |polarity| look_at(frames, &places, ground, polarity, info);
-    Ok(Seen { bright: side(Polarity::Bright)?, dark: side(Polarity::Dark)? })
+    let dark = look_for(Polarity::Dark, frames, ground, info)?;
+    look_beside(dark, frames, ground, info)
 }
 
-/// Whether anything dark moves.
-pub fn dark_moves(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<bool> {
-    let dark = look_at(frames, &growing(frames.len()), ground, Polarity::Dark, info)?;
-    Ok(dark.chains.is_sure())
+/// As [`look`], where the dark ones were looked for before.
+pub fn look_beside(dark: Side, frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
+    Ok(Seen { bright: look_for(Polarity::Bright, frames, ground, info)?, dark })
+}
+
+/// What is seen of one polarity.
+pub fn look_for(polarity: Polarity, frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Side> {
+    look_at(frames, &growing(frames.len()), ground, polarity, info)
 }
 
 /// What is seen of one polarity in the frames at these places.

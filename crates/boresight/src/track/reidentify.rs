@@ -25,6 +25,7 @@ use boresight_filters::{Filter, Gaussian};
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 
 /// How long a new track may take to be confirmed, s: a lost one is remembered for so much longer than the gap.
 const CONFIRM_S: f64 = 10.0;
@@ -93,7 +94,8 @@ pub(super) enum Identity {
 /// Tracks that were lost.
 #[derive(Default)]
 pub(super) struct Reidentification {
-    lost: Vec<Lost>,
+    /// The oldest first.
+    lost: VecDeque<Lost>,
 }
 
 impl Reidentification {
@@ -103,9 +105,9 @@ impl Reidentification {
             return;
         }
         if self.lost.len() >= MOST_LOST {
-            self.lost.remove(0);
+            self.lost.pop_front();
         }
-        self.lost.push(Lost {
+        self.lost.push_back(Lost {
             id: track.id,
             filter: track.filter.clone(),
             at: now,
@@ -173,7 +175,7 @@ impl Reidentification {
         match best {
             None => Identity::New,
             Some((_, Earlier::Lost(i))) => {
-                tracks[new].id = self.lost.remove(i).id;
+                tracks[new].id = self.lost.remove(i).map_or(tracks[new].id, |l| l.id);
                 Identity::Found
             }
             Some((_, Earlier::Coasting(i))) => {

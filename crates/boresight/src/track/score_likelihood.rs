@@ -79,55 +79,66 @@ impl ScoreLikelihoodConfig {
 
     /// f₁: density of the ln s of a target with that level, that was seen in the scan before or `missed`; of one whose level is not known yet, any of the range.
     #[inline]
-    pub(super) fn target_density(&self, level: Option<f64>, missed: bool, log_score: f64) -> f64 {
+    pub(super) fn target_density(&self, level: Option<f64>, missed: bool, score: LogScore) -> f64 {
         let Some(level) = level else { return 1.0 / self.log_range };
-        let z = (log_score - level) / self.target_log_std;
+        let z = (score.ln - level) / self.target_log_std;
         let usual = (-0.5 * z * z).exp() / (self.target_log_std * std::f64::consts::TAU.sqrt());
         let odd = if missed { self.target_outlier_share_after_miss } else { self.target_outlier_share };
-        (1.0 - odd) * usual + odd * self.clutter_density(log_score)
+        (1.0 - odd) * usual + odd * score.clutter
     }
 
     /// Likelihood ratio of the score of a target with that level, or a new one's, seen in the scan before, against a false detection.
     #[inline]
-    pub(super) fn ratio(&self, level: Option<f64>, log_score: f64) -> f64 {
-        self.target_density(level, false, log_score) / self.clutter_density(log_score)
+    pub(super) fn ratio(&self, level: Option<f64>, score: LogScore) -> f64 {
+        self.target_density(level, false, score) / score.clutter
     }
+}
+
+/// A detection's ln s and f₀ there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LogScore {
+    pub ln: f64,
+    pub clutter: f64,
 }
 
 /// The scores of a scan's detections, their logarithms and clutter densities taken once; empty where scores say nothing.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ScanScores {
-    log_scores: Vec<f64>,
-    clutter: Vec<f64>,
-}
+pub(super) struct ScanScores(Vec<LogScore>);
 
 impl ScanScores {
     /// Reads a scan.
     pub fn read(&mut self, config: Option<&ScoreLikelihoodConfig>, detections: &[Detection]) {
-        self.log_scores.clear();
-        self.clutter.clear();
+        self.0.clear();
         if let Some(c) = config {
-            // One without a score is far below all others.
-            self.log_scores.extend(detections.iter().map(|d| f64::from(d.score.max(f32::MIN_POSITIVE)).ln()));
-            self.clutter.extend(self.log_scores.iter().map(|s| c.clutter_density(*s)));
+            self.0.extend(detections.iter().map(|d| {
+                // One without a score is far below all others.
+                let ln = f64::from(d.score.max(f32::MIN_POSITIVE)).ln();
+                LogScore { ln, clutter: c.clutter_density(ln) }
+            }));
         }
+    }
+
+    /// ln s and f₀ of a detection.
+    #[inline]
+    pub fn of(&self, detection: u32) -> Option<LogScore> {
+        self.0.get(detection as usize).copied()
     }
 
     /// ln s of a detection.
     #[inline]
     pub fn log_score(&self, detection: u32) -> Option<f64> {
-        self.log_scores.get(detection as usize).copied()
+        self.of(detection).map(|s| s.ln)
     }
 
     /// f₀ of a detection, 1 where scores say nothing.
     #[inline]
     pub fn clutter(&self, detection: u32) -> f64 {
-        self.clutter.get(detection as usize).copied().unwrap_or(1.0)
+        self.of(detection).map_or(1.0, |s| s.clutter)
     }
 
     /// Whether scores say nothing.
     pub fn is_empty(&self) -> bool {
-        self.log_scores.is_empty()
+        self.0.is_empty()
     }
 }
 
@@ -138,6 +149,10 @@ mod tests {
     use crate::track::{InitialTrackConfig, TrackerConfig, build};
     use crate::{FrameIndex, Scan, Timestamp};
     use nalgebra::{Matrix2, Vector2};
+
+    fn at(c: &ScoreLikelihoodConfig, ln: f64) -> LogScore {
+        LogScore { ln, clutter: c.clutter_density(ln) }
+    }
 
     #[test]
     fn densities_integrate_to_one_over_all_scores() {
@@ -151,17 +166,17 @@ mod tests {
         let level = from + 1.5;
         for missed in [false, true] {
             let odd = if missed { c.target_outlier_share_after_miss } else { c.target_outlier_share };
-            assert!((sum(&|u| c.target_density(Some(level), missed, u)) + odd * tail - 1.0).abs() < 1e-3);
+            assert!((sum(&|u| c.target_density(Some(level), missed, at(&c, u))) + odd * tail - 1.0).abs() < 1e-3);
         }
-        assert!((sum(&|u| c.ratio(None, u) * c.clutter_density(u)) - 1.0).abs() < 1e-3);
+        assert!((sum(&|u| c.ratio(None, at(&c, u)) * c.clutter_density(u)) - 1.0).abs() < 1e-3);
     }
 
     #[test]
     fn one_odd_score_weighs_no_more_than_its_share() {
         let c = ScoreLikelihoodConfig::default();
         let level = Some(20f64.ln());
-        assert!((c.ratio(level, 2.6f64.ln()) / c.target_outlier_share - 1.0).abs() < 1e-6);
-        assert!(c.ratio(level, 20f64.ln()) > 100.0, "its usual score, that false detections hardly ever have");
+        assert!((c.ratio(level, at(&c, 2.6f64.ln())) / c.target_outlier_share - 1.0).abs() < 1e-6);
+        assert!(c.ratio(level, at(&c, 20f64.ln())) > 100.0, "its usual score, that false detections hardly ever have");
     }
 
     /// Where a target at (50, 50) that was seen with a score of 20 is after a miss, and a false detection of score 2.6 not far from it.

@@ -84,6 +84,7 @@ impl ConfirmationConfig {
     /// New targets per px² and scan; none where the rule knows none.
     pub(crate) fn new_target_density_per_px2(&self) -> Option<f64> {
         match self {
+            Self::Sprt(c) => Some(c.new_target_density_per_px2),
             Self::Existence(c) => Some(c.new_target_density_per_px2),
             _ => None,
         }

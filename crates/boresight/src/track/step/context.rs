@@ -2,6 +2,7 @@
 
 use super::super::config::TrackerConfig;
 use super::super::scan_table::ScanTable;
+use super::super::score_likelihood::LogScore;
 use super::super::single_track::Track;
 use crate::{Scan, Timestamp};
 
@@ -24,19 +25,19 @@ impl Context<'_> {
     /// −2 ln of the density of detection `j`'s score for a track; 0 where scores say nothing.
     #[inline]
     pub fn score_cost(&self, track: &Track, j: u32) -> f64 {
-        match (&self.config.score_likelihood, self.table.scores.log_score(j)) {
-            (Some(c), Some(log_score)) => {
-                -2.0 * c.target_density(track.log_score, track.history.misses > 0, log_score).ln()
-            }
+        match (&self.config.score_likelihood, self.table.scores.of(j)) {
+            (Some(c), Some(score)) => -2.0 * c.target_density(track.log_score, track.history.misses > 0, score).ln(),
             _ => 0.0,
         }
     }
 
-    /// Likelihood ratio of detection `j`'s score for a target not known before the detection with the log score `first`, if there is one; 1 where scores say
+    /// Likelihood ratio of detection `j`'s score for a target not known before the detection with the score `first`, if there is one; 1 where scores say
     /// nothing.
-    pub fn new_target_score_ratio(&self, first: Option<f64>, j: u32) -> f64 {
-        match (&self.config.score_likelihood, self.table.scores.log_score(j)) {
-            (Some(c), Some(log_score)) => first.map_or(1.0, |first| c.ratio(None, first)) * c.ratio(first, log_score),
+    pub fn new_target_score_ratio(&self, first: Option<LogScore>, j: u32) -> f64 {
+        match (&self.config.score_likelihood, self.table.scores.of(j)) {
+            (Some(c), Some(score)) => {
+                first.map_or(1.0, |first| c.ratio(None, first)) * c.ratio(first.map(|f| f.ln), score)
+            }
             _ => 1.0,
         }
     }

@@ -13,6 +13,7 @@ use super::super::confirm::motion_test::MotionProgress;
 use super::super::filter::TrackedFilter;
 use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points, from_velocity};
 use super::super::scan_table::{Cov2, MOST_LOOKED_AT};
+use super::super::score_likelihood::LogScore;
 use super::super::single_track::{BATCH, Outcome, Track, motion_of, place_of};
 use super::context::Context;
 use super::gate::normalised_square;
@@ -26,7 +27,7 @@ use nalgebra::Vector2;
 struct Unassociated {
     position: Vector2<f64>,
     noise: Cov2,
-    log_score: Option<f64>,
+    score: Option<LogScore>,
 }
 
 /// What waits for a second point.
@@ -93,7 +94,7 @@ pub(in crate::track) fn initiate(
             pending.unassociated.push(Unassociated {
                 position: d.position,
                 noise: table.noise(j as u32),
-                log_score: table.scores.log_score(j as u32),
+                score: table.scores.of(j as u32),
             });
         }
     }
@@ -149,7 +150,7 @@ fn begin(
     let noise = table.noise(detection as u32);
     let Some((filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else { return };
     let likelihood_ratio =
-        likelihood_ratio * context.new_target_score_ratio(first.and_then(|f| f.log_score), detection as u32);
+        likelihood_ratio * context.new_target_score_ratio(first.and_then(|f| f.score), detection as u32);
     let n_points = if first.is_some() { 2 } else { 1 };
     let clutter_density = clutter.at(d.position.x, d.position.y);
     let mut track = Track {
