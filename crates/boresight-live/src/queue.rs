@@ -1,4 +1,6 @@
 //! A bounded queue to an output that may be slow or away: the giver never waits, the oldest goes and is counted.
+//!
+//! Why not `crossbeam-queue`: its queue that drops the oldest cannot be waited for.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, PoisonError};

@@ -2,76 +2,100 @@
 
 use crate::board::{Board, read};
 use crate::event::TrackReport;
+use crate::output::Shown;
 use axum::body::Bytes;
 use serde::Serialize;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{broadcast, watch};
 
 /// Events that a slow reader may lag behind before it loses some.
 const EVENTS: usize = 1024;
 /// Detections that are shown.
-pub const MOST_SHOWN: usize = 1000;
+const MOST_SHOWN: usize = 1000;
 
 /// Everything of one frame but the picture, as viewers get it.
 #[derive(Debug, Serialize)]
-pub struct Snapshot<'a> {
+struct Snapshot<'a> {
     /// Name and version of this object.
-    pub schema: &'static str,
+    schema: &'static str,
     /// Name of the source.
-    pub source: &'a str,
+    source: &'a str,
     /// State of the run, and why.
-    pub state: &'static str,
+    state: &'static str,
     /// See `state`.
-    pub why: String,
+    why: String,
     /// Number, time and arrival of the frame.
-    pub frame: u64,
+    frame: u64,
     /// See `frame`.
-    pub time_s: f64,
+    time_s: f64,
     /// See `frame`.
-    pub arrived_unix_s: f64,
+    arrived_unix_s: f64,
     /// Size of the frame; 0 where there are only detections.
-    pub size_px: [usize; 2],
+    size_px: [usize; 2],
     /// Positions of the detections.
-    pub detections: &'a [[f32; 2]],
+    detections: &'a [[f32; 2]],
     /// The confirmed tracks.
-    pub tracks: &'a [TrackReport],
+    tracks: &'a [TrackReport],
     /// Frames a second.
-    pub rate_hz: f64,
+    rate_hz: f64,
     /// Latency from arrival to the last output, ms.
-    pub latency_ms: [Option<f64>; 2],
+    latency_ms: [Option<f64>; 2],
     /// Frames that came, were dropped, were refused; times that the source was lost.
-    pub arrived: u64,
+    arrived: u64,
     /// See `arrived`.
-    pub dropped: u64,
+    dropped: u64,
     /// See `arrived`.
-    pub refused: u64,
+    refused: u64,
     /// See `arrived`.
-    pub lost: u64,
+    lost: u64,
     /// Events that an output could not take.
-    pub events_dropped: u64,
+    events_dropped: u64,
     /// Mean normalised squared innovation; 2 where the filters are consistent.
-    pub mean_nis: Option<f64>,
+    mean_nis: Option<f64>,
     /// Viewers.
-    pub viewers: u64,
+    viewers: u64,
 }
 
-impl<'a> Snapshot<'a> {
-    /// What the board says, without a frame.
-    pub fn of(board: &'a Board) -> Self {
+/// What was seen in a frame, as it is kept for viewers; its memory is used again.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    frame: u64,
+    time_s: f64,
+    arrived_unix_s: f64,
+    size_px: [usize; 2],
+    detections: Vec<[f32; 2]>,
+    tracks: Vec<TrackReport>,
+}
+
+impl Seen {
+    /// Takes a frame's.
+    fn take(&mut self, shown: &Shown<'_>) {
+        (self.frame, self.time_s) = (shown.when.frame, shown.when.time.as_secs_f64());
+        self.arrived_unix_s = shown.when.arrived_unix_s;
+        self.size_px = shown.view.frame.map_or([0, 0], |f| [f.pixels.width(), f.pixels.height()]);
+        self.detections.clear();
+        let positions = shown.view.scan.detections.iter().take(MOST_SHOWN).map(|d| d.position);
+        self.detections.extend(positions.map(|p| [p.x as f32, p.y as f32]));
+        self.tracks.clear();
+        self.tracks.extend_from_slice(shown.tracks);
+    }
+
+    /// As JSON, beside what the run says of itself.
+    pub fn json(&self, board: &Board) -> String {
         let said = board.said();
         let ms = |share: f64| board.latency.quantile_s(share).map(|s| (s * 1e5).round() / 100.0);
         let c = &board.counts;
-        Self {
+        let snapshot = Snapshot {
             schema: "boresight.live/1",
             source: &board.source,
             state: said.state.word(),
             why: said.why,
-            frame: 0,
-            time_s: 0.0,
-            arrived_unix_s: 0.0,
-            size_px: [0, 0],
-            detections: &[],
-            tracks: &[],
+            frame: self.frame,
+            time_s: self.time_s,
+            arrived_unix_s: self.arrived_unix_s,
+            size_px: self.size_px,
+            detections: &self.detections,
+            tracks: &self.tracks,
             rate_hz: (board.rate_hz() * 10.0).round() / 10.0,
             latency_ms: [ms(0.5), ms(0.99)],
             arrived: read(&c.arrived),
@@ -81,12 +105,8 @@ impl<'a> Snapshot<'a> {
             events_dropped: read(&c.events_dropped),
             mean_nis: board.mean_nis().map(|(mean, _)| mean),
             viewers: read(&c.viewers),
-        }
-    }
-
-    /// As JSON.
-    pub fn json(&self) -> String {
-        serde_json::to_string(self).unwrap_or_default()
+        };
+        serde_json::to_string(&snapshot).unwrap_or_default()
     }
 }
 
@@ -98,25 +118,31 @@ pub struct Hub {
     pub message: watch::Sender<Bytes>,
     /// Events.
     pub events: broadcast::Sender<Arc<str>>,
-    latest: Mutex<Arc<str>>,
+    newest: Mutex<Seen>,
 }
 
 impl Hub {
     /// A hub without viewers.
     pub fn new(board: Arc<Board>) -> Self {
-        let latest: Arc<str> = Snapshot::of(&board).json().into();
-        let message = watch::Sender::new(message(&latest, &[]));
-        Self { board, message, events: broadcast::Sender::new(EVENTS), latest: Mutex::new(latest) }
+        let message = watch::Sender::new(message(&Seen::default().json(&board), &[]));
+        Self { board, message, events: broadcast::Sender::new(EVENTS), newest: Mutex::default() }
     }
 
-    /// The newest snapshot as JSON.
-    pub fn latest(&self) -> Arc<str> {
-        Arc::clone(&self.latest.lock().unwrap_or_else(PoisonError::into_inner))
+    fn newest(&self) -> MutexGuard<'_, Seen> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes the newest snapshot.
-    pub fn set_latest(&self, json: Arc<str>) {
-        *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = json;
+    /// What was seen in the newest frame.
+    pub fn seen(&self) -> Seen {
+        self.newest().clone()
+    }
+
+    /// Takes the newest frame's; of the run's state alone, nothing.
+    pub fn see(&self, shown: Option<&Shown<'_>>) {
+        match shown {
+            Some(shown) => self.newest().take(shown),
+            None => *self.newest() = Seen::default(),
+        }
     }
 }
 

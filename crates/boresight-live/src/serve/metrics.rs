@@ -7,8 +7,6 @@ use std::fmt::Write;
 
 /// Upper edges of the latency's buckets, s.
 const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
-/// Bytes of a page of memory on the systems that tell it.
-const PAGE: u64 = 4096;
 
 /// The text.
 pub fn text(board: &Board) -> String {
@@ -52,6 +50,7 @@ pub fn text(board: &Board) -> String {
 
 /// Memory of this process that is in use, bytes; only Linux tells.
 pub fn resident_bytes() -> Option<u64> {
-    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
-    statm.split(' ').nth(1)?.parse::<u64>().ok().map(|pages| pages * PAGE)
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kib = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?.split_whitespace().next()?;
+    kib.parse::<u64>().ok().map(|kib| kib << 10)
 }

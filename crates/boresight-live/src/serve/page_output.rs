@@ -1,6 +1,6 @@
-//! The run's end of the page: notes the newest frame, and lets a thread of its own make a picture of it while somebody looks.
+//! The run's end of the page: notes the newest frame, and lets a thread of its own make text and picture of it while somebody looks.
 
-use super::hub::{Hub, MOST_SHOWN, Snapshot, message};
+use super::hub::{Hub, Seen, message};
 use super::picture::Pictures;
 use crate::event::Event;
 use crate::output::{LiveOutput, Shown};
@@ -11,14 +11,13 @@ use std::time::Duration;
 
 struct ToShow {
     pixels: Option<Pixels>,
-    json: Arc<str>,
+    seen: Seen,
 }
 
 /// Feeds the page.
 pub struct PageOutput {
     hub: Arc<Hub>,
     slot: Arc<Slot<ToShow>>,
-    detections: Vec<[f32; 2]>,
 }
 
 impl PageOutput {
@@ -34,7 +33,7 @@ impl PageOutput {
                 match from.take(Duration::from_secs(3600)) {
                     Taken::Item(show) => {
                         let jpeg = show.pixels.and_then(|p| pictures.encode(&p)).unwrap_or_default();
-                        to.message.send_replace(message(&show.json, &jpeg));
+                        to.message.send_replace(message(&show.seen.json(&to.board), &jpeg));
                     }
                     Taken::Nothing => {}
                     Taken::Closed => return,
@@ -43,25 +42,16 @@ impl PageOutput {
         };
         let thread = std::thread::Builder::new().name("live-picture".into()).spawn(encode);
         thread.map_err(|e| Error::new(ErrorKind::Output, "no thread can be started").because(e))?;
-        Ok(Self { hub, slot, detections: Vec::new() })
+        Ok(Self { hub, slot })
     }
 }
 
 impl LiveOutput for PageOutput {
     fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
-        self.detections.clear();
-        let positions = shown.view.scan.detections.iter().take(MOST_SHOWN);
-        self.detections.extend(positions.map(|d| [d.position.x as f32, d.position.y as f32]));
-        let mut snapshot = Snapshot::of(&self.hub.board);
-        (snapshot.frame, snapshot.time_s) = (shown.when.frame, shown.when.time.as_secs_f64());
-        snapshot.arrived_unix_s = shown.when.arrived_unix_s;
-        let pixels = shown.view.frame.map(|f| &f.pixels);
-        snapshot.size_px = pixels.map_or([0, 0], |p| [p.width(), p.height()]);
-        (snapshot.detections, snapshot.tracks) = (&self.detections, shown.tracks);
-        let json: Arc<str> = snapshot.json().into();
-        self.hub.set_latest(Arc::clone(&json));
+        self.hub.see(Some(shown));
         if self.hub.message.receiver_count() > 0 && self.slot.is_empty() {
-            self.slot.put(ToShow { pixels: pixels.cloned(), json });
+            let pixels = shown.view.frame.map(|f| f.pixels.clone());
+            self.slot.put(ToShow { pixels, seen: self.hub.seen() });
         }
         for event in shown.events {
             self.event(event);
@@ -73,9 +63,8 @@ impl LiveOutput for PageOutput {
         // Without a reader it goes nowhere, which is no loss.
         let _ = self.hub.events.send(Arc::clone(&event.json));
         if event.is_status {
-            let json: Arc<str> = Snapshot::of(&self.hub.board).json().into();
-            self.hub.set_latest(Arc::clone(&json));
-            self.slot.put(ToShow { pixels: None, json });
+            self.hub.see(None);
+            self.slot.put(ToShow { pixels: None, seen: Seen::default() });
         }
     }
 }

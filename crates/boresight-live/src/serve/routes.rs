@@ -88,7 +88,7 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
 }
 
 async fn tracks(State(shared): State<Shared>) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], shared.hub.latest().to_string()).into_response()
+    ([(header::CONTENT_TYPE, "application/json")], shared.hub.seen().json(&shared.hub.board)).into_response()
 }
 
 async fn config(State(shared): State<Shared>) -> Response {
