@@ -20,24 +20,25 @@ fn program() -> Option<String> {
     candidates.iter().find(runs).map(ToString::to_string)
 }
 
-/// A broker that dies with its test.
-struct Broker(Child);
+/// A broker that dies with its test, and the folder of its configuration.
+struct Broker(Child, tempfile::TempDir);
 
 impl Broker {
     fn start(port: u16) -> Self {
         let program = program().unwrap();
-        let child = Command::new(program)
-            .args(["-p", &port.to_string()])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        // As it comes it drops what a subscriber has not taken beyond 1000 messages: here every one is looked for, however slow the machine.
+        let dir = tempfile::tempdir().unwrap();
+        let config = dir.path().join("mosquitto.conf");
+        let text = format!("listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n");
+        std::fs::write(&config, text).unwrap();
+        let child =
+            Command::new(program).arg("-c").arg(&config).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let until = Instant::now() + PATIENCE;
         while TcpStream::connect(("127.0.0.1", port)).is_err() {
             assert!(Instant::now() < until, "the broker does not listen");
             std::thread::sleep(Duration::from_millis(10));
         }
-        Self(child)
+        Self(child, dir)
     }
 }
 
