@@ -21,7 +21,10 @@ fn program() -> Option<String> {
 }
 
 /// A broker that dies with its test, and the folder of its configuration.
-struct Broker(Child, tempfile::TempDir);
+struct Broker {
+    child: Child,
+    _config: tempfile::TempDir,
+}
 
 impl Broker {
     fn start(port: u16) -> Self {
@@ -38,14 +41,14 @@ impl Broker {
             assert!(Instant::now() < until, "the broker does not listen");
             std::thread::sleep(Duration::from_millis(10));
         }
-        Self(child, dir)
+        Self { child, _config: dir }
     }
 }
 
 impl Drop for Broker {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
