@@ -93,7 +93,7 @@ impl Kept {
     /// Frames that are not alike, a parameter out of its range.
     pub fn choose(self, base: &Config, sets: &[String], detector: Option<DetectorKind>) -> Result<Ready> {
         let set = |config: Config| sets.iter().try_fold(config, |c, s| c.with(s));
-        let request = Request { detector, false_tracks_per_hour: None };
+        let request = Request { detector, ..Request::default() };
         let Some(mut info) = self.info else {
             let rate_hz = mean_rate_hz(&self.scans).unwrap_or(base.input.rate_hz);
             let (mut config, mut reasons) = (set(base.clone())?, Vec::new());

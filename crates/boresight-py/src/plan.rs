@@ -52,7 +52,7 @@ impl Wishes {
     }
 
     fn request(&self) -> auto::Request {
-        auto::Request { detector: None, false_tracks_per_hour: self.false_tracks_per_hour }
+        auto::Request { false_tracks_per_hour: self.false_tracks_per_hour, ..auto::Request::default() }
     }
 
     /// The plan for a path, a glob, a folder, a table of detections.

@@ -5,9 +5,11 @@
 //! costs itself: a warning counts such scans, and if they are most of them, the run counts as broken. A run that did not get one frame finishes no sink: what stood under their names
 //! stays. The caller is asked after every frame whether to go on.
 //!
-//! Reading, detecting and the rest run on threads of their own, with short queues between them (`pipeline/scans.rs`); the results are the same bytes for
-//! any number of threads.
+//! Reading, detecting and the rest run on threads of their own, with short queues between them (`pipeline/scans.rs`), detecting on several where frames can be taken alone
+//! (`pipeline/finders.rs`); the results are the same bytes for any number of threads.
 
+mod finders;
+mod made;
 mod read_ahead;
 mod scans;
 
@@ -35,7 +37,7 @@ opaque_debug!(Input);
 pub struct StageTimes {
     /// Reading and decoding (waiting for it).
     pub read: Duration,
-    /// Frame to detections.
+    /// Frame to detections, of all threads together.
     pub detect: Duration,
     /// Detections to tracks.
     pub track: Duration,
@@ -101,7 +103,7 @@ pub fn run(
     run_on(None, input, tracking, sinks, go_on)
 }
 
-/// As [`run`], on at most `n_threads` threads, or as many as the machine has (video is decoded and encoded on one more each).
+/// As [`run`], with at most `n_threads` at work at once, or as many as the machine has (video is decoded and encoded on one more each).
 pub fn run_on(
     n_threads: Option<NonZeroUsize>,
     input: Input,

@@ -104,8 +104,11 @@ fn summary(kind: &str, half: char, scores: &[&(Clip, char, Score)]) -> String {
 
 /// Runs the exam, prints it and writes `docs/exam.md`.
 pub fn run(args: &Args) -> Result<()> {
-    let request =
-        boresight::auto::Request { detector: args.detector, false_tracks_per_hour: args.false_tracks_per_hour };
+    let request = boresight::auto::Request {
+        detector: args.detector,
+        false_tracks_per_hour: args.false_tracks_per_hour,
+        ..Default::default()
+    };
     let asked = !args.only.is_empty() || !args.sets.is_empty() || request != boresight::auto::Request::default();
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     let mut done: Vec<(Clip, char, Score)> = Vec::new();

@@ -140,7 +140,11 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         let input = Input::Frames(source, detector);
         return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None });
     }
-    let request = auto::Request { detector: args.detector, false_tracks_per_hour: tracker.false_tracks_per_hour };
+    let request = auto::Request {
+        detector: args.detector,
+        false_tracks_per_hour: tracker.false_tracks_per_hour,
+        threads: args.threads,
+    };
     let (mut source, mut choice) = auto::open_and_choose(&args.input, &base, &request)?;
     let info = source.info().clone();
     // What the user sets holds for the first pass as well, and is not overruled by what it learns.

@@ -23,31 +23,38 @@ pub fn configure(
     scene: &Scene,
     interval_s: f64,
     info: &SourceInfo,
+    n_threads: usize,
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) -> Result<()> {
     reasons.push(format!("The detector is the one asked for: {kind}, for {}.", kind.purpose()));
     match kind {
-        DetectorKind::Isolated => spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, reasons),
+        DetectorKind::Isolated => {
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, reasons)
+        }
         DetectorKind::Cfar => {
-            spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, &mut Vec::new());
-            faint::configure_asked(&faint::better(faint::count(frames, &scene.ground, info)?.0), config, reasons);
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
+            faint::configure_asked(
+                &faint::better(faint::count(frames, &scene.ground, info, n_threads)?.0),
+                config,
+                reasons,
+            );
         }
         DetectorKind::Integrate => {
-            spots::configure(&spots::look(frames, &scene.ground, info)?, info, config, &mut Vec::new());
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
             summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Moving => {
-            let explained = scene.explained(if looked.is_empty() { frames } else { looked }, info)?;
+            let explained = scene.explained(if looked.is_empty() { frames } else { looked }, info, n_threads)?;
             moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
         }
         DetectorKind::Spot => {
-            let seen = particles::count(frames, info)?.0;
+            let seen = particles::count(frames, info, n_threads)?.0;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
             particles::configure(&seen, info, interval_s, config, reasons);
         }
         DetectorKind::Local => {
-            let seen = cells::count(frames, info)?.0;
+            let seen = cells::count(frames, info, n_threads)?.0;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
             cells::configure(&seen, info, interval_s, config, reasons);
         }
@@ -118,7 +125,7 @@ mod tests {
         };
         let scene = super::super::scene::look(&frames, &info)?;
         let (mut config, mut reasons) = (Config::default(), Vec::new());
-        configure(kind, &frames, &[], &scene, 0.04, &info, &mut config, &mut reasons)?;
+        configure(kind, &frames, &[], &scene, 0.04, &info, 1, &mut config, &mut reasons)?;
         Ok((config, reasons))
     }
 

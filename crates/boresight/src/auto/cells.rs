@@ -5,13 +5,14 @@
 //! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
 
 use super::digits::round;
+use super::looks;
 use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::spatial::{SpatialConfig, WindowConfig};
 use crate::vision::threshold::{LocalConfig, Polarity, ThresholdConfig};
-use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};
+use crate::{Config, Detection, Frame, Result, SourceInfo};
 
 /// Least cells a frame.
 const LEAST: f64 = 6.0;
@@ -61,23 +62,21 @@ fn is_compact(d: &Detection) -> bool {
 /// Cells, if the frames are of that kind.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Option<Cells>> {
-    let (seen, fits) = count(frames, info)?;
+pub fn look(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Cells>> {
+    let (seen, fits) = count(frames, info, n_threads)?;
     Ok(fits.then_some(seen))
 }
 
 /// The compact pieces in the frames, and whether they are cells.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Cells, bool)> {
+pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Cells, bool)> {
     let pixels = (info.width * info.height) as f64;
     // A thing of less than 10 px across is a spot, not a cell.
     let specks = 60;
-    let mut detector = crate::vision::build(&detector(info, specks), info)?;
-    let mut scan = Scan::default();
+    let scans = looks::scans(&detector(info, specks), spread(frames, LOOKS), info, n_threads)?;
     let (mut areas, mut compact, mut all, mut looks) = (Vec::new(), 0.0, 0.0, 0usize);
-    for frame in spread(frames, LOOKS) {
-        detector.detect(frame, &mut scan)?;
+    for scan in &scans {
         looks += 1;
         for d in &scan.detections {
             let area = f64::from(d.area_px);
@@ -159,10 +158,10 @@ mod tests {
     #[test]
     fn discs_of_one_size_are_cells_and_bars_are_not() {
         let (discs, info) = frames(true);
-        let cells = look(&discs, &info).unwrap().expect("twelve discs");
+        let cells = look(&discs, &info, 1).unwrap().expect("twelve discs");
         // The 5 x 5 mean spreads a disc of radius 14 by up to 2 px: between pi 14² and pi 16².
         assert!(cells.per_frame == 12.0 && (615.0..=804.0).contains(&cells.area_px), "{cells:?}");
         let (bars, info) = frames(false);
-        assert_eq!(look(&bars, &info).unwrap(), None);
+        assert_eq!(look(&bars, &info, 1).unwrap(), None);
     }
 }

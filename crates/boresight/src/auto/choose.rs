@@ -5,7 +5,7 @@
 
 use super::asked;
 use super::interval::interval_s;
-use super::request::DetectorKind;
+use super::request::Request;
 use super::scene::{self, Scene};
 use super::spots::Seen;
 use super::{cells, colour, faint, moving, particles, spots};
@@ -29,7 +29,7 @@ pub struct Choice {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
-    choose_seen(frames, scene::look(frames, info)?, &[], info, base, None)
+    choose_seen(frames, scene::look(frames, info)?, &[], info, base, &Request::default())
 }
 
 /// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
@@ -39,8 +39,9 @@ pub(super) fn choose_seen(
     second: &[Frame],
     info: &SourceInfo,
     base: &Config,
-    asked: Option<DetectorKind>,
+    request: &Request,
 ) -> Result<Choice> {
+    let n_threads = request.n_threads();
     let mut reasons = Vec::new();
     let mut config = base.clone();
     let interval_s = interval_s(frames, info);
@@ -67,28 +68,28 @@ pub(super) fn choose_seen(
     }
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
-    if let Some(kind) = asked {
-        asked::configure(kind, frames, second, &scene, interval_s, info, &mut config, &mut reasons)?;
+    if let Some(kind) = request.detector {
+        asked::configure(kind, frames, second, &scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
-    } else if let Some(explained) = moving::look(looked, &scene, info)? {
+    } else if let Some(explained) = moving::look(looked, &scene, info, n_threads)? {
         moving::configure(&scene, explained, info, &mut config, &mut reasons);
-    } else if let Some(seen) = particles::look(frames, &scene, info)? {
+    } else if let Some(seen) = particles::look(frames, &scene, info, n_threads)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
-        let cells = cells::look(frames, info)?;
+        let cells = cells::look(frames, info, n_threads)?;
         // Cells are bright: where dark ones move beside them, both are looked for.
-        let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info)?;
+        let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info, n_threads)?;
         let evidence = match cells.is_some() && !dark.chains.is_sure() {
             true => Seen::default(),
-            false => spots::look_beside(dark, frames, &scene.ground, info)?,
+            false => spots::look_beside(dark, frames, &scene.ground, info, n_threads)?,
         };
         if let Some(seen) = cells.filter(|_| evidence.polarity() != Polarity::Both) {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {
             spots::configure(&evidence, info, &mut config, &mut reasons);
             if (evidence.is_poor() || !evidence.moves())
-                && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info)?
+                && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);
             }

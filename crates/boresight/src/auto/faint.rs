@@ -5,13 +5,14 @@
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
 use super::evidence::{Evidence, SURE_GAIN};
+use super::looks;
 use super::sightings::Sightings;
 use super::spots::{self, Seen};
 use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, Scan, Similarity, SourceInfo};
+use crate::{Config, Frame, Result, Similarity, SourceInfo};
 
 /// False alarms a frame that the tracker can bear: at 320 x 240 px and 5 px a frame, three within five frames and a gate of 50 px² meet by
 /// chance in some 3e-6 of the frames, twice in eight hours.
@@ -40,9 +41,14 @@ fn detector(polarity: Polarity) -> DetectorConfig {
 /// What is found at that rate in the frames, with bright targets and with dark ones, and the number of frames looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<([Faint; 2], f64)> {
+pub fn count(
+    frames: &[Frame],
+    ground: &[Similarity],
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<([Faint; 2], f64)> {
     let places = growing(frames.len());
-    let side = |polarity| look_at(frames, &places, ground, polarity, info);
+    let side = |polarity| look_at(frames, &places, ground, polarity, info, n_threads);
     Ok(([side(Polarity::Bright)?, side(Polarity::Dark)?], places.len() as f64))
 }
 
@@ -52,14 +58,14 @@ fn look_at(
     ground: &[Similarity],
     polarity: Polarity,
     info: &SourceInfo,
+    n_threads: usize,
 ) -> Result<Faint> {
-    let mut detector = crate::vision::build(&detector(polarity), info)?;
-    let (mut scan, mut n) = (Scan::default(), 0usize);
+    let scans = looks::scans(&detector(polarity), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+    let mut n = 0usize;
     let mut sightings = Vec::with_capacity(places.len());
-    for &k in places {
-        detector.detect(&frames[k], &mut scan)?;
+    for (scan, &k) in scans.iter().zip(places) {
         n += scan.detections.len();
-        sightings.push(Sightings::of(&scan, ground.get(k)));
+        sightings.push(Sightings::of(scan, ground.get(k)));
     }
     let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
     Ok(Faint { polarity, per_frame: n as f64 / places.len().max(1) as f64, chains })
@@ -80,8 +86,14 @@ pub fn better([bright, dark]: [Faint; 2]) -> Faint {
 /// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if nothing moves and there are more detections than false alarms.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], ground: &[Similarity], isolated: &Seen, info: &SourceInfo) -> Result<Option<Faint>> {
-    let (seen, looks) = count(frames, ground, info)?;
+pub fn look(
+    frames: &[Frame],
+    ground: &[Similarity],
+    isolated: &Seen,
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Option<Faint>> {
+    let (seen, looks) = count(frames, ground, info, n_threads)?;
     let seen = better(seen);
     let (polarity, chains) = isolated.most();
     if !seen.chains.is_sure() && !chains.is_sure() {
@@ -92,8 +104,10 @@ pub fn look(frames: &[Frame], ground: &[Similarity], isolated: &Seen, info: &Sou
     if !more && !chains.is_surely_more_than(&seen.chains) {
         // What is gone after a second shows in few of the frames looked at.
         let all: Vec<usize> = (0..frames.len()).collect();
-        let of_isolated = spots::look_at(frames, &all, ground, polarity, info)?;
-        more = look_at(frames, &all, ground, seen.polarity, info)?.chains.is_surely_more_than(&of_isolated.chains);
+        let of_isolated = spots::look_at(frames, &all, ground, polarity, info, n_threads)?;
+        more = look_at(frames, &all, ground, seen.polarity, info, n_threads)?
+            .chains
+            .is_surely_more_than(&of_isolated.chains);
     }
     Ok(more.then_some(seen))
 }
@@ -176,11 +190,11 @@ mod tests {
     #[test]
     fn spots_of_five_deviations_are_seen_and_noise_alone_is_not() {
         let (spots, info) = frames(10);
-        let seen = look(&spots, &[], &Seen::default(), &info).unwrap().expect("ten spots");
+        let seen = look(&spots, &[], &Seen::default(), &info, 1).unwrap().expect("ten spots");
         assert_eq!(seen.polarity, Polarity::Bright);
         assert!((8.0..13.0).contains(&seen.per_frame), "{seen:?}");
         let (noise, info) = frames(0);
-        assert_eq!(look(&noise, &[], &Seen::default(), &info).unwrap(), None);
+        assert_eq!(look(&noise, &[], &Seen::default(), &info, 1).unwrap(), None);
     }
 
     #[test]
@@ -199,7 +213,7 @@ mod tests {
                 }
             }
         }
-        let seen = look(&few, &[], &Seen::default(), &info).unwrap().expect("two spots");
+        let seen = look(&few, &[], &Seen::default(), &info, 1).unwrap().expect("two spots");
         // Three a frame are no more than twelve frames of false alarms may have.
         assert!(seen.polarity == Polarity::Bright && seen.per_frame < 5.0, "{seen:?}");
         assert!(seen.chains.moving.len() >= 2 && seen.chains.is_sure());

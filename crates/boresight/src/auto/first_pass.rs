@@ -2,7 +2,7 @@
 //!
 //! The detector that made them goes on where they end, so a frame is detected once however often it is looked at.
 
-use crate::vision::Detector;
+use crate::vision::{AtOnce, Detector};
 use crate::{Frame, Result, Scan, SourceInfo};
 use std::collections::VecDeque;
 
@@ -18,13 +18,17 @@ impl FirstPass {
         Self { scans: VecDeque::new(), detector }
     }
 
-    /// Takes the next frame of a source; one that the detector refuses ends the pass (`false`), and is refused again in the run.
-    pub fn take(&mut self, frame: &Frame) -> bool {
-        let mut scan = Scan::default();
-        let taken = self.detector.detect(frame, &mut scan).is_ok();
-        if taken {
-            self.scans.push_back(scan);
-        }
+    /// What detects in several frames at once, on so many threads.
+    pub fn at_once(&self, n_threads: usize) -> AtOnce {
+        AtOnce::new(&*self.detector, n_threads)
+    }
+
+    /// Takes the next frames of a source; one that the detector refuses ends the pass (`false`), and is refused again in the run.
+    pub fn take(&mut self, frames: &[Frame], at_once: &mut AtOnce) -> bool {
+        let frames: Vec<&Frame> = frames.iter().collect();
+        let mut scans = Vec::with_capacity(frames.len());
+        let taken = at_once.detect(&mut *self.detector, &frames, &mut scans).is_ok();
+        self.scans.extend(scans);
         taken
     }
 
@@ -46,6 +50,17 @@ impl Detector for FirstPass {
                 self.detector.detect(frame, scan)
             }
         }
+    }
+
+    fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
+        if self.scans.is_empty() {
+            return self.detector.begin(frame, scan);
+        }
+        self.detect(frame, scan).map(|()| true)
+    }
+
+    fn twin(&self) -> Option<Box<dyn Detector>> {
+        self.detector.twin()
     }
 }
 
@@ -86,7 +101,8 @@ mod tests {
         let seen = std::sync::Arc::default();
         let frames: Vec<Frame> = (0..5).map(frame).collect();
         let mut pass = FirstPass::new(Box::new(Counting(std::sync::Arc::clone(&seen))));
-        assert!(frames[..2].iter().all(|f| pass.take(f)));
+        let mut at_once = pass.at_once(2);
+        assert!(pass.take(&frames[..2], &mut at_once));
         assert_eq!(pass.scans().len(), 2);
         let mut scan = Scan::default();
         for f in &frames {

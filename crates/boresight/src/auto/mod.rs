@@ -18,6 +18,7 @@ mod first_pass;
 mod first_scans;
 mod fixed_blocks;
 mod interval;
+mod looks;
 mod moving;
 mod noise;
 mod open;

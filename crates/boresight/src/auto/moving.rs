@@ -29,11 +29,11 @@ const LEAST_FRAMES: usize = 12;
 /// Whether what moves before a fixed camera is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option<f64>> {
+pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<f64>> {
     if !fits(scene, info) {
         return Ok(None);
     }
-    Ok(Some(scene.explained(frames, info)?).filter(|e| *e <= MOST_EXPLAINED))
+    Ok(Some(scene.explained(frames, info, n_threads)?).filter(|e| *e <= MOST_EXPLAINED))
 }
 
 /// Whether what moves is large, lasting and new enough.

@@ -98,7 +98,7 @@ fn choose_from(
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
     let second = if look_again { again() } else { Vec::new() };
-    choose_seen(probed(frames.ahead()), scene, &second, &info, base, request.detector)
+    choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)
 }
 
 /// The frames that are looked at for the choice.
@@ -115,10 +115,16 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     let info = frames.info().clone();
     let detector = crate::vision::build(&choice.config.detector, &info)?;
     let mut pass = FirstPass::new(detector);
-    let mut k = 0;
-    while frames.get(k).is_some_and(|frame| pass.take(frame)) {
-        k += 1;
+    let mut at_once = pass.at_once(request.n_threads());
+    let mut taken = 0;
+    loop {
+        let frames = frames.read_on(taken + at_once.n_frames()).get(taken..).unwrap_or_default();
+        if frames.is_empty() || !pass.take(frames, &mut at_once) {
+            break;
+        }
+        taken += frames.len();
     }
+    drop(at_once);
     let area_px2 = (info.width * info.height).max(1) as f64;
     speed::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();

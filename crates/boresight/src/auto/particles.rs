@@ -4,6 +4,7 @@
 //! wood or a street is known to stand. Size: the half-height boxes of isolated blobs; a spot with its soft edge is about 2.45 times as wide.
 
 use super::digits::round;
+use super::looks;
 use super::scene::{Camera, Scene};
 use super::spread::spread;
 use crate::camera::CameraConfig;
@@ -11,7 +12,7 @@ use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
-use crate::{Config, Frame, Result, Scan, SourceInfo};
+use crate::{Config, Frame, Result, SourceInfo};
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
 /// Least blobs a frame.
@@ -50,19 +51,19 @@ pub struct Particles {
 /// Particles, if the frames are full of them.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option<Particles>> {
+pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<Particles>> {
     // What stands before a fixed camera is scenery.
     if scene.camera == Camera::Fixed && scene.regions < LEAST {
         return Ok(None);
     }
-    let (seen, fits) = count(frames, info)?;
+    let (seen, fits) = count(frames, info, n_threads)?;
     Ok(fits.then_some(seen))
 }
 
 /// The blobs of the polarity of which there are more of one size all over the frame, else of which there are more; whether they are particles.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Particles, bool)> {
+pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Particles, bool)> {
     let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX };
     let (mut best, mut most, mut counts): (Option<Particles>, Particles, [f64; 2]) = (None, none, [0.0; 2]);
     for (polarity, count) in [Polarity::Bright, Polarity::Dark].into_iter().zip(&mut counts) {
@@ -70,11 +71,9 @@ pub fn count(frames: &[Frame], info: &SourceInfo) -> Result<(Particles, bool)> {
             IsolatedConfig { polarity, min_score: SCORE, max_side_px: WIDEST_PX, ..IsolatedConfig::default() };
         let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..DetectorConfig::default() };
         config.cluster.min_area_px = Some(3);
-        let mut detector = crate::vision::build(&config, info)?;
-        let mut scan = Scan::default();
+        let scans = looks::scans(&config, spread(frames, LOOKS), info, n_threads)?;
         let (mut n, mut looks, mut widths, mut quarters) = (0usize, 0usize, Vec::new(), [0usize; 4]);
-        for frame in spread(frames, LOOKS) {
-            detector.detect(frame, &mut scan)?;
+        for scan in &scans {
             looks += 1;
             n += scan.detections.len();
             for d in &scan.detections {

@@ -24,20 +24,16 @@ impl Replay {
         replay
     }
 
-    /// Lets [`Replay::get`] read on, up to `most` frames in all.
+    /// Lets [`Replay::read_on`] read on, up to `most` frames in all.
     pub(super) fn up_to(mut self, most: usize) -> Self {
         self.most = most;
         self
     }
 
-    /// The frame at a place, read now if it has not been yet; `None` behind the last one that is held.
-    pub(super) fn get(&mut self, k: usize) -> Option<&Frame> {
-        while self.ahead.len() <= k {
-            if !self.read_one() {
-                return None;
-            }
-        }
-        self.ahead.get(k)
+    /// The first `n` frames, or as many as may be held, read now if they have not been yet; more if more have.
+    pub(super) fn read_on(&mut self, n: usize) -> &[Frame] {
+        while self.ahead.len() < n && self.read_one() {}
+        self.ahead()
     }
 
     /// Reads one more frame, if there is one and it may be held.

@@ -1,6 +1,7 @@
 //! What a user asks of the automatic choice; everything else it decides by what it sees.
 
 use std::fmt;
+use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 /// A detector asked for by its word.
@@ -78,6 +79,15 @@ pub struct Request {
     pub detector: Option<DetectorKind>,
     /// False tracks an hour that are allowed.
     pub false_tracks_per_hour: Option<f64>,
+    /// Threads to look on; as many as the machine has if absent.
+    pub threads: Option<NonZeroUsize>,
+}
+
+impl Request {
+    /// The number of threads.
+    pub(super) fn n_threads(&self) -> usize {
+        self.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, usize::from)
+    }
 }
 
 #[cfg(test)]

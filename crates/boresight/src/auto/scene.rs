@@ -10,6 +10,7 @@
 //! Limits: a target that stands in the same place in half of the frames is background.
 
 use super::fixed_blocks;
+use super::looks;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage};
@@ -19,7 +20,7 @@ use crate::vision::config::{ClusterConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Frame, Image, MotionBasis, PixelKind, Pixels, Result, Scan, Similarity, SourceInfo};
+use crate::{Frame, Image, MotionBasis, PixelKind, Pixels, Result, Similarity, SourceInfo};
 use nalgebra::Vector2;
 
 /// Width of the grid, px.
@@ -228,7 +229,7 @@ impl Scene {
     /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
     /// # Errors
     /// Frames of more than one size or pixel type.
-    pub fn explained(&self, frames: &[Frame], info: &SourceInfo) -> Result<f64> {
+    pub fn explained(&self, frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<f64> {
         let moved = &self.moved;
         let moving: Vec<usize> = (0..moved.len()).filter(|&i| !moved[i].is_empty()).collect();
         let isolated = IsolatedConfig {
@@ -242,11 +243,9 @@ impl Scene {
         let Some(first) = frames.first() else { return Ok(0.0) };
         // A second look may have another kind of pixels than the source announced.
         let seen = SourceInfo { kind: first.pixels.kind(), ..info.clone() };
-        let mut detector = crate::vision::build(&config, &seen)?;
-        let mut scan = Scan::default();
+        let scans = looks::scans(&config, spread(&moving, LOOKS).map(|&i| &frames[i]), &seen, n_threads)?;
         let (mut n, mut hits) = (0usize, 0usize);
-        for &i in spread(&moving, LOOKS) {
-            detector.detect(&frames[i], &mut scan)?;
+        for (scan, &i) in scans.iter().zip(spread(&moving, LOOKS)) {
             for m in &moved[i] {
                 let area = (m.right - m.left) * (m.bottom - m.top);
                 let hit = scan.detections.iter().any(|d| {

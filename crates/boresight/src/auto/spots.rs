@@ -2,6 +2,7 @@
 
 use super::digits::round;
 use super::evidence::{Evidence, SURE_GAIN};
+use super::looks;
 use super::sightings::Sightings;
 use super::spread::growing;
 use crate::camera::CameraConfig;
@@ -9,8 +10,7 @@ use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::vision::{self};
-use crate::{Config, Frame, Result, Scan, Similarity, SourceInfo};
+use crate::{Config, Frame, Result, Similarity, SourceInfo};
 
 /// A score from which a blob is surely a thing and not noise.
 const SURE: f64 = 8.0;
@@ -85,19 +85,31 @@ impl Seen {
 }
 
 /// Looks for isolated blobs in the frames; `ground` is the first one's in each, none where it stands.
-pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
-    let dark = look_for(Polarity::Dark, frames, ground, info)?;
-    look_beside(dark, frames, ground, info)
+pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo, n_threads: usize) -> Result<Seen> {
+    let dark = look_for(Polarity::Dark, frames, ground, info, n_threads)?;
+    look_beside(dark, frames, ground, info, n_threads)
 }
 
 /// As [`look`], where the dark ones were looked for before.
-pub fn look_beside(dark: Side, frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
-    Ok(Seen { bright: look_for(Polarity::Bright, frames, ground, info)?, dark })
+pub fn look_beside(
+    dark: Side,
+    frames: &[Frame],
+    ground: &[Similarity],
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Seen> {
+    Ok(Seen { bright: look_for(Polarity::Bright, frames, ground, info, n_threads)?, dark })
 }
 
 /// What is seen of one polarity.
-pub fn look_for(polarity: Polarity, frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Side> {
-    look_at(frames, &growing(frames.len()), ground, polarity, info)
+pub fn look_for(
+    polarity: Polarity,
+    frames: &[Frame],
+    ground: &[Similarity],
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Side> {
+    look_at(frames, &growing(frames.len()), ground, polarity, info, n_threads)
 }
 
 /// What is seen of one polarity in the frames at these places.
@@ -107,17 +119,16 @@ pub fn look_at(
     ground: &[Similarity],
     polarity: Polarity,
     info: &SourceInfo,
+    n_threads: usize,
 ) -> Result<Side> {
     let isolated = IsolatedConfig { polarity, min_score: MIN_SCORE, max_side_px: max_side(info), ..Default::default() };
     let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..Default::default() };
     config.cluster.min_area_px = Some(3);
-    let mut detector = vision::build(&config, info)?;
-    let mut scan = Scan::default();
+    let scans = looks::scans(&config, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     let (mut n, mut sum, mut sides) = (0usize, 0.0, Vec::new());
     let mut sightings = Vec::with_capacity(places.len());
-    for &k in places {
-        detector.detect(&frames[k], &mut scan)?;
-        sightings.push(Sightings::of(&scan, ground.get(k)));
+    for (scan, &k) in scans.iter().zip(places) {
+        sightings.push(Sightings::of(scan, ground.get(k)));
         for d in scan.detections.iter().filter(|d| f64::from(d.score) >= SURE) {
             n += 1;
             sum += f64::from(d.score).min(100.0);

@@ -29,7 +29,7 @@ pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Det
     if matches!(config.threshold, ThresholdConfig::Colour(_)) && source.kind != PixelKind::Rgb8 {
         return Err(needs_colour(&format!("{:?}", source.kind)));
     }
-    let detector = Box::new(FrameDetector::new(config, source)?);
+    let detector = Box::new(FrameDetector::new(config, (source.width, source.height), source.kind)?);
     Ok(match config.camera {
         CameraConfig::Fixed => detector,
         CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotionEstimator::default() }),
@@ -64,6 +64,16 @@ impl Detector for WithCamera {
         self.detector.detect(frame, scan)?;
         scan.camera_motion = self.camera.step(&frame.pixels);
         Ok(())
+    }
+
+    fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
+        let done = self.detector.begin(frame, scan)?;
+        scan.camera_motion = self.camera.step(&frame.pixels);
+        Ok(done)
+    }
+
+    fn twin(&self) -> Option<Box<dyn Detector>> {
+        self.detector.twin()
     }
 }
 
@@ -123,21 +133,42 @@ struct FrameDetector {
 }
 
 impl FrameDetector {
-    fn new(config: &DetectorConfig, source: &SourceInfo) -> Result<Self> {
+    fn new(config: &DetectorConfig, size: (usize, usize), kind: PixelKind) -> Result<Self> {
         Ok(Self {
-            by_pixel: match source.kind {
+            by_pixel: match kind {
                 PixelKind::Gray8 => ByPixel::Gray8(Typed::new(config)?),
                 PixelKind::Gray16 => ByPixel::Gray16(Typed::new(config)?),
                 PixelKind::GrayF32 => ByPixel::GrayF32(Typed::new(config)?),
                 PixelKind::Rgb8 => ByPixel::Rgb8(Typed::new(config)?, Image::default()),
             },
-            size: (source.width, source.height),
-            kind: source.kind,
+            size,
+            kind,
             strongest: Strongest::default(),
             follower: config.follow.clone().map(Follower::new),
             last: None,
             config: config.clone(),
         })
+    }
+
+    /// Forgets the last scan.
+    fn clear(&self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+        scan.index = frame.index;
+        scan.time = frame.time;
+        scan.detections.clear();
+        scan.camera_motion = None;
+        scan.blind = false;
+        let fits = (frame.pixels.width(), frame.pixels.height()) == self.size && frame.pixels.kind() == self.kind;
+        if fits { Ok(()) } else { Err(self.refused(frame)) }
+    }
+
+    /// Whether what is found in a frame depends on the frames before.
+    fn remembers(&self) -> bool {
+        let finds = match &self.by_pixel {
+            ByPixel::Gray8(d) | ByPixel::Rgb8(d, _) => d.finder.remembers(),
+            ByPixel::Gray16(d) => d.finder.remembers(),
+            ByPixel::GrayF32(d) => d.finder.remembers(),
+        };
+        finds || self.follower.is_some()
     }
 
     fn refused(&self, frame: &Frame) -> Error {
@@ -151,14 +182,7 @@ impl FrameDetector {
 
 impl Detector for FrameDetector {
     fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
-        scan.index = frame.index;
-        scan.time = frame.time;
-        scan.detections.clear();
-        scan.camera_motion = None;
-        scan.blind = false;
-        if (frame.pixels.width(), frame.pixels.height()) != self.size {
-            return Err(self.refused(frame));
-        }
+        self.clear(frame, scan)?;
         let dt_s = self.last.map_or(0.0, |last| frame.time.seconds_since(last));
         let (config, out) = (&self.config, &mut scan.detections);
         scan.blind = match (&mut self.by_pixel, &frame.pixels) {
@@ -179,5 +203,20 @@ impl Detector for FrameDetector {
             follower.pick(out, self.size);
         }
         Ok(())
+    }
+
+    fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
+        if self.remembers() {
+            return self.detect(frame, scan).map(|()| true);
+        }
+        self.clear(frame, scan).map(|()| false)
+    }
+
+    fn twin(&self) -> Option<Box<dyn Detector>> {
+        if self.remembers() {
+            return None;
+        }
+        // The configuration was checked when this one was built.
+        FrameDetector::new(&self.config, self.size, self.kind).ok().map(|d| Box::new(d) as _)
     }
 }

@@ -3,6 +3,7 @@
 //! A threshold turns one row of pixels into one row of bits (`&[u64]`, bit `x % 64` of word `x / 64` is pixel `x`, bits past
 //! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
 
+mod at_once;
 pub mod background;
 pub(crate) mod centroid;
 pub mod cfar;
@@ -38,6 +39,7 @@ pub use region::Region;
 pub use tbd::{GridEstimate, TrackBeforeDetect};
 pub use window::{FollowConfig, Follower, dark_box, search_window};
 
+pub(crate) use at_once::AtOnce;
 pub use config::DetectorConfig;
 pub use detector::build;
 
@@ -49,4 +51,26 @@ pub trait Detector: Send {
     /// # Errors
     /// A frame whose size or pixel type is not the one the detector was built for.
     fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()>;
+
+    /// Does of [`Detector::detect`] what must be done frame after frame; whether that was all. If not, [`Detector::finish`] of a [`Detector::twin`] does the rest.
+    /// # Errors
+    /// As [`Detector::detect`].
+    fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
+        self.detect(frame, scan).map(|()| true)
+    }
+
+    /// One more detector that finds the same, for another thread and any of the frames; `None` if what is found in a frame depends on those before.
+    fn twin(&self) -> Option<Box<dyn Detector>> {
+        None
+    }
+
+    /// Does what [`Detector::begin`] left to be done.
+    /// # Errors
+    /// As [`Detector::detect`].
+    fn finish(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+        let motion = scan.camera_motion.take();
+        self.detect(frame, scan)?;
+        scan.camera_motion = motion;
+        Ok(())
+    }
 }

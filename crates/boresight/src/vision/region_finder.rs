@@ -33,6 +33,10 @@ impl<T: Pixel> RegionFinder<T> {
 }
 
 impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
+    fn remembers(&self) -> bool {
+        self.segmenter.remembers()
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         let alike = self.segmenter.weight() == PixelWeight::Alike;
         let above_background = match config.centroid.weight {

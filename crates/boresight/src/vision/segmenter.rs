@@ -47,6 +47,11 @@ pub(super) trait Segmenter<T: Pixel>: Send {
     /// What a segmented pixel's value says, where the configuration leaves it to the segmentation.
     fn weight(&self) -> PixelWeight;
 
+    /// Whether what is segmented in a frame depends on the frames before.
+    fn remembers(&self) -> bool {
+        false
+    }
+
     /// Side of the cells of the local background that [`Self::segment`] compares with, px; nothing if it needs none.
     fn cell_px(&self) -> Option<u32> {
         None

@@ -27,6 +27,9 @@ pub(super) trait TargetFinder<T: Pixel>: Send {
     /// A frame that does not go with the frames before.
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()>;
 
+    /// Whether what is found in a frame depends on the frames before.
+    fn remembers(&self) -> bool;
+
     /// Whether nothing could be found in the last frame, whatever it shows.
     fn is_blind(&self) -> bool {
         false

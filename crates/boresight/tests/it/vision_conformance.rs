@@ -134,6 +134,25 @@ fn run(detector: &mut dyn Detector, width: usize, height: usize, kind: PixelKind
         .collect()
 }
 
+/// As [`run`], but what a twin may find is found by two in turn, the last frame first.
+fn run_with_twins(detector: &mut dyn Detector, width: usize, height: usize, kind: PixelKind) -> Vec<Scan> {
+    let mut twins = [detector.twin(), detector.twin()];
+    let frames: Vec<Frame> = (0..9).map(|k| frame(width, height, kind, k)).collect();
+    let begin = |frame| {
+        let mut scan = Scan::default();
+        let done = detector.begin(frame, &mut scan).unwrap();
+        (scan, done)
+    };
+    let mut scans: Vec<(Scan, bool)> = frames.iter().map(begin).collect();
+    for (i, (scan, done)) in scans.iter_mut().enumerate().rev() {
+        match &mut twins[i % 2] {
+            Some(twin) => assert!(!*done && twin.finish(&frames[i], scan).is_ok()),
+            None => assert!(*done, "nobody is left to finish it"),
+        }
+    }
+    scans.into_iter().map(|(scan, _)| scan).collect()
+}
+
 const KINDS: [PixelKind; 4] = [PixelKind::Gray8, PixelKind::Gray16, PixelKind::GrayF32, PixelKind::Rgb8];
 
 fn check(config: &DetectorConfig, what: &str) -> usize {
@@ -151,6 +170,7 @@ fn check(config: &DetectorConfig, what: &str) -> usize {
             let build = || build(config, &source(width, height, kind)).unwrap();
             let scans = run(build().as_mut(), width, height, kind);
             assert_eq!(scans, run(build().as_mut(), width, height, kind), "{what}: not the same twice");
+            assert_eq!(scans, run_with_twins(build().as_mut(), width, height, kind), "{what}: not the same by twins");
             for d in scans.iter().flat_map(|s| &s.detections) {
                 n += 1;
                 let (x, y) = (d.position.x, d.position.y);

@@ -16,6 +16,10 @@ pub(crate) fn mask_rows<T: Pixel>(mask: &BitImage, image: &Image<T>, clusters: &
 }
 
 impl<T: Pixel> Segmenter<T> for Background<T> {
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn weight(&self) -> PixelWeight {
         PixelWeight::Alike
     }
@@ -28,6 +32,10 @@ impl<T: Pixel> Segmenter<T> for Background<T> {
 }
 
 impl<T: Pixel> Segmenter<T> for FrameDifference<T> {
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn weight(&self) -> PixelWeight {
         PixelWeight::Alike
     }

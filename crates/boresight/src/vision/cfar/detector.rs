@@ -81,6 +81,10 @@ pub struct CfarDetector {
 }
 
 impl<T: Pixel> TargetFinder<T> for CfarDetector {
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, _: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         self.detect(frame.image, out);
         Ok(())

@@ -315,6 +315,10 @@ fn detection(f: &Found, expected: f64, side: Side, sigma_px: f64, unit: f32) -> 
 }
 
 impl<T: Pixel> TargetFinder<T> for IntegrateDetector {
+    fn remembers(&self) -> bool {
+        true
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, _: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         self.blind = !self.remember(frame);
         if !self.blind {

@@ -165,6 +165,10 @@ impl IsolatedDetector {
 }
 
 impl<T: Pixel> TargetFinder<T> for IsolatedDetector {
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         self.run(frame.image, config, out);
         Ok(())

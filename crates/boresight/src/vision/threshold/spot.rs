@@ -71,6 +71,10 @@ fn odd(v: f64) -> usize {
 }
 
 impl<T: Pixel> TargetFinder<T> for SpotDetector {
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         let noise = self.noise.of(frame.raw, &config.noise);
         self.detect(frame.image, noise, out);
