@@ -3,9 +3,12 @@
 //! Method (ours; docs/theory/track-management.md): a confirmed track without a detection whose predicted centre lies inside a
 //! detection's box shares that detection with the track that took it. Along each axis the outer members are placed by the box's edges
 //! and their own size from before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place
-//! relative to the centre. Sizes do not follow while merged. The member that fits best is primary; the others are secondary and live on
+//! relative to the centre. Which members are the outer ones is not known while they pass each other: every pair is weighed by how well its two places fit the
+//! predictions, and a member's place is the mean over the pairs, with their spread added to its noise. So what passes keeps its velocity, and is not turned back at an edge that
+//! is the other's by then. Sizes do not follow while merged. The member that fits best is primary; the others are secondary and live on
 //! the time that they were seen alone before (`step/delete.rs`), so a target that ended inside another does not live for ever.
-//! Limits: needs boxes. Near equal predicted positions the order is that of the prediction.
+//! Symbols: s variance of a member's predicted place and of an edge (px²); a pair (l, r) weighs exp(−(left + w_l/2 − x_l)²/2s_l − (right − w_r/2 − x_r)²/2s_r)/√(s_l s_r).
+//! Limits: needs boxes; the axes are taken one by one.
 
 use super::appearance::Appearance;
 use super::scan_table::{Cov2, MOST_LOOKED_AT, Predicted, ScanTable};
@@ -64,7 +67,7 @@ pub(super) struct MergedMeasurements {
     members: Vec<(u32, u32)>,
     pub parts: Vec<Part>,
     group: Vec<u32>,
-    order: Vec<usize>,
+    outer: Vec<Outer>,
 }
 
 impl MergedMeasurements {
@@ -155,22 +158,72 @@ impl MergedMeasurements {
                 (d.extent.top_px, d.extent.top_px + d.extent.height_px)
             };
             let place = |i: u32| if axis == 0 { predicted[i as usize].x } else { predicted[i as usize].y };
-            self.order.clear();
-            self.order.extend(0..group.len());
-            self.order.sort_by(|a, b| place(group[*a]).total_cmp(&place(group[*b])).then(a.cmp(b)));
+            let parts = &mut self.parts[first..];
             let mean = group.iter().map(|i| place(*i)).sum::<f64>() / group.len() as f64;
-            for (rank, k) in self.order.iter().enumerate() {
-                let half = (0.5 * appearance(group[*k]).size[axis]).min(0.5 * (high - low));
-                self.parts[first + *k].position[axis] = if rank == 0 {
-                    low + half
-                } else if rank + 1 == group.len() {
-                    high - half
-                } else {
-                    0.5 * (low + high) + place(group[*k]) - mean
-                };
+            self.outer.clear();
+            self.outer.extend(group.iter().zip(&*parts).map(|(i, part)| {
+                let cov = &predicted[*i as usize].cov;
+                let half = (0.5 * appearance(*i).size[axis]).min(0.5 * (high - low));
+                Outer {
+                    at: [low + half, high - half],
+                    between: 0.5 * (low + high) + place(*i) - mean,
+                    predicted: place(*i),
+                    variance: if axis == 0 { cov.xx + part.noise.xx } else { cov.yy + part.noise.yy },
+                    share: [0.0; 2],
+                }
+            }));
+            weigh(&mut self.outer);
+            for (part, outer) in parts.iter_mut().zip(&self.outer) {
+                let (position, variance) = outer.place();
+                part.position[axis] = position;
+                *(if axis == 0 { &mut part.noise.xx } else { &mut part.noise.yy }) += variance;
             }
         }
     }
+}
+
+/// What one member would be along one axis.
+#[derive(Clone, Copy, Debug)]
+struct Outer {
+    /// Its place as the first and as the last one, and between others.
+    at: [f64; 2],
+    between: f64,
+    predicted: f64,
+    /// Of the prediction and of an edge.
+    variance: f64,
+    /// Probability to be the first and to be the last one.
+    share: [f64; 2],
+}
+
+impl Outer {
+    /// Mean and variance over what it may be.
+    fn place(&self) -> (f64, f64) {
+        let inner = (1.0 - self.share[0] - self.share[1]).max(0.0);
+        let mean = self.share[0] * self.at[0] + self.share[1] * self.at[1] + inner * self.between;
+        let off = |v: f64| (v - mean).powi(2);
+        (mean, self.share[0] * off(self.at[0]) + self.share[1] * off(self.at[1]) + inner * off(self.between))
+    }
+
+    /// Log-likelihood of being at an end.
+    fn fit(&self, end: usize) -> f64 {
+        -0.5 * ((self.at[end] - self.predicted).powi(2) / self.variance + self.variance.ln())
+    }
+}
+
+/// Weighs every pair of a first and a last member.
+fn weigh(members: &mut [Outer]) {
+    let pairs = |n: usize| (0..n).flat_map(move |l| (0..n).filter(move |r| *r != l).map(move |r| (l, r)));
+    let n = members.len();
+    let fit = |members: &[Outer], l: usize, r: usize| members[l].fit(0) + members[r].fit(1);
+    let most = pairs(n).map(|(l, r)| fit(members, l, r)).fold(f64::NEG_INFINITY, f64::max);
+    let mut all = 0.0;
+    for (l, r) in pairs(n) {
+        let weight = (fit(members, l, r) - most).exp();
+        members[l].share[0] += weight;
+        members[r].share[1] += weight;
+        all += weight;
+    }
+    members.iter_mut().for_each(|m| m.share = m.share.map(|s| s / all));
 }
 
 #[cfg(test)]
@@ -202,15 +255,15 @@ mod tests {
 
     #[test]
     fn outer_members_stand_at_the_edges_and_inner_ones_keep_their_place_to_the_centre() {
-        // Left edge 10 + 6/2, right edge 30 − 8/2; between: 20 + 19 − (13 + 19 + 27)/3.
+        // Left edge 10 + 6/2, right edge 30 − 8/2; between: 20 + 19 − (13 + 19 + 27)/3. Other pairs weigh e^-10 at most (a shift of 7 px with a variance of 2.5 px²).
         let parts = parts(&[13.0, 19.0, 27.0], &[6.0, 4.0, 8.0], Some(2), &[0, 1]);
         let x: Vec<f64> = parts.iter().map(|p| p.position[0]).collect();
-        assert_eq!((x[0], x[2]), (13.0, 26.0));
-        assert!((x[1] - (39.0 - 59.0 / 3.0)).abs() < 1e-12, "{}", x[1]);
-        assert!(parts.iter().all(|p| p.position[1] == 2.0 && p.detection == 0));
+        assert!((x[0] - 13.0).abs() < 1e-3 && (x[2] - 26.0).abs() < 1e-3, "{x:?}");
+        assert!((x[1] - (39.0 - 59.0 / 3.0)).abs() < 1e-3, "{}", x[1]);
+        assert!(parts.iter().all(|p| (p.position[1] - 2.0).abs() < 1e-12 && p.detection == 0));
         assert_eq!(parts.iter().map(|p| p.track).collect::<Vec<_>>(), [0, 1, 2]);
         // The detection's own variance and that of an edge, 0.7 px.
-        assert!(parts.iter().all(|p| (p.noise.xx - 1.49).abs() < 1e-12 && (p.noise.yy - 1.49).abs() < 1e-12));
+        assert!(parts.iter().all(|p| (p.noise.xx - 1.49).abs() < 0.01 && (p.noise.yy - 1.49).abs() < 1e-12));
     }
 
     #[test]
@@ -224,9 +277,20 @@ mod tests {
     }
 
     #[test]
+    fn members_that_pass_each_other_are_placed_by_no_edge() {
+        // Both predicted in the middle: each is the left one or the right one, 13 or 27 px, and no place is better.
+        let parts = parts(&[20.0, 20.0], &[6.0; 2], Some(1), &[0]);
+        for part in &parts {
+            assert!((part.position[0] - 20.0).abs() < 1e-12, "{}", part.position[0]);
+            assert!((part.noise.xx - 1.49 - 49.0).abs() < 1e-9, "{}", part.noise.xx);
+        }
+    }
+
+    #[test]
     fn a_member_wider_than_the_box_stands_in_its_middle() {
         let parts = parts(&[15.0, 25.0], &[90.0, 2.0], None, &[0, 1]);
-        assert_eq!(parts.iter().map(|p| p.position[0]).collect::<Vec<_>>(), [20.0, 29.0]);
+        let x: Vec<f64> = parts.iter().map(|p| p.position[0]).collect();
+        assert!(x[0] == 20.0 && (x[1] - 29.0).abs() < 1e-3, "{x:?}");
     }
 
     #[test]
