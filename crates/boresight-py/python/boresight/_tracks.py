@@ -28,6 +28,8 @@ _FORMAT_OF_ENDING = {
     ".geff": "geff",
     ".npy": "napari",
     ".zip": "mot-zip",
+    ".mcap": "mcap",
+    ".ts": "vmti",
 }
 
 
@@ -110,8 +112,8 @@ class Tracks:
         """Writes the table; without `format` the ending says which.
 
         `csv` (the command's tracks.csv, byte by byte), `mot` (.txt), `jsonl`, `parquet` (needs pyarrow), `geff` (a folder), `napari`
-        (.npy), `mot-zip` (.zip), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`, `ultrack`. What a format
-        cannot hold is said as a warning.
+        (.npy), `mot-zip` (.zip), `mcap`, `vmti` (.ts), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`,
+        `ultrack`. `csv`, `jsonl` and `parquet` hold tentative rows too. What a format cannot hold is said as a warning.
         """
         chosen = format or _FORMAT_OF_ENDING.get(Path(path).suffix.lower())
         if chosen == "report":
