@@ -107,6 +107,7 @@ def main() -> None:
         "SORT on filterpy": sort,
         "supervision's ByteTrack": bytetrack,
         "boresight, learnt from another run": lambda s: ours(s, config),
+        'boresight, learnt, then `filter="imm"`': lambda s: ours(s, config.set(filter="imm")),
         "boresight, preset `detections-mot`": lambda s: ours(s, bs.Config.preset("detections-mot")),
     }
     for name, run in runs.items():
