@@ -282,3 +282,25 @@ def test_parquet_of_a_batch(clip, parquet, tmp_path):
     same = polars.read_csv(tmp_path / "tracks.csv")
     assert table["input"].unique().to_list() == [clip] and len(table) == len(same)
     np.testing.assert_array_equal(table["vx_px_per_s"], same["vx_px_per_s"])
+
+
+def test_detections_in_coco_by_another_writer(run, tmp_path):
+    dm = pytest.importorskip("datumaro", reason="datumaro is not installed")
+    boxes = {k: [(1.5 + k, 2.0, 4.0, 6.25, 0.5 + k / 10), (20.0, 10.0, 3.0, 3.0, 0.75)] for k in range(4)}
+    items = [
+        dm.DatasetItem(
+            id=f"f{k}",
+            attributes={"id": k + 1},
+            media=dm.Image.from_numpy(np.zeros((20, 30, 3), np.uint8)),
+            annotations=[dm.Bbox(*b[:4], label=i, id=2 * k + i + 1, attributes={"score": b[4]}) for i, b in enumerate(boxes[k])],
+        )
+        for k in boxes
+    ]
+    dm.Dataset.from_iterable(items, categories=["car", "person"]).export(str(tmp_path / "d"), "coco_instances", save_media=False)
+    (table,) = (tmp_path / "d/annotations").glob("*.json")
+    boresight("track", table, "-o", tmp_path / "out", "--rate-hz", "10", "--no-report")
+    with open(tmp_path / "out/detections.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    want = [(k, x + w / 2 - 0.5, y + h / 2 - 0.5, w, h, s) for k, found in boxes.items() for x, y, w, h, s in found]
+    found = numbers(rows, "frame", "x_px", "y_px", "width_px", "height_px", "score")
+    np.testing.assert_allclose(found, want, atol=1e-6)
