@@ -59,8 +59,8 @@ def track_all(
     arguments = ["--no-video", *(f"--set={a}" for a in assignments(dict(sets), None, None))]
     names = list(dict.fromkeys(os.fspath(i) for i in inputs))
     if output is None:
-        task = ray.remote(_in_memory).options(max_retries=max_retries, num_cpus=num_cpus, **(ray_options or {}))
-        started = [(n, task.remote(n, arguments, sets)) for n in names]
+        short = ray.remote(_in_memory).options(max_retries=max_retries, num_cpus=num_cpus, **(ray_options or {}))
+        started = [(n, short.remote(n, arguments, sets)) for n in names]
         return [_got(ray, ref, partial(_short, n, arguments)) for n, ref in started]
     folder = Path(output)
     folder.mkdir(parents=True, exist_ok=True)
