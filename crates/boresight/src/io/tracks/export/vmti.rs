@@ -19,6 +19,8 @@ const UAS_VERSION: u8 = 19;
 const VMTI_VERSION: u8 = 6;
 /// Most targets told in a frame: each takes at most 80 bytes.
 const MOST_TARGETS: usize = 500;
+/// Largest width and height, px.
+const MOST_PX: u64 = (1 << 24) - 1;
 /// Detection status: active and moving; active and coasting.
 const MOVING: u8 = 1;
 const COASTING: u8 = 4;
@@ -82,8 +84,14 @@ pub(crate) fn write(table: &TrackTable, out: &mut impl Write) -> Result<Vec<Stri
     let fits = |r: usize| (0.0..=1.0).contains(&table.score.get(r));
     let has_scores = table.score != Column::Constant(1.0) && (0..table.n_rows()).all(fits);
     let known = table.size_px.map(|s| s.map(u64::from));
-    let scene = Scene { table, size: known.unwrap_or_else(|| reach(table)), has_scores, tracks };
+    let size = known.unwrap_or_else(|| reach(table)).map(|s| s.clamp(1, MOST_PX));
+    let scene = Scene { table, size, has_scores, tracks };
     let mut stream = MpegTs::new();
+    let is_outside = |r: usize| {
+        let at = centre(table, r);
+        (0..2).any(|k| !(-0.5..size[k] as f64 - 0.5).contains(&at[k]))
+    };
+    let outside = (0..table.n_rows()).filter(|r| is_outside(*r)).count();
     let mut beyond = 0;
     let mut first = None;
     for frame in times.frames_to_tell(table) {
@@ -105,6 +113,7 @@ pub(crate) fn write(table: &TrackTable, out: &mut impl Write) -> Result<Vec<Stri
         ),
     ];
     lost.extend(also.into_iter().filter_map(|(is, what)| is.then(|| what.to_string())));
+    lost.extend((outside > 0).then(|| format!("how far {outside} rows lie outside of the frame")));
     lost.extend((beyond > 0).then(|| format!("{beyond} rows beyond {MOST_TARGETS} in a frame")));
     lost.extend(times.lost());
     Ok(lost)
@@ -151,7 +160,8 @@ impl Scene<'_> {
         let [x, y, width, height] = centre(table, r);
         // Column and row from 1, kept within the frame.
         let pixel = |x: f64, y: f64| {
-            let within = |v: f64, most: u64| (v.round() + 1.0).clamp(1.0, most as f64) as u64;
+            // What is no number becomes 1.
+            let within = |v: f64, most: u64| ((v.round() + 1.0).clamp(1.0, most as f64) as u64).max(1);
             [within(x, self.size[0]), within(y, self.size[1])]
         };
         let number = |[column, row]: [u64; 2]| uint(column + (row - 1) * self.size[0]);
@@ -204,6 +214,12 @@ mod tests {
         let (_, pack) = scene.target(0);
         // Columns 1 and 2, rows 1 to 3; the centre is rounded to column 2, row 2: 2 + 640; the last pixel is 2 + 2 x 640.
         assert_eq!(pack[..13], [1, 1, 2, 2, 130, 2, 1, 1, 3, 2, 5, 2, 5], "{pack:?}");
+        let far = |left: f64| TrackRow { frame: 0, id: 1, bbox: [left, 0.0, 2.0, 3.0], ..TrackRow::default() };
+        for (left, words) in [(-30.0, "how far 1 rows"), (1e300, "how far 1 rows"), (f64::NAN, "how far 1 rows")] {
+            let table = TrackTable::from_rows("t", PixelOrigin::Pixel0, [far(left)]).unwrap();
+            let lost = write(&table, &mut Vec::new()).unwrap();
+            assert!(lost.iter().any(|l| l.starts_with(words)), "{left}: {lost:?}");
+        }
         let crowd = (1..700).map(|id| row(0, id));
         let crowd = TrackTable::from_rows("t", PixelOrigin::Pixel0, crowd).unwrap();
         let lost = write(&crowd, &mut Vec::new()).unwrap();
