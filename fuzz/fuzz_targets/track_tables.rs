@@ -11,7 +11,7 @@ libfuzzer_sys::fuzz_target!(|data: &[u8]| {
             let options = ReadOptions { skip_bad_rows, keep_extra: true, ..ReadOptions::default() };
             let Ok(file) = read(path, None, options, true) else { continue };
             let _ = mot_scores(&file.table, &file.table, &MatchOptions::default());
-            for to in Format::ALL {
+            for to in Format::ALL.into_iter().chain(Format::EXPORTS) {
                 let _ = write(&file.table, to, &mut Vec::new());
             }
         }

@@ -107,6 +107,8 @@ fn formats_of_other_programs_are_written_whole_and_say_what_they_lose() {
         ("cvat", "does not hold: score, mood"),
         ("mot-zip", "does not hold: score, mood"),
         ("napari", "width, height, score, mood"),
+        ("mcap", "does not hold: mood, times (the table has none: 25 frames/s)\n"),
+        ("vmti", "positions between pixels (they are rounded), mood, the size of the frames"),
     ] {
         let (o, output) = to(name, &["--lossless"]);
         assert!(o.status.code() == Some(3) && !output.exists(), "{name}: {}", text(&o.stderr));

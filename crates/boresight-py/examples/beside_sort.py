@@ -4,11 +4,12 @@ Needs filterpy and scipy; ByteTrack is left out where supervision does not have 
 
 python crates/boresight-py/examples/beside_sort.py              people turn round within a second
 python crates/boresight-py/examples/beside_sort.py --bounce     they bounce off the edges at once, which constant velocity does not hold
+python crates/boresight-py/examples/beside_sort.py --seed 6     another scene (4 if absent); learnt is from that of the next seed
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 import warnings
 
@@ -98,15 +99,19 @@ def ours(scans: list[np.ndarray], config: bs.Config) -> dict[str, np.ndarray]:
 
 def main() -> None:
     warnings.simplefilter("ignore")
-    bounce = "--bounce" in sys.argv[1:]
-    scans, truth = scene(bounce=bounce)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bounce", action="store_true")
+    parser.add_argument("--seed", type=int, default=4)
+    args = parser.parse_args()
+    scans, truth = scene(args.seed, args.bounce)
     print("| | time a scan | MOTA | IDF1 | switches | ids for 25 people |\n| --- | --- | --- | --- | --- | --- |")
     # Learnt from other people than those that are tracked.
-    config = bs.Config.for_detections(scene(seed=5, bounce=bounce)[0], rate_hz=RATE_HZ)
+    config = bs.Config.for_detections(scene(args.seed + 1, args.bounce)[0], rate_hz=RATE_HZ)
     runs = {
         "SORT on filterpy": sort,
         "supervision's ByteTrack": bytetrack,
         "boresight, learnt from another run": lambda s: ours(s, config),
+        'boresight, learnt, then `filter="imm"`': lambda s: ours(s, config.set(filter="imm")),
         "boresight, preset `detections-mot`": lambda s: ours(s, bs.Config.preset("detections-mot")),
     }
     for name, run in runs.items():

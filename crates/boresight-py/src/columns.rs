@@ -174,7 +174,9 @@ impl Columns {
             }
             begin = row.end;
         }
-        builder.finish(self.frames.last().map_or(0, |r| r.index.0 as usize + 1))
+        let mut table = builder.finish(self.frames.last().map_or(0, |r| r.index.0 as usize + 1))?;
+        table.size_px = self.picture.as_ref().map(|(_, f)| [f.pixels.width() as u32, f.pixels.height() as u32]);
+        Ok(table)
     }
 }
 

@@ -19,6 +19,8 @@ pub struct Wishes {
     pub rate_hz: Option<f64>,
     /// False tracks an hour that are allowed.
     pub false_tracks_per_hour: Option<f64>,
+    /// The library's detector, by its word, where it is not to be chosen.
+    pub word: Option<String>,
     /// A detector of the caller's own.
     pub detector: Option<PythonDetector>,
 }
@@ -51,21 +53,31 @@ impl Wishes {
         changed(base, &input)
     }
 
-    fn request(&self) -> auto::Request {
-        auto::Request { false_tracks_per_hour: self.false_tracks_per_hour, ..auto::Request::default() }
+    fn request(&self) -> Result<auto::Request> {
+        let detector = self.word.as_ref().map(|w| w.parse()).transpose().map_err(|e: Error| e.at("detector"))?;
+        Ok(auto::Request { detector, false_tracks_per_hour: self.false_tracks_per_hour, ..auto::Request::default() })
+    }
+
+    /// Refuses a detector's word where nothing is chosen by looking at frames.
+    fn no_word(&self, why: &str) -> Result<()> {
+        self.word
+            .as_ref()
+            .map_or(Ok(()), |word| Err(Error::new(ErrorKind::Config, why).at(format!("detector = {word}"))))
     }
 
     /// The plan for a path, a glob, a folder, a table of detections.
     pub fn for_path(self, input: &str) -> Result<Plan> {
         let base = self.base()?;
         if io::is_table(input) {
+            self.no_word("a table of detections needs no detector")?;
             return self.for_table(input, base);
         }
         if self.config.is_some() || self.detector.is_some() {
+            self.no_word("with a configuration the detector stands in it")?;
             let source = io::open(input, &base.input.open_options())?;
             return self.for_source(source, base);
         }
-        let request = self.request();
+        let request = self.request()?;
         let (mut frames, mut choice) = auto::open_and_choose(input, &base, &request)?;
         choice.config = changed(choice.config, &self.sets)?;
         let detector = auto::learn(&mut frames, &mut choice, &request)?;
@@ -76,9 +88,10 @@ impl Wishes {
     pub fn for_arrays(self, frames: ArrayFrames, again: Option<ArrayFrames>) -> Result<Plan> {
         let base = self.base()?;
         if self.config.is_some() || self.detector.is_some() {
+            self.no_word("with a configuration the detector stands in it")?;
             return self.for_source(Box::new(frames), base);
         }
-        let request = self.request();
+        let request = self.request()?;
         let mut again = again;
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
         let (mut frames, mut choice) = auto::read_and_choose(Box::new(frames), again, &base, &request)?;

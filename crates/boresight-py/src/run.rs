@@ -36,6 +36,7 @@ pub struct Request {
     rate_hz: Option<f64>,
     false_tracks_per_hour: Option<f64>,
     detector: Option<Py<PyAny>>,
+    detector_word: Option<String>,
     annotate: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 }
@@ -58,6 +59,7 @@ impl Request {
             sets: self.sets.clone(),
             rate_hz: self.rate_hz,
             false_tracks_per_hour: self.false_tracks_per_hour,
+            word: self.detector_word.clone(),
             detector: detector.map(|f| PythonDetector {
                 function: f.clone_ref(py),
                 raised: raised.clone(),

@@ -136,7 +136,7 @@ impl Tracks {
                     let Some(format) = all.find(|f| f.name() == other && *f != Format::Ctc) else {
                         return Ok(None);
                     };
-                    return write_path(&self.columns.table(&self.label, true)?, format, Some(&path)).map(Some);
+                    return write_path(&self.columns.table(&self.label, false)?, format, Some(&path)).map(Some);
                 }
             };
             self.columns.replay(sink.as_mut())?;
@@ -144,7 +144,7 @@ impl Tracks {
             Ok(Some(Vec::new()))
         });
         written.or_raise(py)?.ok_or_else(|| {
-            let known = "csv, mot, mot-truth, kitti, trackpy, trackmate, btrack, ultrack, geff, trackmate-xml, cvat, mot-zip, napari, jsonl, parquet";
+            let known = "csv, mot, mot-truth, kitti, trackpy, trackmate, btrack, ultrack, geff, trackmate-xml, cvat, mot-zip, napari, mcap, vmti, jsonl, parquet";
             refused("there is no such format", format!("format = {format}"), format!("formats: {known}"))
         })
     }

@@ -12,7 +12,7 @@ import warnings
 import pytest
 from conftest import ROOT
 
-PAGES = ["docs/python.md", "docs/batch.md", "docs/from-trackpy.md", "docs/from-sort.md", "docs/from-filterpy.md", "README.md"]
+PAGES = ["README.md", "docs/python.md", "docs/batch.md", *(f"docs/from-{name}.md" for name in ("trackpy", "sort", "filterpy", "stonesoup"))]
 FENCE = re.compile(r"^```python(?P<words>[^\n]*)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

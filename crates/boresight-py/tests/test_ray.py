@@ -103,6 +103,11 @@ def test_a_killed_worker_loses_nothing_and_does_nothing_twice(clips, tmp_path):
         with open(manifest, "a") as file:
             file.write('{"input": "cut')
         again = boresight.ray.track_all(clips, tmp_path / "shared", resume=True)
+        # Nothing written: the columns come back.
+        returned = boresight.ray.track_all([clips[3], str(tmp_path / "gone.y4m")], None)
+        here = bs.track(clips[3], progress=False).to_dict()
+        assert all((returned[0]["tracks"][name] == values).all() for name, values in here.items())
+        assert returned[1]["status"] == "failed" and "gone.y4m" in returned[1]["reason"]
         assert _hashes(again) == _hashes(alone) and len(manifest.read_text().splitlines()) == N_CLIPS + 1
     finally:
         ray.shutdown()

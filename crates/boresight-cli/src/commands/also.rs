@@ -7,12 +7,14 @@ use boresight::{Error, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Each format with the name of its file, or its folder.
-const FORMATS: [(Format, &str); 11] = [
+const FORMATS: [(Format, &str); 13] = [
     (Format::Geff, "tracks.geff/"),
     (Format::TrackMateXml, "trackmate.xml"),
     (Format::Cvat, "cvat.xml"),
     (Format::MotZip, "mot.zip"),
     (Format::Napari, "napari.npy"),
+    (Format::Mcap, "tracks.mcap"),
+    (Format::Vmti, "vmti.ts"),
     (Format::Parquet, "tracks.parquet"),
     (Format::Kitti, "kitti.txt"),
     (Format::Named(Dialect::Trackpy), "trackpy.csv"),
@@ -27,16 +29,17 @@ pub fn file_name() -> impl TypedValueParser<Value = &'static str> {
         .try_map(|name| FORMATS.iter().find(|(f, _)| f.name() == name).map(|(_, file)| *file).ok_or("no such format"))
 }
 
-/// Writes the files among `names` and says what they cannot hold; what could not be written is returned.
-pub fn write(folder: &RunFolder, names: &[&'static str], quiet: bool) -> Vec<Error> {
+/// Writes the files among `names` and says what they cannot hold; what could not be written is returned. `size_px`: width and height of the frames.
+pub fn write(folder: &RunFolder, names: &[&'static str], size_px: Option<[u32; 2]>, quiet: bool) -> Vec<Error> {
     if names.is_empty() {
         return Vec::new();
     }
     let options = ReadOptions { keep_extra: true, ..ReadOptions::default() };
-    let file = match read(&folder.path("tracks.csv"), None, options, false) {
+    let mut file = match read(&folder.path("tracks.csv"), None, options, false) {
         Ok(file) => file,
         Err(e) => return vec![e],
     };
+    file.table.size_px = size_px;
     let one = |&(format, name): &(Format, &str)| -> Result<()> {
         let dropped = write_path(&file.table, format, Some(&folder.path(name)))?;
         if !dropped.is_empty() && !quiet {

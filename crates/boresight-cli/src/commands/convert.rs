@@ -40,7 +40,7 @@ pub struct Args {
     /// Frames of a MOTChallenge input count from 0 in the file.
     #[arg(long)]
     from_zero: bool,
-    /// Size of the label images of ctc as WIDTHxHEIGHT, px; without it they reach to the last row.
+    /// Size of the frames as WIDTHxHEIGHT, px, for ctc, cvat and vmti; without it they reach to the last row.
     #[arg(long, value_parser = super::evaluate::size)]
     size: Option<(f64, f64)>,
     /// Fail if anything would be lost.
@@ -56,7 +56,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         refuse_to_overwrite(&args.input, [args.output.as_path()])?;
     }
     let options = ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, frames_from_zero: args.from_zero };
-    let file = read(&args.input, args.from, options, args.tentative)?;
+    let mut file = read(&args.input, args.from, options, args.tentative)?;
+    file.table.size_px = args.size.map(|(w, h)| [w as u32, h as u32]);
     if let Some(first) = &file.bad.first {
         say!("note: {} malformed rows left out; the first: {first}", file.bad.count);
     }

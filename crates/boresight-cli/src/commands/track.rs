@@ -63,7 +63,7 @@ pub struct Args {
     /// Also write a small picture, the first of the frames with the most tracks, to DIR/thumbnail.png.
     #[arg(long)]
     thumbnail: bool,
-    /// Also write the confirmed tracks for other programs: geff, trackmate-xml, cvat, mot-zip, napari, parquet ..
+    /// Also write the confirmed tracks for other programs: geff, trackmate-xml, cvat, mot-zip, napari, mcap, vmti, parquet ..
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = also::file_name())]
     also: Vec<&'static str>,
     /// End at once when standard input ends: for a program that starts this one and may be killed.
@@ -101,6 +101,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     sinks.push(Box::new(observed.sink()));
     let mut notes = notes(&args, &plan)?;
+    let size_px = plan.info.as_ref().map(|i| [i.width as u32, i.height as u32]);
     let settings = plan.config.clone();
     let config = folder.begin_config(&plan, input)?;
     let quiet = args.input.quiet;
@@ -129,7 +130,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         // An earlier run's table may still stand under the name of one that failed.
         let failed = |e: &boresight::Error| e.place().is_some_and(|place| place.contains("tracks.csv"));
         if !done.unwritten.iter().any(failed) {
-            done.unwritten.extend(also::write(&folder, &args.also, quiet));
+            done.unwritten.extend(also::write(&folder, &args.also, size_px, quiet));
         }
         if folder.makes("summary.json") {
             let told = RunSummary::new(input, &done.summary, &verdict, next.as_deref(), &notes.warnings);

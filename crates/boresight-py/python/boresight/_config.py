@@ -29,7 +29,10 @@ class Config:
 
     @classmethod
     def auto(cls, source: Any, *, rate_hz: float | None = None, times: Any = None, **sets: Any) -> Config:
-        """What the automatic choice takes for a path or frames, looked at up to its first 400 frames; `.reasons` says why."""
+        """What the automatic choice takes for a path or frames, looked at up to its first 400 frames; `.reasons` says why.
+
+        `detector=` asks for a detector by its word, as of `track`; `false_tracks_per_hour=` for how many are allowed.
+        """
         from ._track import plan
 
         return plan(source, rate_hz=rate_hz, times=times, **sets)

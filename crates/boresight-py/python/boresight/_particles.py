@@ -39,8 +39,8 @@ def batch(
     Args:
         frames: a path, an array of frames x rows x columns, or an iterable of arrays.
         minmass: leave out what has a smaller sum of brightness, counts.
-        config, **sets: as of `track`; without `config` the detector is chosen by looking at the first frames. No diameter
-            is needed.
+        config, detector, **sets: as of `track`; without `config` and `detector` one is chosen by looking at the first frames. No
+            diameter is needed.
 
     Returns:
         A DataFrame with trackpy's columns `y`, `x` (px), `mass` (sum of brightness), `size` (radius of a disc of the same area, px),

@@ -23,7 +23,7 @@ def track(
     rate_hz: float | None = None,
     times: Any = None,
     config: Any = None,
-    detector: Callable[[np.ndarray[Any, Any]], Any] | None = None,
+    detector: str | Callable[[np.ndarray[Any, Any]], Any] | None = None,
     filter: str | None = None,
     associator: str | None = None,
     false_tracks_per_hour: float | None = None,
@@ -40,9 +40,10 @@ def track(
         times: the time of each frame, s, for arrays; one for each frame, rising.
         config: a `Config`, a preset's name, a path of a TOML file, TOML text, or a dictionary of keys; without it everything is chosen
             by looking at the first frames.
-        detector: your own `f(pixels) -> detections` in the place of the library's: positions N x 2 (px), boxes N x 4 (left, top, right,
-            bottom), a dictionary with `positions`, `covariances` (N x 2 x 2, px²), `boxes`, `scores`, `classes`, or
-            `supervision.Detections`. Without `config` it runs over all frames before the first is tracked.
+        detector: one of the library's by its word, where it is not to be chosen: `isolated`, `cfar`, `integrate`, `moving`, `spot`,
+            `local`, `colour`. Or your own `f(pixels) -> detections` in its place, a detector or a measurement: positions N x 2 (px),
+            boxes N x 4 (left, top, right, bottom), a dictionary with `positions`, `covariances` (N x 2 x 2, px²), `boxes`, `scores`,
+            `classes`, or `supervision.Detections`. Without `config` it runs over all frames before the first is tracked.
         filter, associator: short for `tracker__filter` and `tracker__associator`; `boresight config --list filters` lists them.
         false_tracks_per_hour: how many are allowed; fewer take longer to confirm.
         annotate: also write the video with boxes, ids and ellipses drawn in, H.264 in MP4.
@@ -84,6 +85,10 @@ def request(
     progress: Any = None,
 ) -> dict[str, Any]:
     """What the native functions are asked for; `filter` and `associator` among the keys are the short ones."""
+    if not (detector is None or isinstance(detector, str) or callable(detector)):
+        raise BoresightError(
+            f"a {type(detector).__name__}", where="detector", hint="a function from pixels to detections, or a detector's word"
+        )
     whole = settled(config)
     keys = dict(sets)
     return {
@@ -91,7 +96,8 @@ def request(
         "sets": assignments(keys, keys.pop("filter", None), keys.pop("associator", None)),
         "rate_hz": _number(rate_hz, "rate_hz"),
         "false_tracks_per_hour": _number(false_tracks_per_hour, "false_tracks_per_hour"),
-        "detector": detector,
+        "detector": None if isinstance(detector, str) else detector,
+        "detector_word": detector if isinstance(detector, str) else None,
         "annotate": annotate,
         "progress": progress,
     }
@@ -145,8 +151,10 @@ def frames_of(source: Any, times: Any) -> tuple[Any, int | None, list[float] | N
 
 def plan(source: Any, *, rate_hz: float | None, times: Any, **sets: Any) -> Config:
     """What the automatic choice takes for a source; nothing is tracked."""
-    allowed = sets.pop("false_tracks_per_hour", None)
-    asked = request(None, sets, rate_hz=rate_hz, false_tracks_per_hour=allowed)
+    allowed, word = sets.pop("false_tracks_per_hour", None), sets.pop("detector", None)
+    if not (word is None or isinstance(word, str)):
+        raise BoresightError("a function", where="detector", hint="what its detections teach is learnt by Config.for_detections")
+    asked = request(None, sets, rate_hz=rate_hz, false_tracks_per_hour=allowed, detector=word)
     if isinstance(source, str | os.PathLike):
         return Config._of(_boresight.choose_for_path(os.fspath(source), asked))
     return Config._of(_boresight.choose_for_arrays(*frames_of(source, times), asked))

@@ -7,6 +7,7 @@ import os
 import warnings as python_warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _FORMAT_OF_ENDING = {
     ".geff": "geff",
     ".npy": "napari",
     ".zip": "mot-zip",
+    ".mcap": "mcap",
+    ".ts": "vmti",
 }
 
 
@@ -41,6 +44,7 @@ class Tracks:
 
     def __init__(self, rows: _boresight.Rows) -> None:
         self._rows = rows
+        self._report: str | None = None
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -110,8 +114,8 @@ class Tracks:
         """Writes the table; without `format` the ending says which.
 
         `csv` (the command's tracks.csv, byte by byte), `mot` (.txt), `jsonl`, `parquet` (needs pyarrow), `geff` (a folder), `napari`
-        (.npy), `mot-zip` (.zip), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`, `ultrack`. What a format
-        cannot hold is said as a warning.
+        (.npy), `mot-zip` (.zip), `mcap`, `vmti` (.ts), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`,
+        `ultrack`. `csv`, `jsonl` and `parquet` hold tentative rows too. What a format cannot hold is said as a warning.
         """
         chosen = format or _FORMAT_OF_ENDING.get(Path(path).suffix.lower())
         if chosen == "report":
@@ -135,6 +139,7 @@ class Tracks:
     def report(self, path: str | os.PathLike[str]) -> None:
         """Writes the report: one HTML file that opens offline."""
         self._rows.report(os.fspath(path))
+        self._report = os.fspath(path)
 
     def plot(self, ax: Any = None, **line: Any) -> Any:
         """Draws the confirmed tracks with matplotlib; y points down as in the image. Returns the axes."""
@@ -170,7 +175,7 @@ class Tracks:
         )
 
     def _repr_html_(self) -> str:
-        """The summary and a picture of the 50 longest tracks, for a notebook."""
+        """The summary, a picture of the 50 longest tracks, and a link to the report if it is written, for a notebook."""
         paths = self._paths(50)
         drawn = ""
         if paths:
@@ -191,4 +196,7 @@ class Tracks:
             )
         said = "".join(f"<li>{html.escape(w)}</li>" for w in self.warnings)
         said = f"<ul>{said}</ul>" if said else ""
-        return f"<div><p>{html.escape(repr(self).strip('<>'))}</p>{drawn}{said}</div>"
+        linked = "<p><code>tracks.report('report.html')</code> writes the report.</p>"
+        if self._report is not None:
+            linked = f'<p><a href="{html.escape(quote(self._report))}" target="_blank">{html.escape(self._report)}</a></p>'
+        return f"<div><p>{html.escape(repr(self).strip('<>'))}</p>{drawn}{said}{linked}</div>"

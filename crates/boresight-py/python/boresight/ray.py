@@ -1,4 +1,4 @@
-"""Many videos on many machines with Ray: one task a video, results in a shared folder with the manifest of `boresight batch`.
+"""Many videos on many machines with Ray: one task a video, results in a shared folder with the manifest of `boresight batch`, or returned.
 
 `track_all` must see the inputs and the output folder under the same names on every machine. A worker that dies costs its video's
 attempt: Ray starts the task again, and the driver writes a line of the manifest only for what came back. The tables are the bytes of
@@ -13,7 +13,8 @@ import os
 import shutil
 import time
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ MANIFEST = "manifest.jsonl"
 
 def track_all(
     inputs: Iterable[str | os.PathLike[str]],
-    output: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None,
     *,
     max_retries: int = 3,
     num_cpus: float = 1,
@@ -40,7 +41,8 @@ def track_all(
     Args:
         inputs: videos, folders of images or tables of detections, as paths that every machine sees; one that comes twice counts once.
         output: the folder for all results, shared by all machines: `manifest.jsonl` and a folder for each input with `tracks.csv`,
-            `mot.txt`, `report.html`, `summary.json` and `config.toml`.
+            `mot.txt`, `report.html`, `summary.json` and `config.toml`. `None`: nothing is written, and each entry has its columns
+            (as of `Tracks.to_dict`) under `tracks`, its configuration's text under `configuration`.
         max_retries: how often Ray starts a task again whose worker died.
         num_cpus: processors that Ray reserves for a task.
         resume: go on with the manifest in `output`: what is done, with these keys and as its hashes say, stays.
@@ -54,10 +56,14 @@ def track_all(
         import ray
     except ImportError as e:
         raise BoresightError("Ray is not installed", where="boresight.ray", hint="pip install ray") from e
-    folder = Path(output)
-    folder.mkdir(parents=True, exist_ok=True)
     arguments = ["--no-video", *(f"--set={a}" for a in assignments(dict(sets), None, None))]
     names = list(dict.fromkeys(os.fspath(i) for i in inputs))
+    if output is None:
+        short = ray.remote(_in_memory).options(max_retries=max_retries, num_cpus=num_cpus, **(ray_options or {}))
+        started = [(n, short.remote(n, arguments, sets)) for n in names]
+        return [_got(ray, ref, partial(_short, n, arguments)) for n, ref in started]
+    folder = Path(output)
+    folder.mkdir(parents=True, exist_ok=True)
     done = _known(folder, resume)
     entries = {n: old for n in names if (old := done.get(n)) and old["arguments"] == arguments and _holds(folder, old)}
     task = ray.remote(_task).options(max_retries=max_retries, num_cpus=num_cpus, **(ray_options or {}))
@@ -66,11 +72,7 @@ def track_all(
         while waiting:
             for ref in ray.wait(list(waiting))[0]:
                 name = waiting.pop(ref)
-                try:
-                    entry = ray.get(ref)
-                except ray.exceptions.RayError as e:
-                    # The worker died in every attempt.
-                    entry = _entry(name, folder, arguments, time.time(), f"{type(e).__name__}: {e}")
+                entry = _got(ray, ref, partial(_entry, name, folder, arguments, time.time()))
                 manifest.write(json.dumps(entry) + "\n")
                 manifest.flush()
                 os.fsync(manifest.fileno())
@@ -100,6 +102,32 @@ def track_one(name: str, output: str | os.PathLike[str], arguments: list[str] | 
     except BoresightError as e:
         reason = str(e)
     return _entry(name, folder, arguments or ["--no-video"], began, reason)
+
+
+def _got(ray: Any, ref: Any, failed: Callable[[str], dict[str, Any]]) -> dict[str, Any]:
+    """What a task returned; what `failed` makes of the reason where its worker died in every attempt."""
+    try:
+        entry: dict[str, Any] = ray.get(ref)
+    except ray.exceptions.RayError as e:
+        return failed(f"{type(e).__name__}: {e}")
+    return entry
+
+
+def _short(name: str, arguments: list[str], reason: str | None) -> dict[str, Any]:
+    """An entry without files."""
+    status = "done" if reason is None else "failed"
+    return {"input": name, "status": status, "reason": reason, "arguments": arguments, "version": _boresight.__version__}
+
+
+def _in_memory(name: str, arguments: list[str], sets: dict[str, Any]) -> dict[str, Any]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", BoresightWarning)
+            tracks = track(name, progress=False, **sets)
+    except BoresightError as e:
+        return _short(name, arguments, str(e))
+    found = {"tracks": tracks.to_dict(), "configuration": tracks.config.to_toml(), "summary": tracks.summary}
+    return {**_short(name, arguments, None), **found, "warnings": tracks.warnings}
 
 
 def _task(name: str, output: str, arguments: list[str], sets: dict[str, Any]) -> dict[str, Any]:

@@ -35,6 +35,7 @@ impl TrackTableBuilder {
             truncation: Column::Constant(0.0),
             occlusion: Column::Constant(0),
             ignore: Vec::new(),
+            size_px: None,
             states: StateColumns::default(),
             extra: Vec::new(),
             starts: vec![0],

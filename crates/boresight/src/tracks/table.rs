@@ -39,6 +39,8 @@ pub struct TrackTable {
     pub occlusion: Column<i32>,
     /// Regions in which unmatched results do not count (KITTI's DontCare): frame and box.
     pub ignore: Vec<(u32, [f64; 4])>,
+    /// Width and height of the frames, px, where they are known; no file of tracks tells them.
+    pub size_px: Option<[u32; 2]>,
     /// Times, status, velocities and covariances, where the table has them.
     pub states: StateColumns,
     /// Further columns by name, as text, one value a row; read only where asked for.
@@ -154,6 +156,7 @@ impl TrackTable {
             truncation: self.truncation.clone(),
             occlusion: self.occlusion.clone(),
             ignore: self.ignore.clone(),
+            size_px: self.size_px,
             states: self.states.clone(),
             extra: self
                 .extra

@@ -204,7 +204,7 @@ fn damaged_tables_of_tracks_are_survived_read_judged_and_written() {
                 n_refused += u32::from(read.is_err() || read.as_ref().is_ok_and(|f| f.bad.count > 0));
                 let file = read?;
                 let _ = mot_scores(&truth, &file.table, &MatchOptions::default());
-                for to in Format::ALL {
+                for to in Format::ALL.into_iter().chain(Format::EXPORTS) {
                     let _ = write(&file.table, to, &mut Vec::new());
                 }
                 if skip_bad_rows && n_refused > 0 {

@@ -36,6 +36,5 @@ pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
 pub use read_tracks::{StateTable, read_tracks};
 pub(crate) use tracks_csv::COVARIANCE_COLUMNS;
-#[cfg(feature = "parquet")]
 pub(crate) use tracks_csv::status_word;
 pub use tracks_csv::{TRACKS_HEADER, TracksCsv};

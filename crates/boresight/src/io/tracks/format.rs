@@ -25,6 +25,10 @@ pub enum Format {
     MotZip,
     /// napari's array of tracks; written only.
     Napari,
+    /// MCAP with Foxglove's messages; written only.
+    Mcap,
+    /// MISB ST 0903 VMTI in an MPEG transport stream; written only.
+    Vmti,
     /// Apache Parquet, with the feature `parquet`; written only.
     Parquet,
 }
@@ -47,13 +51,15 @@ impl Format {
             Self::Cvat => "cvat",
             Self::MotZip => "mot-zip",
             Self::Napari => "napari",
+            Self::Mcap => "mcap",
+            Self::Vmti => "vmti",
             Self::Parquet => "parquet",
         }
     }
 
     /// Formats that are written for other programs and not read.
-    pub const EXPORTS: [Self; 6] =
-        [Self::Geff, Self::TrackMateXml, Self::Cvat, Self::MotZip, Self::Napari, Self::Parquet];
+    pub const EXPORTS: [Self; 8] =
+        [Self::Geff, Self::TrackMateXml, Self::Cvat, Self::MotZip, Self::Napari, Self::Mcap, Self::Vmti, Self::Parquet];
 
     /// Whether it is a folder rather than a file.
     pub fn is_folder(self) -> bool {

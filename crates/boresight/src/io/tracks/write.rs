@@ -39,6 +39,8 @@ pub fn write(table: &TrackTable, format: Format, out: &mut (impl Write + Send)) 
         Format::Cvat => export::cvat::write(table, out),
         Format::MotZip => export::mot_zip::write(table, out),
         Format::Napari => export::napari::write(table, out),
+        Format::Mcap => export::foxglove::write(table, out),
+        Format::Vmti => export::vmti::write(table, out),
         #[cfg(feature = "parquet")]
         Format::Parquet => export::parquet::write(table, out),
         #[cfg(not(feature = "parquet"))]

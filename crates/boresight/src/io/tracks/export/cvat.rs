@@ -3,7 +3,7 @@
 //! Source: CVAT, *CVAT for video* format. Every box is `keyframe="1"`: what lies between keyframes CVAT makes up.
 //! Coordinates: the top-left corner of the first pixel is (0, 0), so edges are 0.5 px more than boresight's. Points stay points.
 
-use super::paths::{Paths, class, dropped};
+use super::paths::{Paths, class, dropped, reach};
 use super::xml::escaped;
 use crate::tracks::Column;
 use crate::{Error, ErrorKind, Result, TrackTable};
@@ -20,7 +20,7 @@ const SHIFT_PX: f64 = 0.5;
 pub(crate) fn write(table: &TrackTable, out: &mut impl Write) -> Result<Vec<String>> {
     let paths = Paths::new(table)?;
     let labels: BTreeSet<String> = (0..table.n_rows()).map(|r| label(table, r)).collect();
-    let (width, height) = reach(table);
+    let [width, height] = table.size_px.map_or_else(|| reach(table), |s| s.map(u64::from));
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<annotations>\n  <version>1.1</version>\n");
     let size = table.n_frames();
     let _ = writeln!(
@@ -87,17 +87,6 @@ fn label(table: &TrackTable, r: usize) -> String {
         return "object".to_string();
     }
     class(table, r)
-}
-
-/// Width and height that hold all rows, px: the table does not tell those of the frames.
-fn reach(table: &TrackTable) -> (u64, u64) {
-    let most = |k: usize| {
-        let ends = (0..table.n_rows())
-            .map(|r| table.extent(r))
-            .map(|e| [e.left_px + e.width_px + SHIFT_PX, e.top_px + e.height_px + SHIFT_PX][k]);
-        ends.fold(1.0, f64::max).ceil() as u64
-    };
-    (most(0), most(1))
 }
 
 #[cfg(test)]

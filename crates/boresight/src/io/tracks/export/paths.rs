@@ -41,6 +41,16 @@ pub(super) fn centre(table: &TrackTable, r: usize) -> [f64; 4] {
     [e.left_px + e.width_px / 2.0, e.top_px + e.height_px / 2.0, e.width_px, e.height_px]
 }
 
+/// Width and height that hold all rows, px: what stands for the frames' where the table does not tell them.
+pub(super) fn reach(table: &TrackTable) -> [u64; 2] {
+    let ends = |r: usize| {
+        let e = table.extent(r);
+        // From the centre of the first pixel to its corner.
+        [e.left_px + e.width_px + 0.5, e.top_px + e.height_px + 0.5]
+    };
+    [0, 1].map(|k| (0..table.n_rows()).map(|r| ends(r)[k]).fold(1.0, f64::max).ceil() as u64)
+}
+
 /// The name of a row's class, or its number.
 pub(super) fn class(table: &TrackTable, r: usize) -> String {
     table.class_name(r).map_or_else(|| table.class.get(r).to_string(), str::to_string)
