@@ -14,6 +14,7 @@ use boresight::verdict::Observed;
 use boresight::{Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 const EXAMPLES: &str = "Examples:
   boresight track flight.mp4
@@ -87,7 +88,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
     let stop = Stop::on_signal()?;
+    let opened = Instant::now();
     let plan = run_options::plan(&args.input, &args.tracker)?;
+    let looked = opened.elapsed();
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
     }
@@ -109,7 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }
     let bar = progress::bar(plan.total(), "frames");
-    let started = std::time::Instant::now();
+    let started = Instant::now();
     stop.run_begins();
     let mut done = pipeline::run_on(args.input.threads, plan.input, Some(tracking), sinks, &mut |so_far| {
         bar.set_position(so_far.frames);
@@ -143,7 +146,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     if !quiet {
-        print_summary(&done.summary, started.elapsed().as_secs_f64());
+        print_summary(&done.summary, looked, started.elapsed());
     }
     warnings.iter().for_each(|w| say!("warning: {w}"));
     if !quiet && done.summary.frames > 0 {
@@ -259,9 +262,9 @@ fn counted(n: u64, thing: &str) -> String {
     format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
 }
 
-/// The summary on the terminal.
-fn print_summary(s: &Summary, wall_s: f64) {
-    let per_frame = |d: std::time::Duration| 1e3 * d.as_secs_f64() / s.frames.max(1) as f64;
+/// The summary on the terminal; `looked` is the time that opening and the choice took, in which the first frames are read and detected already.
+fn print_summary(s: &Summary, looked: Duration, run: Duration) {
+    let per_frame = |d: Duration| 1e3 * d.as_secs_f64() / s.frames.max(1) as f64;
     say!(
         "{} ({:.1} s), {}, {} (at most {} at once)",
         counted(s.frames, "frame"),
@@ -274,8 +277,9 @@ fn print_summary(s: &Summary, wall_s: f64) {
         say!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");
     }
     say!(
-        "{:.1} frames/s; a frame took {:.2} ms to read, {:.2} to detect, {:.2} to track, {:.2} to write",
-        s.frames as f64 / wall_s.max(1e-9),
+        "{:.1} frames/s in all; {:.2} s to open and choose, then for each frame {:.2} ms to read, {:.2} to detect, {:.2} to track, {:.2} to write",
+        s.frames as f64 / (looked + run).as_secs_f64().max(1e-9),
+        looked.as_secs_f64(),
         per_frame(s.times.read),
         per_frame(s.times.detect),
         per_frame(s.times.track),
