@@ -1,6 +1,6 @@
 """Every format that `track --also` and `convert` write, read back by a reader that others wrote.
 
-Needs the command, named by the variable BORESIGHT, and a reader a format: `.ci/run` brings all but a command that writes Parquet.
+Needs the command, named by the variable BORESIGHT, and a reader a format: `.ci/run` brings them all.
 """
 
 from __future__ import annotations
