@@ -271,6 +271,16 @@ pub fn end_with_stdin() {
     });
 }
 
+/// A sentence on how many positions are fitted, where a fit was asked for.
+pub fn fits(s: &boresight::pipeline::Summary) -> Option<String> {
+    let [fitted, kept] = s.fits;
+    (fitted + kept > 0).then(|| {
+        format!(
+            "{fitted} positions by fitted spots; {kept} by the centroid, since the fit was poor or the target too large"
+        )
+    })
+}
+
 /// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
 /// # Errors
 /// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.

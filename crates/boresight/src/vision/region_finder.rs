@@ -99,5 +99,6 @@ fn detection<T: Pixel>(
         score,
         class: None,
         velocity: None,
+        fit: None,
     }
 }
