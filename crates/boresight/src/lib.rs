@@ -84,6 +84,7 @@ pub mod pipeline;
 mod record;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod sensor;
 pub mod sim;
 mod similarity;
 mod time;
