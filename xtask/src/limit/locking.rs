@@ -64,7 +64,7 @@ fn trackpys(folder: &Path) -> Result<Vec<[f64; 2]>> {
     for row in csv::Reader::from_path(folder.join("trackpy_link_first60.csv"))?.records() {
         let row = row?;
         let number = |i: usize| -> Result<f64> { Ok(row.get(i).unwrap_or("").parse()?) };
-        if number(0)? as usize % EVERY == 0 {
+        if (number(0)? as usize).is_multiple_of(EVERY) {
             out.push([number(2)?, number(3)?]);
         }
     }

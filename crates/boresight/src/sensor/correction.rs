@@ -99,11 +99,11 @@ impl Correction {
         match pixels {
             Pixels::Gray8(image) => {
                 let full = f32::from(u8::MAX);
-                self.mend(image, |v| f32::from(v), |v| v.round().clamp(0.0, full) as u8, full);
+                self.mend(image, f32::from, |v| v.round().clamp(0.0, full) as u8, full);
             }
             Pixels::Gray16(image) => {
                 let full = f32::from(u16::MAX);
-                self.mend(image, |v| f32::from(v), |v| v.round().clamp(0.0, full) as u16, full);
+                self.mend(image, f32::from, |v| v.round().clamp(0.0, full) as u16, full);
             }
             Pixels::GrayF32(image) => self.mend(image, |v| v, |v| v, f32::INFINITY),
             Pixels::Rgb8(_) => {}

@@ -45,7 +45,7 @@ pub(super) fn fit(points: &[[f64; 3]]) -> Option<Line> {
             n += 1.0;
         }
         let det = w * xx - x * x;
-        if !(det > 1e-12 * w * xx) || n < 2.0 {
+        if det.is_nan() || det <= 1e-12 * w * xx || n < 2.0 {
             return None;
         }
         line = Line {

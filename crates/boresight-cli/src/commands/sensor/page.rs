@@ -32,9 +32,9 @@ impl Plot {
     fn new(x: [f64; 2], y: [f64; 2], labels: [&str; 2]) -> Self {
         let spread = |[a, b]: [f64; 2]| if b > a { [a, b] } else { [a - 1.0, a + 1.0] };
         let mut plot = Self { x: spread(x), y: spread(y), svg: String::new() };
-        let _ = write!(
+        let _ = writeln!(
             plot.svg,
-            "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {HEIGHT}' role='img' font-size='12'>\n"
+            "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {WIDTH} {HEIGHT}' role='img' font-size='12'>"
         );
         for v in ticks(plot.x[0], plot.x[1]) {
             let x = plot.at(v, plot.y[0]).0;

@@ -73,7 +73,7 @@ impl<const P: usize> Factor<P> {
                 }
                 if i == j {
                     // Below this, parameters cannot be told apart in f64.
-                    if !(v > 1e-12) {
+                    if v.is_nan() || v <= 1e-12 {
                         return None;
                     }
                     f.lower[i][i] = v.sqrt();
