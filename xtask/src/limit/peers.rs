@@ -1,8 +1,7 @@
 //! The same frames for this fit, trackpy, Picasso and SciPy: written to a folder, the peers run by `scripts/fit_peers.py`.
 
-use super::positions::noise_and_height;
 use super::scenes::random;
-use super::spot_frames::{SIGMA, frame_of};
+use super::spot_frames::{SIGMA, frame_of, noise_and_height};
 use anyhow::{Result, ensure};
 use boresight::Image;
 use boresight::vision::fit::{SensorNoise, Spot, SpotModel, Stamp, Width, fit_spots};

@@ -1,9 +1,9 @@
 //! Fitted positions beside the Cramér-Rao bound: errors, covariances, place in the pixel, fits a second, peers.
 
 use super::scenes::random;
-use super::spot_frames::{SIGMA, frame_of, image_of};
+use super::spot_frames::{SIGMA, frame_of, image_of, noise_and_height};
 use anyhow::Result;
-use boresight::vision::fit::{SensorNoise, Spot, SpotModel, Stamp, Width, fit_spots};
+use boresight::vision::fit::{Spot, SpotModel, Stamp, Width, fit_spots};
 use nalgebra::Vector2;
 use rand::RngExt;
 use std::fmt::Write as _;
@@ -14,17 +14,6 @@ const SIDE: usize = 9;
 /// Cells of a pixel along each axis.
 const CELLS: usize = 4;
 const GROUND: f64 = 120.0;
-
-/// Noise and the height of a peak that stands `snr` deviations of it high.
-pub fn noise_and_height(light: bool, snr: f64) -> (SensorNoise, f64) {
-    if !light {
-        return (SensorNoise::constant(16.0), 4.0 * snr);
-    }
-    // Gain 2, 10 electrons of ground, read noise of 1 electron: A² = snr² (A + 11).
-    let noise = SensorNoise { read_variance: 4.0, gain: 2.0, offset: 100.0 };
-    let (s, rest) = (snr * snr, 11.0);
-    (noise, 2.0 * 0.5 * (s + (s * s + 4.0 * s * rest).sqrt()))
-}
 
 /// Sums over the fits of one cell.
 #[derive(Clone, Copy, Default)]

@@ -10,6 +10,17 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 
 pub const SIGMA: f64 = 1.3;
 
+/// Noise and the height of a peak that stands `snr` deviations of it high.
+pub fn noise_and_height(light: bool, snr: f64) -> (SensorNoise, f64) {
+    if !light {
+        return (SensorNoise::constant(16.0), 4.0 * snr);
+    }
+    // Gain 2, 10 electrons of ground, read noise of 1 electron: A² = snr² (A + 11).
+    let noise = SensorNoise { read_variance: 4.0, gain: 2.0, offset: 100.0 };
+    let (s, rest) = (snr * snr, 11.0);
+    (noise, 2.0 * 0.5 * (s + (s * s + 4.0 * s * rest).sqrt()))
+}
+
 /// Share of a Gaussian of deviation [`SIGMA`] at `c` that falls on pixel `i`.
 fn share(i: f64, c: f64) -> f64 {
     const STEPS: usize = 16;

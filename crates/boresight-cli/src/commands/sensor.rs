@@ -1,12 +1,13 @@
 //! `boresight sensor`: gain, noise and defects of the sensor behind an input.
 
+mod measured;
 mod page;
 
 use crate::console::{self, say};
 use boresight::io::{Colour, OpenOptions};
-use boresight::sensor::{Defects, Level, MeanMap, PhotonTransfer, TransferCurve, find_defects};
+use boresight::sensor::{Level, MeanMap, PhotonTransfer, find_defects};
 use boresight::{Config, Error, ErrorKind, Pixels};
-use std::fmt::Write as _;
+use measured::{Measured, text};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -41,18 +42,6 @@ pub struct Args {
     /// Change how the input is read: `input.raw={width=640,height=512,pixel="u16-le"}`. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-}
-
-/// What was measured.
-struct Measured {
-    input: String,
-    size: (usize, usize),
-    n_frames: u32,
-    curve: TransferCurve,
-    dark: Option<Level>,
-    defects: Defects,
-    /// Bad pixels are those of the dark frames.
-    of_dark: bool,
 }
 
 /// Runs the command.
@@ -125,63 +114,4 @@ fn lifted(pixels: &Pixels) -> Pixels {
         Pixels::Rgb8(_) => Vec::new(),
     };
     boresight::Image::from_vec(w, h, values).map_or_else(|| pixels.clone(), Pixels::GrayF32)
-}
-
-/// The options that use what was measured.
-fn options(m: &Measured) -> Vec<String> {
-    let [read, gain, offset] = m.curve.noise(m.dark);
-    let mut out = vec![format!(
-        "--set 'detector.noise.given={{read-counts={read:.4}, gain={gain:.5}, offset-counts={offset:.3}}}'"
-    )];
-    if !m.defects.pixels.is_empty() {
-        out.push("--set input.sensor.bad-pixels=true".to_string());
-    }
-    if !m.defects.columns.is_empty() && !m.of_dark {
-        out.push("--set input.sensor.column-noise=true".to_string());
-    }
-    out
-}
-
-/// Sentences about the sensor.
-fn sentences(m: &Measured) -> Vec<String> {
-    let [read, gain, offset] = m.curve.noise(m.dark);
-    let mut out = Vec::new();
-    match m.curve.line.filter(|_| m.curve.has_gain()) {
-        Some(line) => {
-            out.push(format!("gain {gain:.4} counts (line: {:.4} ± {:.4})", line.slope, line.slope_sd));
-            out.push(match m.dark {
-                Some(_) => format!("offset {offset:.2} counts and read noise {read:.3} counts, from the dark frames"),
-                None => format!(
-                    "variance {:.2} counts² at 0 counts: offset and read noise cannot be told apart without --dark; {offset:.2} and {read:.3} counts describe them",
-                    line.intercept
-                ),
-            });
-        }
-        None => out.push(format!(
-            "noise {:.3} counts, the same for all light that was seen: no gain to be told",
-            m.curve.variance.sqrt()
-        )),
-    }
-    let bad = &m.defects.pixels;
-    let some: Vec<String> = bad.iter().take(8).map(|[x, y]| format!("({x}, {y})")).collect();
-    let more = if bad.len() > 8 { " .." } else { "" };
-    let place = if m.of_dark { " in the dark frames" } else { "" };
-    out.push(match bad.len() {
-        0 => format!("no bad pixels{place}"),
-        n => format!("{n} bad pixels{place}: {}{more}", some.join(" ")),
-    });
-    out.push(match m.defects.columns.len() {
-        0 => format!("columns even{place}"),
-        _ => format!("offsets of columns{place}: {:.3} counts rms", m.defects.column_rms()),
-    });
-    out
-}
-
-fn text(m: &Measured) -> String {
-    let mut out = format!("{} frames of {} x {} px\n", m.n_frames, m.size.0, m.size.1);
-    for s in sentences(m) {
-        let _ = writeln!(out, "{s}");
-    }
-    let _ = writeln!(out, "options: {}", options(m).join(" "));
-    out
 }

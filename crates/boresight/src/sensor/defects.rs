@@ -1,10 +1,10 @@
 //! Pixels and columns unlike their neighbours, from the mean and the variance of each pixel over frames.
 //!
-//! A bad pixel is one of: brighter or darker than the median of its eight neighbours by five times their spread (the largest and the smallest left out) and by
-//! eight deviations of its mean; as good as still while its neighbours are not; twenty times as noisy as they. An optical spot is wider than a pixel: one of
+//! A bad pixel is one of: brighter or darker than the median of its eight neighbours by five times their spread (the largest and the smallest left out, at least the rounding) and
+//! by eight deviations of its mean; it never changes while its neighbours do in most frames; it is twenty times as noisy as they. An optical spot is wider than a pixel: one of
 //! deviation 0.5 px stands 4.7 times the spread of its neighbours above them, so that it is none. Over a scene that moves the mean is smooth, and defects stand out.
 //! A column's offset is the sum of the median differences of neighbouring columns, less a line through [`SPAN`] columns by medians: what is wider is shading.
-//! They count if their spread is twice what noise alone makes of it.
+//! They count if their spread is twice what noise alone makes of it and steps have the same sign in the upper and the lower half of the rows.
 //! Limits: clusters of more than two bad pixels; a point sharper than 0.5 px, or an upright edge over half the height, that never moves.
 
 use super::mean_map::MeanMap;
@@ -13,11 +13,16 @@ use crate::Image;
 /// How many spreads of its neighbours, and deviations of its mean, a bad pixel is off.
 const SPREADS: f32 = 5.0;
 const DEVIATIONS: f32 = 8.0;
+/// Spread of neighbours that rounding alone may hide, in units of the values' distance.
+const ROUNDED: f32 = 0.5;
+/// Agreement in sign of the steps between columns in the upper and in the lower half of the rows from which they are the columns'.
+const ALIKE: f32 = 0.5;
 /// Frames from which variances tell anything.
 const FRAMES: u32 = 12;
-/// Shares of the neighbours' variance below and above which a pixel is bad.
-const STILL: f32 = 0.02;
+/// Times the neighbours' variance above which a pixel is bad.
 const NOISY: f32 = 20.0;
+/// Share of the frames in which all neighbours change, so that one that does not, or much more, tells anything.
+const RESTLESS: f32 = 0.5;
 /// Columns over which offsets are compared.
 const SPAN: usize = 31;
 
@@ -48,6 +53,7 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
     let typical = median(&mut variance.as_slice().to_vec());
     let columns = columns(&mean, (typical / frames.n_frames() as f32).sqrt());
     let mut pixels = Vec::new();
+    let (step, changes) = (frames.step(), frames.changes());
     let n = frames.n_frames();
     for y in 0..h {
         for x in 0..w {
@@ -55,12 +61,13 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
             let level = neighbours(&mean, x, y, |x, v| v - offset(x));
             let noise = neighbours(&variance, x, y, |_, v| v);
             let (own, own_noise) = (mean.row(y)[x] - offset(x), variance.row(y)[x]);
-            // One frame has no variance, and a neighbourhood without any still rounds.
-            let sd = (noise.middle.max(1.0 / 12.0) / n as f32).sqrt();
+            // One frame has no variance. Of light that comes rarely the middle neighbour may have seen none.
+            let sd = (noise.middle.max(own_noise) / n as f32).sqrt();
             let off = (own - level.middle).abs();
-            let is_off = off > SPREADS * (level.high - level.low) && off > DEVIATIONS * sd && n > 1;
-            let tells = n >= FRAMES && noise.middle > 0.5;
-            let is_still = tells && own_noise < STILL * noise.low;
+            let spread = (level.high - level.low).max(ROUNDED * step);
+            let is_off = off > SPREADS * spread && off > DEVIATIONS * sd && n > 1;
+            let tells = n >= FRAMES && neighbours(&changes, x, y, |_, v| v).low > RESTLESS;
+            let is_still = tells && changes.row(y)[x] == 0.0;
             let is_noisy = tells && own_noise > NOISY * noise.high;
             if is_off || is_still || is_noisy || !own.is_finite() {
                 pixels.push([x as u32, y as u32]);
@@ -70,7 +77,7 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
     Defects { pixels, columns }
 }
 
-/// The neighbours of a pixel: the second smallest, the middle and the second largest.
+/// The neighbours of a pixel: the second smallest, the middle and the second largest; at the border the smallest and the largest.
 struct Around {
     low: f32,
     middle: f32,
@@ -90,7 +97,9 @@ fn neighbours(image: &Image<f32>, x: usize, y: usize, of: impl Fn(usize, f32) ->
     }
     let v = &mut v[..n];
     v.sort_unstable_by(f32::total_cmp);
-    Around { low: v[1], middle: 0.5 * (v[(n - 1) / 2] + v[n / 2]), high: v[n - 2] }
+    // At the border one of few may be the other side of an edge.
+    let trimmed = usize::from(n == 8);
+    Around { low: v[trimmed], middle: 0.5 * (v[(n - 1) / 2] + v[n / 2]), high: v[n - 1 - trimmed] }
 }
 
 fn median(v: &mut [f32]) -> f32 {
@@ -109,18 +118,17 @@ fn shading(v: &[f32], at: usize) -> f32 {
     median(&mut rests) + slope * at as f32
 }
 
-/// Offsets of the columns; empty if noise of this deviation of a pixel's mean explains them.
+/// Offsets of the columns; empty if noise of this deviation of a pixel's mean explains them, or if the halves of the frame do not agree.
 fn columns(mean: &Image<f32>, sd: f32) -> Vec<f32> {
     let (w, h) = (mean.width(), mean.height());
-    let mut sum = vec![0.0f32; w];
-    let mut differences = vec![0.0; h];
-    for x in 1..w {
-        for (y, d) in differences.iter_mut().enumerate() {
-            *d = mean.row(y)[x] - mean.row(y)[x - 1];
-        }
-        sum[x] = sum[x - 1] + median(&mut differences);
+    if w < SPAN || agreement(&steps(mean, 0..h / 2), &steps(mean, h / 2..h)) < ALIKE {
+        return Vec::new();
     }
-    if w < SPAN || !sum.iter().all(|v| v.is_finite()) {
+    let mut sum = steps(mean, 0..h);
+    for x in 1..w {
+        sum[x] += sum[x - 1];
+    }
+    if !sum.iter().all(|v| v.is_finite()) {
         return Vec::new();
     }
     let offsets: Vec<f32> = (0..w)
@@ -134,6 +142,30 @@ fn columns(mean: &Image<f32>, sd: f32) -> Vec<f32> {
     let expected = step * (SPAN as f32 / 4.0).sqrt();
     let rms = (offsets.iter().map(|v| v * v).sum::<f32>() / w as f32).sqrt();
     if rms > 2.0 * expected.max(1e-6) { offsets } else { Vec::new() }
+}
+
+/// Medians over some of the rows of the differences between each column and the one before; 0 for the first.
+fn steps(mean: &Image<f32>, rows: std::ops::Range<usize>) -> Vec<f32> {
+    let step = |x: usize| {
+        let mut differences: Vec<f32> = rows.clone().map(|y| mean.row(y)[x] - mean.row(y)[x - 1]).collect();
+        median(&mut differences)
+    };
+    (0..mean.width()).map(|x| if x == 0 { 0.0 } else { step(x) }).collect()
+}
+
+/// How often two series lie on the same side of their medians less how often on different ones, -1..=1: an edge in one of them counts once.
+fn agreement(a: &[f32], b: &[f32]) -> f32 {
+    let (middle_a, middle_b) = (median(&mut a.to_vec()), median(&mut b.to_vec()));
+    let side = |v: f32, middle: f32| {
+        if v > middle {
+            1.0
+        } else if v < middle {
+            -1.0
+        } else {
+            0.0
+        }
+    };
+    a.iter().zip(b).map(|(a, b)| side(*a, middle_a) * side(*b, middle_b)).sum::<f32>() / a.len().max(1) as f32
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The mean and the variance of each pixel over frames.
 
-use super::grey::values;
+use super::grey::{range, values};
 use crate::{Error, ErrorKind, Image, Pixels, Result};
 
 /// Running mean and variance of each pixel.
@@ -13,6 +13,10 @@ pub struct MeanMap {
     /// Sum of squares about the mean.
     spread: Vec<f64>,
     now: Vec<f32>,
+    before: Vec<f32>,
+    /// Frames in which a pixel was not what it was in the one before.
+    changes: Vec<u16>,
+    step: f32,
 }
 
 impl MeanMap {
@@ -31,11 +35,17 @@ impl MeanMap {
             (self.width, self.height) = (w, h);
             self.mean.resize(w * h, 0.0);
             self.spread.resize(w * h, 0.0);
+            self.changes.resize(w * h, 0);
         }
         if (w, h) != (self.width, self.height) {
             return wrong(format!("expected {} x {} px, found {w} x {h}", self.width, self.height));
         }
+        for ((c, now), before) in self.changes.iter_mut().zip(&self.now).zip(&self.before) {
+            *c = c.saturating_add(u16::from(now != before));
+        }
+        self.before.clone_from(&self.now);
         self.n += 1;
+        self.step = range(pixels).1;
         let n = f64::from(self.n);
         for ((m, s), v) in self.mean.iter_mut().zip(&mut self.spread).zip(&self.now) {
             let d = f64::from(*v) - *m;
@@ -50,6 +60,11 @@ impl MeanMap {
         self.n
     }
 
+    /// Distance of the values of a pixel, counts; 0 for floats.
+    pub(super) fn step(&self) -> f32 {
+        self.step
+    }
+
     /// Mean of each pixel, counts.
     pub fn mean(&self) -> Image<f32> {
         self.image(&self.mean, 1.0)
@@ -58,6 +73,13 @@ impl MeanMap {
     /// Variance of each pixel in one frame, counts²; 0 from a single frame.
     pub fn variance(&self) -> Image<f32> {
         self.image(&self.spread, 1.0 / f64::from(self.n.max(2) - 1))
+    }
+
+    /// Share of the frames in which each pixel was not what it was in the one before.
+    pub(super) fn changes(&self) -> Image<f32> {
+        let frames = f32::from(u16::try_from(self.n.max(2) - 1).unwrap_or(u16::MAX));
+        let shares = self.changes.iter().map(|c| f32::from(*c) / frames).collect();
+        Image::from_vec(self.width, self.height, shares).unwrap_or_default()
     }
 
     fn image(&self, values: &[f64], scale: f64) -> Image<f32> {

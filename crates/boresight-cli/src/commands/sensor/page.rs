@@ -1,6 +1,6 @@
 //! The page of `boresight sensor`: variance against mean with its line, the columns, the numbers; one file, no script.
 
-use super::{Measured, options, sentences};
+use super::measured::{Measured, options, sentences};
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 760.0;

@@ -92,6 +92,28 @@ fn offsets_of_columns_are_found_to_a_fraction_of_the_noise() {
 }
 
 #[test]
+fn frames_without_noise_and_light_that_comes_rarely_have_no_defects() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let mut scene = Image::filled(W, H, 0u8);
+    // Whole numbers of a codec's still picture: patches of a few counts.
+    for (i, v) in scene.as_mut_slice().iter_mut().enumerate() {
+        let (x, y) = ((i % W) as f64, (i / W) as f64);
+        *v = (60.0
+            + 3.0 * (0.11 * x).sin() * (0.07 * y).cos()
+            + 20.0 * f64::from(u8::from(x > 2.0 * y))
+            + rng.random::<f64>()) as u8;
+    }
+    let (mut still, mut rare) = (MeanMap::default(), MeanMap::default());
+    for _ in 0..32 {
+        still.push(&Pixels::Gray8(scene.clone())).unwrap();
+        let values = (0..W * H).map(|_| if rng.random::<f64>() < 0.04 { rng.random_range(3..30) } else { 0 }).collect();
+        rare.push(&Pixels::Gray8(Image::from_vec(W, H, values).unwrap())).unwrap();
+    }
+    assert_eq!(find_defects(&still), Defects::default());
+    assert_eq!(find_defects(&rare), Defects::default());
+}
+
+#[test]
 fn frames_too_small_or_too_few_have_no_defects() {
     assert_eq!(find_defects(&MeanMap::default()), Defects::default());
     let mut map = MeanMap::default();
