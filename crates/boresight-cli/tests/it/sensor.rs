@@ -114,3 +114,23 @@ fn what_cannot_be_measured_or_mended_is_said() {
     let out = boresight().current_dir(dir.path()).args(["detect", "one", "--flat", "nothing-there"]).output().unwrap();
     assert!(!out.status.success() && stderr(&out).contains("input.sensor.flat"), "{}", stderr(&out));
 }
+
+#[test]
+fn of_a_clip_whose_codec_copies_nothing_is_claimed() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("copies")).unwrap();
+    // One picture of a few counts' texture, twenty times.
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut bytes = format!("P5\n{W} {H}\n255\n").into_bytes();
+    bytes.extend((0..W * H).map(|_| rng.random_range(60..64u8)));
+    for k in 0..20 {
+        std::fs::write(dir.path().join(format!("copies/{k}.pgm")), &bytes).unwrap();
+    }
+    let out = boresight().current_dir(dir.path()).args(["sensor", "copies"]).output().unwrap();
+    assert!(out.status.success(), "{}", stderr(&out));
+    let text = stdout(&out);
+    assert!(
+        text.contains("below the rounding") && text.contains("not looked for") && !text.contains("options"),
+        "{text}"
+    );
+}

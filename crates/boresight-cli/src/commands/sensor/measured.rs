@@ -29,6 +29,9 @@ pub(super) fn options(m: &Measured) -> Vec<String> {
             "--set 'detector.noise.given={{read-counts={read:.4}, gain={gain:.5}, offset-counts={offset:.3}}}'"
         ));
     }
+    if is_hidden(&m.curve) && !m.of_dark {
+        return out;
+    }
     if !m.defects.pixels.is_empty() {
         out.push("--set input.sensor.bad-pixels=true".to_string());
     }
@@ -62,12 +65,19 @@ pub(super) fn sentences(m: &Measured) -> Vec<String> {
             m.curve.variance.sqrt()
         )),
     }
+    if is_hidden(&m.curve) && !m.of_dark {
+        out.push(
+            "defects are not looked for: without noise a still scene's own points cannot be told from them".to_string(),
+        );
+        return out;
+    }
     let bad = &m.defects.pixels;
     let some: Vec<String> = bad.iter().take(8).map(|[x, y]| format!("({x}, {y})")).collect();
     let more = if bad.len() > 8 { " .." } else { "" };
     let place = if m.of_dark { " in the dark frames" } else { "" };
     out.push(match bad.len() {
         0 => format!("no bad pixels{place}"),
+        1 => format!("1 bad pixel{place}: {}", some.join(" ")),
         n => format!("{n} bad pixels{place}: {}{more}", some.join(" ")),
     });
     out.push(match m.defects.columns.len() {
