@@ -96,7 +96,7 @@ fn one(config: &TrackerConfig, seed: Seed) -> Result<[u64; 4]> {
     let detector = DetectorConfig {
         threshold: ThresholdConfig::Band(BandConfig { low: 90.0, high: 110.0 }),
         cluster: ClusterConfig { min_area_px: Some(28), max_area_px: Some(200), ..ClusterConfig::default() },
-        noise: NoiseConfig::Given(GivenNoise { read_counts: 0.0, gain: 0.0 }),
+        noise: NoiseConfig::Given(GivenNoise { read_counts: 0.0, ..Default::default() }),
         ..DetectorConfig::default()
     };
     let mut detector = vision::build(&detector, source.info())?;

@@ -44,6 +44,8 @@ enum Command {
     Config(commands::config::Args),
     /// Reproduce the papers' tables and figures.
     Reproduce(commands::reproduce::Args),
+    /// Measure gain, noise and defects of the sensor behind frames.
+    Sensor(commands::sensor::Args),
     /// Simulate a scene: frames and their truth.
     Simulate(commands::simulate::Args),
     /// Write completions for a shell, or the manual page.
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Command::Convert(args) => commands::convert::run(args),
         Command::Config(args) => commands::config::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(args),
+        Command::Sensor(args) => commands::sensor::run(args),
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Completions(args) => commands::completions::run::<Cli>(&args),
     };

@@ -74,7 +74,7 @@ impl Wishes {
         }
         if self.config.is_some() || self.detector.is_some() {
             self.no_word("with a configuration the detector stands in it")?;
-            let source = io::open(input, &base.input.open_options())?;
+            let source = base.input.mend(io::open(input, &base.input.open_options())?)?;
             return self.for_source(source, base);
         }
         let request = self.request()?;
@@ -89,12 +89,14 @@ impl Wishes {
         let base = self.base()?;
         if self.config.is_some() || self.detector.is_some() {
             self.no_word("with a configuration the detector stands in it")?;
-            return self.for_source(Box::new(frames), base);
+            let frames = base.input.mend(Box::new(frames))?;
+            return self.for_source(frames, base);
         }
         let request = self.request()?;
         let mut again = again;
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
-        let (mut frames, mut choice) = auto::read_and_choose(Box::new(frames), again, &base, &request)?;
+        let (mut frames, mut choice) =
+            auto::read_and_choose(base.input.mend(Box::new(frames))?, again, &base, &request)?;
         choice.config = changed(choice.config, &self.sets)?;
         let detector = auto::learn(&mut frames, &mut choice, &request)?;
         self.chosen(frames, choice, detector)

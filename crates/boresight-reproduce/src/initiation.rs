@@ -41,7 +41,7 @@ pub fn paper_detector(size_limits: bool) -> DetectorConfig {
         threshold: ThresholdConfig::Band(BandConfig { low: 90.0, high: 110.0 }),
         cluster: ClusterConfig { target_size_px: size_limits.then_some([9.0, 9.0]), ..ClusterConfig::default() },
         // Of no weight here: the tracker's extra noise is R.
-        noise: NoiseConfig::Given(GivenNoise { read_counts: 0.0, gain: 0.0 }),
+        noise: NoiseConfig::Given(GivenNoise { read_counts: 0.0, ..Default::default() }),
         ..DetectorConfig::default()
     }
 }

@@ -6,6 +6,7 @@ mod explain;
 mod reference;
 mod renamed;
 mod schema_tree;
+mod sensor_frames;
 mod typo;
 mod whole;
 

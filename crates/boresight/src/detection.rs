@@ -38,6 +38,21 @@ pub struct DetectedVelocity {
     pub with_position: Matrix2<f64>,
 }
 
+/// How a position came about where a fit was asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PositionFit {
+    /// By a fitted spot.
+    Spot {
+        /// Squared residuals over their variances, for each degree of freedom: 1 where the noise explains them.
+        chi2_per_dof: f64,
+        /// Chance that the stated noise leaves as much or more, 0..=1.
+        p: f64,
+    },
+    /// By the centroid, since the fit was poor or there was none.
+    Centroid,
+}
+
 /// One detected thing in one frame; [`Detection::at`] makes one.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -60,6 +75,8 @@ pub struct Detection {
     pub class: Option<ClassId>,
     /// Velocity, if the detector looks at more than one frame; a track starts with it, and takes only positions afterwards.
     pub velocity: Option<DetectedVelocity>,
+    /// How the position came about, if a fit was asked for (`detector.centroid.fit`).
+    pub fit: Option<PositionFit>,
 }
 
 impl Detection {
@@ -76,7 +93,18 @@ impl Detection {
     /// ```
     pub fn at(position: Vector2<f64>, cov: Matrix2<f64>) -> Self {
         let extent = Extent::around(position, 0.0, 0.0);
-        Self { position, cov, extent, area_px: 1, peak: 1.0, sum: 1.0, score: 1.0, class: None, velocity: None }
+        Self {
+            position,
+            cov,
+            extent,
+            area_px: 1,
+            peak: 1.0,
+            sum: 1.0,
+            score: 1.0,
+            class: None,
+            velocity: None,
+            fit: None,
+        }
     }
 
     /// A point at (x, y), px, known to `std_px` along both axes; else as [`Detection::at`].

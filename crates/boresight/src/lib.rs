@@ -84,6 +84,7 @@ pub mod pipeline;
 mod record;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod sensor;
 pub mod sim;
 mod similarity;
 mod time;
@@ -98,7 +99,7 @@ pub mod vision;
 pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;
 pub use cpu::cpu_features;
-pub use detection::{ClassId, DetectedVelocity, Detection, Extent, Scan};
+pub use detection::{ClassId, DetectedVelocity, Detection, Extent, PositionFit, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};
 pub use image::Image;

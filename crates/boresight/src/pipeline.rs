@@ -16,7 +16,7 @@ mod scans;
 use self::scans::Scans;
 use crate::track::Tracking;
 use crate::vision::Detector;
-use crate::{Error, FrameSource, Result, Scan, Sink, TrackStatus, View};
+use crate::{Error, FrameSource, PositionFit, Result, Scan, Sink, TrackStatus, View};
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -54,6 +54,8 @@ pub struct Summary {
     pub duration_s: f64,
     /// Detections in all frames.
     pub detections: u64,
+    /// Of these, how many have the position of a fitted spot, and how many fell back to the centroid, where a fit was asked for.
+    pub fits: [u64; 2],
     /// Tracks that were confirmed at some time.
     pub confirmed_tracks: u64,
     /// Most confirmed tracks in one frame.
@@ -215,6 +217,9 @@ fn drive(
         summary.times.write += tracked.elapsed();
         summary.frames += 1;
         summary.detections += scan.detections.len() as u64;
+        for fit in scan.detections.iter().filter_map(|d| d.fit) {
+            summary.fits[usize::from(fit == PositionFit::Centroid)] += 1;
+        }
         summary.duration_s = scan.time.seconds_since(*first.get_or_insert(scan.time));
         let mut now = 0;
         for t in tracks.iter().filter(|t| t.status != TrackStatus::Tentative) {

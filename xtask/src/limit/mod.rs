@@ -3,9 +3,13 @@
 mod cost;
 mod crossing;
 mod curve;
+mod locking;
+mod peers;
+mod positions;
 mod real;
 mod scene_j;
 mod scenes;
+mod spot_frames;
 mod white;
 
 use anyhow::Result;
@@ -13,7 +17,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost. The page is then printed, not written.
+    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost, positions. The page is then printed, not written.
     #[arg(default_value = "")]
     only: String,
     /// Windows of eight spots for each point of the curves.
@@ -25,13 +29,16 @@ pub struct Args {
     /// Frames of noise for the false alarms of long sums; ten times as many for short ones.
     #[arg(long, default_value_t = 20_000)]
     frames: u64,
+    /// Fits for each row of positions.
+    #[arg(long, default_value_t = 32_000)]
+    fits: usize,
     /// Keys set for the real clips.
     #[arg(long = "set")]
     sets: Vec<String>,
     /// Test data (default: `BORESIGHT_TEST_DATA`).
     #[arg(long)]
     data: Option<PathBuf>,
-    /// Python with NumPy, for the comparison of cost.
+    /// Python with NumPy, for the comparison of cost; with SciPy, trackpy and picassosr, for that of positions.
     #[arg(long)]
     python: Option<PathBuf>,
 }
@@ -66,6 +73,9 @@ pub fn run(args: &Args) -> Result<()> {
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     part("real", include_str!("real.txt").trim(), &mut |p| real::table(&data, &args.sets, p))?;
     part("cost", include_str!("cost.txt").trim(), &mut |p| cost::table(args.python.as_deref(), p))?;
+    part("positions", include_str!("positions.txt").trim(), &mut |p| {
+        positions::table(args.fits, &data, args.python.as_deref(), p)
+    })?;
     if args.only.is_empty() {
         let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");
         std::fs::write(docs.join("limit.md"), page)?;

@@ -33,6 +33,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
+    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some());
     if !args.input.quiet {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }
@@ -46,6 +47,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     if !args.input.quiet {
         say!("{} frames, {} detections", done.summary.frames, done.summary.detections);
+        if let Some(fits) = run_options::fits(&done.summary) {
+            say!("{fits}");
+        }
     }
     plan.lost.iter().chain(&done.summary.warnings).for_each(|w| say!("warning: {w}"));
     run_options::outcome(&args.input.input, done)

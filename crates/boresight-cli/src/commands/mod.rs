@@ -14,6 +14,7 @@ pub mod reproduce;
 mod run_folder;
 mod run_options;
 mod run_summary;
+pub mod sensor;
 pub mod simulate;
 pub mod smooth;
 pub mod stitch;

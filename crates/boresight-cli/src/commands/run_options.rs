@@ -37,6 +37,12 @@ pub struct InputArgs {
     /// Leave out rows of a table that cannot be read, and count them.
     #[arg(long)]
     pub skip_bad_rows: bool,
+    /// Frames taken without light, whose mean is taken off: a file, a folder, a pattern. Short for `--set input.sensor.dark=..`.
+    #[arg(long, value_name = "INPUT")]
+    pub dark: Option<String>,
+    /// Frames of even light, by which unequal response is divided out. Short for `--set input.sensor.flat=..`.
+    #[arg(long, value_name = "INPUT")]
+    pub flat: Option<String>,
     /// Memory that reading one picture may take, MB; half of the machine's if absent.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
     pub max_memory: Option<u64>,
@@ -123,6 +129,9 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
     }
+    let sensor = &mut base.input.sensor;
+    sensor.dark = args.dark.clone().or(sensor.dark.take());
+    sensor.flat = args.flat.clone().or(sensor.flat.take());
     // How the input is read must be settled before it is opened.
     for set in args.sets.iter().filter(|s| s.starts_with("input.")) {
         base = base.with(set)?;
@@ -131,7 +140,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         return plan_table(args, tracker, given, base);
     }
     if given.is_some() {
-        let source = boresight::io::open(&args.input, &base.input.open_options())?;
+        let source = base.input.mend(boresight::io::open(&args.input, &base.input.open_options())?)?;
         let config = changed(base, args, tracker)?;
         let info = source.info().clone();
         let detector = vision::build(&config.detector, &info)?;
@@ -275,6 +284,16 @@ pub fn end_with_stdin() {
     });
 }
 
+/// A sentence on how many positions are fitted, where a fit was asked for.
+pub fn fits(s: &boresight::pipeline::Summary) -> Option<String> {
+    let [fitted, kept] = s.fits;
+    (fitted + kept > 0).then(|| {
+        format!(
+            "{fitted} positions by fitted spots; {kept} by the centroid, since the fit was poor or the target too large"
+        )
+    })
+}
+
 /// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
 /// # Errors
 /// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.
@@ -314,6 +333,8 @@ mod tests {
             rate_hz: None,
             columns: None,
             skip_bad_rows: false,
+            dark: None,
+            flat: None,
             max_memory: None,
             threads: None,
             quiet: true,

@@ -98,7 +98,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
     let mut observed = Observed::default();
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder)?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, plan.config.detector.centroid.fit.is_some())?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -202,11 +202,11 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder) -> boresight::Result<Vec<Box<dyn Sink>>> {
+fn sinks(folder: &RunFolder, with_fits: bool) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(folder.path("tracks.csv"))?),
-        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?),
+        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits)),
         Box::new(MotWriter::create(folder.path("mot.txt"))?),
     ];
     if folder.makes("tracks.jsonl") {
@@ -273,6 +273,9 @@ fn print_summary(s: &Summary, looked: Duration, run: Duration) {
         counted(s.confirmed_tracks, "confirmed track"),
         s.most_at_once
     );
+    if let Some(fits) = run_options::fits(s) {
+        say!("{fits}");
+    }
     if let Some((nis, n)) = s.mean_nis {
         say!("mean NIS {nis:.2} over {n} updates (2 for a filter whose uncertainty is honest)");
     }

@@ -54,7 +54,7 @@ impl Address {
             }
         }
         let options = io::OpenOptions { stop: Some(self.stop.clone()), ..self.input.open_options() };
-        let source = io::open(&self.name, &options)?;
+        let source = self.input.mend(io::open(&self.name, &options)?)?;
         let has_stamps = source.info().true_times || self.has_rate || self.pace || !self.never_waits();
         Ok(Box::new(Frames::new(source, has_stamps)))
     }

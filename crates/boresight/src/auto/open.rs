@@ -50,7 +50,7 @@ opaque_debug!(Opened);
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
 pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
     let read = |config: &Config| -> Result<Replay> {
-        let source = crate::io::open(input, &config.input.open_options())?;
+        let source = config.input.mend(crate::io::open(input, &config.input.open_options())?)?;
         // A stream waits for nothing longer than the choice needs.
         let most = if second_look::can_be_opened_twice(input) { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, LEARN_BYTES);

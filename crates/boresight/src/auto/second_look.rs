@@ -3,7 +3,7 @@
 //! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither.
 
 use crate::io::{Colour, OpenOptions};
-use crate::{Config, Frame, FrameSource};
+use crate::{Config, Frame, FrameSource, PixelKind};
 use std::path::Path;
 
 /// Frames of a file that are looked through when its camera stands still.
@@ -54,7 +54,14 @@ pub(super) fn frames(input: &str, base: &Config, n_kept: usize) -> Vec<Frame> {
 fn kept(input: &str, base: &Config, n_kept: usize, sparing: bool) -> Option<Vec<Frame>> {
     let options = OpenOptions { colour: Colour::Rgb, ..base.input.open_options() };
     match crate::io::open(input, &options) {
-        Ok(mut source) => kept_of(source.as_mut(), n_kept, sparing),
+        // Colours are not mended, and what cannot be mended is looked at as it is: the run itself says why.
+        Ok(mut source) if source.info().kind == PixelKind::Rgb8 || !base.input.sensor.is_active() => {
+            kept_of(source.as_mut(), n_kept, sparing)
+        }
+        Ok(source) => match base.input.mend(source) {
+            Ok(mut source) => kept_of(source.as_mut(), n_kept, sparing),
+            Err(_) => Some(Vec::new()),
+        },
         Err(_) => Some(Vec::new()),
     }
 }

@@ -6,6 +6,7 @@
 use super::schema_tree::{children, is_choice};
 use super::{renamed, typo};
 use crate::io::{Colour, OpenOptions, RawFormat, TableOptions};
+use crate::sensor::SensorConfig;
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
@@ -46,6 +47,8 @@ pub struct InputConfig {
     pub raw: Option<RawFormat>,
     /// How a table of detections is read; of no effect on frames.
     pub table: TableOptions,
+    /// What is mended of grey frames before anything is detected: dark and flat frames, bad pixels, columns.
+    pub sensor: SensorConfig,
 }
 
 impl Default for InputConfig {
@@ -59,6 +62,7 @@ impl Default for InputConfig {
             first_page: o.first_page,
             raw: None,
             table: Default::default(),
+            sensor: SensorConfig::default(),
         }
     }
 }

@@ -175,7 +175,7 @@ impl Edge {
         let Some(level) = around.level.filter(|l| l.is_finite()) else {
             return Self { radius, width: 0.0, slope: 0.0, sd: 0.0, jump: 0.0, growth: 1.0 };
         };
-        let sd = (around.variance + around.gain * level.max(0.0)).sqrt();
+        let sd = (around.variance + around.gain * level.max(0.0)).max(0.0).sqrt();
         let bright = if mean >= level { 1.0 } else { -1.0 };
         let height = (mean - level).abs().max(0.1 * sd).max(1e-12);
         let over_ground = around.ground.map_or(0.0, |g| bright * (level - g));
@@ -279,7 +279,7 @@ fn weighted(sums: &Sums, region: &Region, around: &Surroundings, rectangle: bool
         return binary(region, around);
     }
     let edge = Edge::of(region, around);
-    let variance = around.variance + around.gain * (sums.intensity / sums.n).max(0.0);
+    let variance = (around.variance + around.gain * (sums.intensity / sums.n).max(0.0)).max(0.0);
     let per_pixel = variance + if rectangle { 0.0 } else { edge.weighted().max(-0.5 * variance) };
     let mut cov = second_moment(sums, position) * (per_pixel / (sums.w * sums.w));
     if rectangle {

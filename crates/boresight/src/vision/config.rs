@@ -3,6 +3,7 @@
 //! Every struct checks itself with `validate(at)`, where `at` is the path of the key (`detector`), so that errors name the
 //! line a user wrote.
 
+use super::fit::FitConfig;
 use super::spatial::SpatialConfig;
 use super::threshold::ThresholdConfig;
 use super::window::FollowConfig;
@@ -85,6 +86,9 @@ pub struct CentroidConfig {
     /// Standard deviation added to each axis, px, 0...: what the pixel noise does not explain (a target whose shape
     /// changes, a codec). 0 gives the covariance from the pixels' noise alone.
     pub extra_sd_px: f64,
+    /// Fit a spot around each detection, on the frame as it came; its position and covariance replace the centroid's. Absent: none is fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<FitConfig>,
 }
 
 /// Over which pixels a centroid is taken.
@@ -122,11 +126,11 @@ pub enum NoiseConfig {
     /// Estimated in every frame from the differences of neighbouring pixels (robust, so edges and targets count little).
     #[default]
     Estimated,
-    /// Given: variance = `read-counts`² + `gain` x intensity.
+    /// Given: variance = `read-counts`² + `gain` x (intensity - `offset-counts`); `boresight sensor INPUT` measures all three.
     Given(GivenNoise),
 }
 
-/// The known noise of one pixel: variance = read-counts² + gain x intensity.
+/// The known noise of one pixel: variance = read-counts² + gain x (intensity - offset-counts).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GivenNoise {
@@ -134,11 +138,13 @@ pub struct GivenNoise {
     pub read_counts: f64,
     /// Variance per count of intensity (shot noise), counts, 0... .
     pub gain: f64,
+    /// Intensity without light, from which the intensity is counted, counts.
+    pub offset_counts: f64,
 }
 
 impl Default for GivenNoise {
     fn default() -> Self {
-        Self { read_counts: 1.0, gain: 0.0 }
+        Self { read_counts: 1.0, gain: 0.0, offset_counts: 0.0 }
     }
 }
 
@@ -185,8 +191,11 @@ impl DetectorConfig {
         ];
         let method = ("detector.centroid.method", self.centroid.method != usual.centroid.method);
         let weight = ("detector.centroid.weight", self.centroid.weight != usual.centroid.weight);
-        let noise = ("detector.noise", self.noise != usual.noise);
-        let shot_noise = ("detector.noise.given.gain", matches!(&self.noise, NoiseConfig::Given(g) if g.gain != 0.0));
+        // A fit takes the noise from there, whatever finds the targets.
+        let noise = ("detector.noise", self.noise != usual.noise && self.centroid.fit.is_none());
+        let fit = ("detector.centroid.fit", self.centroid.fit.is_some());
+        let sheds = matches!(&self.noise, NoiseConfig::Given(g) if g.gain != 0.0);
+        let shot_noise = ("detector.noise.given.gain", sheds && self.centroid.fit.is_none());
         let unused = match self.threshold {
             ThresholdConfig::Band(_)
             | ThresholdConfig::Level(_)
@@ -197,8 +206,10 @@ impl DetectorConfig {
             | ThresholdConfig::Colour(_) => Vec::new(),
             ThresholdConfig::Isolated(_) => [&joining[..], &[weight, shot_noise]].concat(),
             ThresholdConfig::Spot(_) => [&joining[..], &areas, &[method, weight]].concat(),
-            ThresholdConfig::Cfar(_) | ThresholdConfig::Integrate(_) => {
-                [&joining[..], &areas, &[method, weight, noise]].concat()
+            ThresholdConfig::Cfar(_) => [&joining[..], &areas, &[method, weight, noise]].concat(),
+            ThresholdConfig::Integrate(_) => {
+                let noise = ("detector.noise", self.noise != usual.noise);
+                [&joining[..], &areas, &[method, weight, fit, noise]].concat()
             }
         };
         unused.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
@@ -258,6 +269,9 @@ impl CentroidConfig {
                 "0 leaves the covariance from the pixels' noise alone",
             ));
         }
+        if let Some(fit) = &self.fit {
+            fit.validate(&format!("{at}.fit"))?;
+        }
         Ok(())
     }
 }
@@ -272,6 +286,9 @@ impl NoiseConfig {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(wrong(at, key, value, "0 or more", "noise = \"estimated\" measures it in every frame"));
             }
+        }
+        if !g.offset_counts.is_finite() {
+            return Err(wrong(at, "given.offset-counts", g.offset_counts, "a number", "0 where black is 0"));
         }
         Ok(())
     }
@@ -309,6 +326,8 @@ mod tests {
         for threshold in ["band", "level", "otsu", "local", "moving", "difference"] {
             assert!(unused(threshold, all).is_empty(), "{threshold}");
         }
+        assert_eq!(unused("integrate", "centroid.fit = {}"), ["detector.centroid.fit"]);
+        assert!(unused("cfar", "centroid.fit = {}\nnoise.given = { gain = 1.0 }").is_empty());
         for threshold in ["isolated", "spot", "cfar", "integrate"] {
             assert!(unused(threshold, "centroid.extra-sd-px = 0.1\nmax-detections = 5").is_empty(), "{threshold}");
         }

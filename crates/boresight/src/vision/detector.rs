@@ -1,11 +1,12 @@
-//! The detector: a frame of any pixel type goes through the spatial filter, the way of finding that the configuration names, and
-//! the limits that hold for all of them.
+//! The detector: a frame of any pixel type goes through the spatial filter, the way of finding that the configuration names, the fit of
+//! spots if one is asked for, and the limits that hold for all of them.
 
 use super::Detector;
 use super::background::{Background, FrameDifference};
 use super::cfar::CfarDetector;
 use super::colour::{ColourMask, grey_image, needs_colour};
 use super::config::DetectorConfig;
+use super::fit::Fitter;
 use super::integrate::IntegrateDetector;
 use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
@@ -82,6 +83,8 @@ struct Typed<T: Pixel> {
     /// The spatial filter and its result.
     filter: Option<(SpatialFilter<T>, Image<T>)>,
     finder: Box<dyn TargetFinder<T>>,
+    /// Fits spots around what is found.
+    fitter: Option<Fitter>,
 }
 
 impl<T: Pixel> Typed<T> {
@@ -90,7 +93,10 @@ impl<T: Pixel> Typed<T> {
             SpatialConfig::None => None,
             filter => Some((SpatialFilter::new(filter)?, Image::default())),
         };
-        Ok(Self { filter, finder: finder(config)? })
+        // Sums of frames have no frame to fit to.
+        let is_summed = matches!(config.threshold, ThresholdConfig::Integrate(_));
+        let fitter = config.centroid.fit.clone().filter(|_| !is_summed).map(Fitter::new);
+        Ok(Self { filter, finder: finder(config)?, fitter })
     }
 
     /// Appends what is found; whether the frame was one in which nothing could be.
@@ -110,6 +116,9 @@ impl<T: Pixel> Typed<T> {
             None => raw,
         };
         self.finder.find(&TypedFrame { raw, image, colours, dt_s }, config, out)?;
+        if let Some(fitter) = &mut self.fitter {
+            fitter.refine(raw, &config.noise, out);
+        }
         Ok(self.finder.is_blind())
     }
 }

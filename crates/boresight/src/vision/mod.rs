@@ -11,6 +11,7 @@ pub(crate) mod cluster;
 pub mod colour;
 pub(crate) mod config;
 pub(crate) mod detector;
+pub mod fit;
 pub mod integrate;
 pub(crate) mod isolated;
 pub(crate) mod llr;

@@ -103,5 +103,6 @@ fn detection<T: Pixel>(
         score,
         class: None,
         velocity: None,
+        fit: None,
     }
 }

@@ -43,14 +43,16 @@ pub(super) struct PixelNoise {
 }
 
 impl PixelNoise {
-    /// Variance of one pixel at intensity 0, counts², and its growth with intensity, counts.
+    /// Variance of one pixel at intensity 0, counts², and its growth with intensity, counts; the first may be below 0 where black is not 0.
     ///
     /// Taken from the unfiltered pixels: a weighted sum over a cluster of smoothed pixels is nearly the same sum over the pixels
     /// before smoothing, whose noise is white.
     pub(super) fn of<T: Pixel>(&mut self, raw: &Image<T>, config: &NoiseConfig) -> (f64, f64) {
         match config {
             // The rounding to whole counts is noise as well.
-            NoiseConfig::Given(g) => (g.read_counts * g.read_counts + f64::from(T::STEP) / 12.0, g.gain),
+            NoiseConfig::Given(g) => {
+                (g.read_counts * g.read_counts - g.gain * g.offset_counts + f64::from(T::STEP) / 12.0, g.gain)
+            }
             NoiseConfig::Estimated => (noise_level(raw, &mut self.samples).powi(2), 0.0),
         }
     }

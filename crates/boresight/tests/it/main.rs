@@ -16,3 +16,4 @@ mod track;
 mod video;
 mod vision_conformance;
 mod vision_covariance;
+mod vision_fit;

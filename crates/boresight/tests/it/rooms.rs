@@ -34,6 +34,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fuse", &["associate"]),
     ("metrics", &["associate"]),
     ("sim", &[]),
+    ("sensor", &[]),
     ("io", &[]),
     ("draw", &["io"]),
     ("report", &["draw", "io", "metrics"]),

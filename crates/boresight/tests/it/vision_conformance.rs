@@ -4,12 +4,15 @@
 use boresight::vision::FollowConfig;
 use boresight::vision::cfar::CfarConfig;
 use boresight::vision::colour::ColourMatchConfig;
+use boresight::vision::fit::{FitConfig, FitWidth};
 use boresight::vision::integrate::{IntegrateConfig, StillBackground};
 use boresight::vision::spatial::{SpatialConfig, WindowConfig};
 use boresight::vision::threshold::{
     BandConfig, LevelConfig, LocalConfig, OtsuConfig, Polarity, Side, SpotConfig, ThresholdConfig,
 };
-use boresight::vision::{CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, Weight};
+use boresight::vision::{
+    CentroidConfig, CentroidMethod, ClusterConfig, DetectorConfig, GivenNoise, NoiseConfig, Weight,
+};
 use boresight::vision::{Detector, build};
 use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
 
@@ -234,7 +237,7 @@ fn every_centroid_weight_filter_and_distance_takes_every_frame() {
         for weight in [Weight::Auto, Weight::Intensity, Weight::AboveBackground] {
             let config = DetectorConfig {
                 threshold: ThresholdConfig::Otsu(OtsuConfig { side: Side::Bright }),
-                centroid: CentroidConfig { method, weight, extra_sd_px: 0.1 },
+                centroid: CentroidConfig { method, weight, extra_sd_px: 0.1, fit: None },
                 ..Default::default()
             };
             check(&config, &format!("{method:?} {weight:?}"));
@@ -249,6 +252,25 @@ fn every_centroid_weight_filter_and_distance_takes_every_frame() {
             ..Default::default()
         };
         check(&config, &format!("d_p {distance_px}"));
+    }
+}
+
+#[test]
+fn every_fit_takes_what_every_threshold_finds() {
+    let fits = [
+        FitConfig::default(),
+        FitConfig { width: FitWidth::Elliptic, motion_px: [3.0, -2.0], max_misfit: 1e3, ..Default::default() },
+        FitConfig { width: FitWidth::Known, sigma_px: Some(1.0), slope: false, max_misfit: 1e3, ..Default::default() },
+    ];
+    let given = NoiseConfig::Given(GivenNoise { read_counts: 2.0, gain: 0.5, offset_counts: 40.0 });
+    for threshold in thresholds() {
+        for (fit, noise) in fits.iter().zip([&NoiseConfig::Estimated, &given, &given]) {
+            let what = format!("{threshold:?} {fit:?} {noise:?}");
+            let centroid = CentroidConfig { fit: Some(fit.clone()), ..Default::default() };
+            let config =
+                DetectorConfig { threshold: threshold.clone(), centroid, noise: noise.clone(), ..Default::default() };
+            check(&config, &what);
+        }
     }
 }
 

@@ -48,7 +48,9 @@ impl<'o> RowReader<'o> {
         match form.kind {
             Kind::Mot => return "MOTChallenge".to_string(),
             Kind::Kitti => return "KITTI".to_string(),
-            Kind::Named if form.header.join(",") == DETECTIONS_HEADER => return "boresight detections".to_string(),
+            Kind::Named if form.header.join(",").starts_with(DETECTIONS_HEADER) => {
+                return "boresight detections".to_string();
+            }
             Kind::Named => {}
         }
         let fields = [Field::Frame, Field::TimeS, Field::X, Field::Y, Field::Left, Field::Top];
@@ -103,6 +105,7 @@ impl<'o> RowReader<'o> {
             score: row.maybe(Field::Score)?.unwrap_or(1.0) as f32,
             class: row.word(Field::Class).and_then(|word| class_of(&word, class_names)),
             velocity: None,
+            fit: None,
         };
         Ok(Some(Seen { frame, id, time, detection }))
     }

@@ -2,11 +2,12 @@
 //!
 //! Columns: frame (from 0), time_s, centroid (px, the centre of the top-left pixel is (0, 0)), its covariance (px²), the
 //! box in pixel-edge coordinates (a single pixel at x has left = x - 0.5), number of pixels, strongest value, sum of
-//! weights (counts), score. Numbers are the shortest that read back to the same bits.
+//! weights (counts), score. Where spots were fitted, also how: `fit` (spot, or centroid where the fit was poor), squared residuals over their
+//! variances a degree of freedom, and the chance of as much. Numbers are the shortest that read back to the same bits.
 
 use super::number::{push_f32, push_f64, push_seconds};
 use crate::io::atomic::Output;
-use crate::{Result, Sink, View};
+use crate::{PositionFit, Result, Sink, View};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -14,10 +15,14 @@ use std::path::PathBuf;
 pub const DETECTIONS_HEADER: &str = "frame,time_s,x_px,y_px,var_x_px2,cov_x_y_px2,var_y_px2,\
 left_px,top_px,width_px,height_px,area_px,peak,sum,score";
 
+/// What it adds where spots were fitted.
+const FIT_COLUMNS: &str = ",fit,chi2_per_dof,fit_p";
+
 /// Writes `detections.csv`.
 pub struct DetectionsCsv {
     output: Output,
     lines: String,
+    with_fits: bool,
 }
 
 opaque_debug!(DetectionsCsv);
@@ -33,16 +38,21 @@ impl DetectionsCsv {
     /// Writes to any output.
     /// # Errors
     /// [`crate::ErrorKind::Output`] if it cannot be written.
-    pub fn to(mut output: Output) -> Result<Self> {
-        output.put(format!("{DETECTIONS_HEADER}\n").as_bytes())?;
-        Ok(Self { output, lines: String::new() })
+    pub fn to(output: Output) -> Result<Self> {
+        Ok(Self { output, lines: format!("{DETECTIONS_HEADER}\n"), with_fits: false })
+    }
+
+    /// With columns that say how each position was fitted, or without.
+    pub fn with_fits(mut self, with_fits: bool) -> Self {
+        self.with_fits = with_fits;
+        self.lines = format!("{DETECTIONS_HEADER}{}\n", if with_fits { FIT_COLUMNS } else { "" });
+        self
     }
 }
 
 impl Sink for DetectionsCsv {
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.lines;
-        out.clear();
         for d in &view.scan.detections {
             let _ = write!(out, "{},", view.scan.index.0);
             push_seconds(out, view.scan.time);
@@ -68,12 +78,28 @@ impl Sink for DetectionsCsv {
             push_f64(out, d.sum);
             out.push(',');
             push_f32(out, d.score);
+            if self.with_fits {
+                match d.fit {
+                    Some(PositionFit::Spot { chi2_per_dof, p }) => {
+                        out.push_str(",spot,");
+                        push_f64(out, chi2_per_dof);
+                        out.push(',');
+                        push_f64(out, p);
+                    }
+                    Some(PositionFit::Centroid) => out.push_str(",centroid,,"),
+                    None => out.push_str(",,,"),
+                }
+            }
             out.push('\n');
         }
-        self.output.put(out.as_bytes())
+        let written = self.output.put(out.as_bytes());
+        out.clear();
+        written
     }
 
-    fn finish(self: Box<Self>) -> Result<()> {
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        // A run without frames has its header still to write.
+        self.output.put(self.lines.as_bytes())?;
         self.output.finish()
     }
 }

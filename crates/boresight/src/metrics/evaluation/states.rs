@@ -364,6 +364,7 @@ mod tests {
             score: 1.0,
             class: None,
             velocity: None,
+            fit: None,
         }
     }
 

@@ -266,6 +266,7 @@ impl CfarDetector {
             score: (-c.number.max(1e-300).log10()) as f32,
             class: None,
             velocity: None,
+            fit: None,
         };
         self.found.push(Found { detection, cells: first..self.cells.len() });
     }

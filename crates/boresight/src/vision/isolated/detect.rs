@@ -204,6 +204,7 @@ fn detection<T: Pixel>(
         score: best.score as f32,
         class: None,
         velocity: None,
+        fit: None,
     })
 }
 

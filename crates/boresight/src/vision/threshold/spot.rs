@@ -290,7 +290,7 @@ impl SpotDetector {
         }
         // Rounding and clipping leave a little even without noise.
         let level = self.frame.get(spot.peak.0, spot.peak.1).unwrap_or(0.0).max(0.0);
-        let variance = variance + gain * f64::from(level);
+        let variance = (variance + gain * f64::from(level)).max(0.0);
         let sd2 = variance * self.noise_gain / (spot.mass * (1.0 - spot.pull.min(0.7))).powi(2) + 1e-4;
         Detection {
             position: spot.position,
@@ -307,6 +307,7 @@ impl SpotDetector {
             score: spot.score,
             class: None,
             velocity: None,
+            fit: None,
         }
     }
 }

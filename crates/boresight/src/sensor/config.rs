@@ -1,0 +1,29 @@
+//! What is mended of a sensor's frames.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is mended before anything is detected; `boresight sensor INPUT` says what is worth it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct SensorConfig {
+    /// Frames taken without light (a file, a folder, a pattern): their mean is taken off, their level stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dark: Option<String>,
+    /// Frames of even light: unequal response is divided out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flat: Option<String>,
+    /// Whether pixels unlike their neighbours are looked for, in the dark frames or else in the first 32, and filled from these. A point sharper than half a pixel
+    /// that never moves is taken for one.
+    pub bad_pixels: bool,
+    /// Whether fixed offsets of columns are looked for, in the dark frames or else in the first 32, and taken off. An upright edge longer than half the
+    /// frame's height that never moves is taken for one.
+    pub column_noise: bool,
+}
+
+impl SensorConfig {
+    /// Whether anything is mended.
+    pub fn is_active(&self) -> bool {
+        self.dark.is_some() || self.flat.is_some() || self.bad_pixels || self.column_noise
+    }
+}
