@@ -10,9 +10,11 @@
 
 mod finders;
 mod made;
+mod primed;
 mod read_ahead;
 mod scans;
 
+pub(crate) use self::primed::prime;
 use self::scans::Scans;
 use crate::track::Tracking;
 use crate::vision::Detector;
@@ -249,7 +251,8 @@ fn drive(
             }
             Ok(())
         }
-        Input::Frames(source, detector) => {
+        Input::Frames(source, mut detector) => {
+            let source = primed::primed(source, &mut *detector);
             let mut scans = Scans::of(source, detector, n_threads);
             let outcome = loop {
                 let made = match scans.next() {

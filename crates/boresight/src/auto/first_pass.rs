@@ -3,7 +3,7 @@
 //! The detector that made them goes on where they end, so a frame is detected once however often it is looked at.
 
 use crate::vision::{AtOnce, Detector};
-use crate::{Frame, Result, Scan, SourceInfo};
+use crate::{Frame, Result, Scan};
 use std::collections::VecDeque;
 
 /// A detector whose first scans were made ahead.
@@ -64,16 +64,10 @@ impl Detector for FirstPass {
     }
 }
 
-/// How many of at most `most` frames are read ahead within that memory.
-pub fn frames_ahead(info: &SourceInfo, most: usize, most_bytes: usize) -> usize {
-    let bytes = info.width.saturating_mul(info.height).saturating_mul(info.kind.bytes()).max(1);
-    most.min((most_bytes / bytes).max(2))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrameIndex, Image, PixelKind, Pixels};
+    use crate::{FrameIndex, Image, Pixels};
 
     /// Counts how often each frame was seen; refuses frame 3.
     struct Counting(std::sync::Arc<std::sync::Mutex<Vec<u64>>>);
@@ -110,22 +104,5 @@ mod tests {
             assert!(f.index.0 == 3 || scan.index == f.index);
         }
         assert_eq!(*seen.lock().unwrap(), [0, 1, 2, 3, 4]);
-    }
-
-    #[test]
-    fn memory_bounds_what_is_read_ahead() {
-        let info = |width, height, kind| SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width,
-            height,
-            kind,
-            n_frames: None,
-            rate_hz: None,
-            true_times: true,
-        };
-        assert_eq!(frames_ahead(&info(100, 100, PixelKind::Gray8), 50, 1 << 20), 50);
-        assert_eq!(frames_ahead(&info(100, 100, PixelKind::GrayF32), 50, 1 << 20), 26);
-        assert_eq!(frames_ahead(&info(60_000, 60_000, PixelKind::Rgb8), 50, 1 << 20), 2);
     }
 }

@@ -23,7 +23,6 @@ mod moving;
 mod noise;
 mod open;
 mod particles;
-mod replay;
 mod request;
 mod scene;
 mod score_statistics;
@@ -35,9 +34,9 @@ mod spots;
 mod spread;
 mod summed;
 
+pub use crate::io::Replay;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
 pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose};
-pub use replay::Replay;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

@@ -8,13 +8,13 @@
 
 use super::choose::{Choice, choose_seen};
 use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
-use super::first_pass::{FirstPass, frames_ahead};
-use super::replay::Replay;
+use super::first_pass::FirstPass;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
 use super::spots::{INITIATION_SCORE, WEAK_INITIATION_SCORE};
 use super::{first_scans, noise, speed};
+use crate::io::{MOST_BYTES, Replay, frames_ahead};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
@@ -22,9 +22,6 @@ use crate::{Config, Frame, FrameSource, Result, Scan};
 
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
-
-/// Most memory that the frames of the first pass take, bytes.
-const LEARN_BYTES: usize = 256 << 20;
 
 /// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
 const FEW_STILL: f64 = 3.0;
@@ -53,7 +50,7 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
         let source = config.input.mend(crate::io::open(input, &config.input.open_options())?)?;
         // A stream waits for nothing longer than the choice needs.
         let most = if second_look::can_be_opened_twice(input) { first_scans::MOST_SCANS } else { PROBE_FRAMES };
-        let n = frames_ahead(source.info(), most, LEARN_BYTES);
+        let n = frames_ahead(source.info(), most, MOST_BYTES);
         // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
         Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
@@ -80,7 +77,7 @@ pub fn read_and_choose(
 ) -> Result<(Replay, Choice)> {
     let info = source.info().clone();
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
-    let n = frames_ahead(&info, most, LEARN_BYTES);
+    let n = frames_ahead(&info, most, MOST_BYTES);
     let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
     let again = || again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
     let choice = choose_from(&mut frames, again, base, request)?;
@@ -113,7 +110,8 @@ fn probed(ahead: &[Frame]) -> &[Frame] {
 pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Box<dyn Detector>> {
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
-    let detector = crate::vision::build(&choice.config.detector, &info)?;
+    let mut detector = crate::vision::build(&choice.config.detector, &info)?;
+    crate::pipeline::prime(&mut *detector, frames);
     let mut pass = FirstPass::new(detector);
     let mut at_once = pass.at_once(request.n_threads());
     let mut taken = 0;

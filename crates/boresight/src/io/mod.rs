@@ -16,6 +16,7 @@ mod options;
 #[cfg(feature = "images")]
 mod pattern;
 mod pixels;
+mod replay;
 mod same_file;
 #[cfg(test)]
 mod same_rows;
@@ -43,6 +44,8 @@ pub use natural::natural_order;
 pub use open::{is_table, open};
 pub use options::{Colour, OpenOptions, RawFormat, RawType, StopFlag};
 pub use pixels::gray_of_rgb8;
+pub use replay::Replay;
+pub(crate) use replay::{MOST_BYTES, frames_ahead};
 pub use same_file::{is_same_file, refuse_to_overwrite};
 #[cfg(feature = "images")]
 pub use stack::gif::GifFrames;

@@ -54,6 +54,9 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
     })
 }
 
+/// Frames of the first seconds that a detector is shown beforehand, evenly spread: a median that five of them do not move.
+const PRIME_FRAMES: usize = 11;
+
 /// A detector that also says how the background moved.
 struct WithCamera {
     detector: Box<dyn Detector>,
@@ -65,6 +68,14 @@ impl Detector for WithCamera {
         self.detector.detect(frame, scan)?;
         scan.camera_motion = self.camera.step(&frame.pixels);
         Ok(())
+    }
+
+    fn prime_s(&self) -> f64 {
+        self.detector.prime_s()
+    }
+
+    fn prime(&mut self, frames: &[Frame]) -> Result<()> {
+        self.detector.prime(frames)
     }
 
     fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
@@ -97,6 +108,19 @@ impl<T: Pixel> Typed<T> {
         let is_summed = matches!(config.threshold, ThresholdConfig::Integrate(_));
         let fitter = config.centroid.fit.clone().filter(|_| !is_summed).map(Fitter::new);
         Ok(Self { filter, finder: finder(config)?, fitter })
+    }
+
+    /// Learns from frames, after the filter.
+    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        let Some((filter, filtered)) = &mut self.filter else { return self.finder.prime(frames) };
+        let filtered: Vec<Image<T>> = frames
+            .iter()
+            .map(|frame| {
+                filter.apply(frame, filtered);
+                filtered.clone()
+            })
+            .collect();
+        self.finder.prime(&filtered.iter().collect::<Vec<_>>())
     }
 
     /// Appends what is found; whether the frame was one in which nothing could be.
@@ -166,8 +190,11 @@ impl FrameDetector {
         scan.detections.clear();
         scan.camera_motion = None;
         scan.blind = false;
-        let fits = (frame.pixels.width(), frame.pixels.height()) == self.size && frame.pixels.kind() == self.kind;
-        if fits { Ok(()) } else { Err(self.refused(frame)) }
+        if self.fits(frame) { Ok(()) } else { Err(self.refused(frame)) }
+    }
+
+    fn fits(&self, frame: &Frame) -> bool {
+        (frame.pixels.width(), frame.pixels.height()) == self.size && frame.pixels.kind() == self.kind
     }
 
     /// Whether what is found in a frame depends on the frames before.
@@ -212,6 +239,44 @@ impl Detector for FrameDetector {
             follower.pick(out, self.size);
         }
         Ok(())
+    }
+
+    fn prime_s(&self) -> f64 {
+        match &self.by_pixel {
+            ByPixel::Gray8(d) | ByPixel::Rgb8(d, _) => d.finder.prime_s(),
+            ByPixel::Gray16(d) => d.finder.prime_s(),
+            ByPixel::GrayF32(d) => d.finder.prime_s(),
+        }
+    }
+
+    fn prime(&mut self, frames: &[Frame]) -> Result<()> {
+        if let Some(wrong) = frames.iter().find(|f| !self.fits(f)) {
+            return Err(self.refused(wrong));
+        }
+        let some: Vec<&Pixels> = (0..PRIME_FRAMES.min(frames.len()))
+            .map(|i| &frames[i * (frames.len() - 1) / (PRIME_FRAMES.min(frames.len()) - 1).max(1)].pixels)
+            .collect();
+        macro_rules! of_kind {
+            ($kind:ident) => {
+                some.iter()
+                    .filter_map(|p| if let Pixels::$kind(image) = p { Some(image) } else { None })
+                    .collect::<Vec<_>>()
+            };
+        }
+        match &mut self.by_pixel {
+            ByPixel::Gray8(d) => d.prime(&of_kind!(Gray8)),
+            ByPixel::Gray16(d) => d.prime(&of_kind!(Gray16)),
+            ByPixel::GrayF32(d) => d.prime(&of_kind!(GrayF32)),
+            ByPixel::Rgb8(d, _) => {
+                let grey = |image: &&Image<[u8; 3]>| {
+                    let mut grey = Image::default();
+                    grey_image(image, &mut grey);
+                    grey
+                };
+                let grey: Vec<Image<u8>> = of_kind!(Rgb8).iter().map(grey).collect();
+                d.prime(&grey.iter().collect::<Vec<_>>())
+            }
+        }
     }
 
     fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {

@@ -53,6 +53,18 @@ pub trait Detector: Send {
     /// A frame whose size or pixel type is not the one the detector was built for.
     fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()>;
 
+    /// Time from the first frame on that it is well to be shown before any of it is detected in, s; 0 for a detector that learns nothing from it.
+    fn prime_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Learns from the first frames.
+    /// # Errors
+    /// As [`Detector::detect`].
+    fn prime(&mut self, _frames: &[Frame]) -> Result<()> {
+        Ok(())
+    }
+
     /// Does of [`Detector::detect`] what must be done frame after frame; whether that was all. If not, [`Detector::finish`] of a [`Detector::twin`] does the rest.
     /// # Errors
     /// As [`Detector::detect`].

@@ -37,6 +37,14 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
         self.segmenter.remembers()
     }
 
+    fn prime_s(&self) -> f64 {
+        self.segmenter.prime_s()
+    }
+
+    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        self.segmenter.prime(frames)
+    }
+
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
         let alike = self.segmenter.weight() == PixelWeight::Alike;
         let above_background = match config.centroid.weight {

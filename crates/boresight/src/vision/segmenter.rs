@@ -6,7 +6,7 @@ use super::pixel::Pixel;
 use super::target_finder::TypedFrame;
 use super::threshold::BackgroundGrid;
 use super::threshold::band::words;
-use crate::Result;
+use crate::{Image, Result};
 
 /// What the value of a segmented pixel says about the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +50,18 @@ pub(super) trait Segmenter<T: Pixel>: Send {
     /// Whether what is segmented in a frame depends on the frames before.
     fn remembers(&self) -> bool {
         false
+    }
+
+    /// As [`super::target_finder::TargetFinder::prime_s`].
+    fn prime_s(&self) -> f64 {
+        0.0
+    }
+
+    /// As [`super::target_finder::TargetFinder::prime`].
+    /// # Errors
+    /// Frames of different sizes.
+    fn prime(&mut self, _frames: &[&Image<T>]) -> Result<()> {
+        Ok(())
     }
 
     /// Side of the cells of the local background that [`Self::segment`] compares with, px; nothing if it needs none.

@@ -30,6 +30,18 @@ pub(super) trait TargetFinder<T: Pixel>: Send {
     /// Whether what is found in a frame depends on the frames before.
     fn remembers(&self) -> bool;
 
+    /// Time from the first frame on that it is well to be shown beforehand, s.
+    fn prime_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Learns from some of the first frames, evenly spread.
+    /// # Errors
+    /// Frames of different sizes.
+    fn prime(&mut self, _frames: &[&Image<T>]) -> Result<()> {
+        Ok(())
+    }
+
     /// Whether nothing could be found in the last frame, whatever it shows.
     fn is_blind(&self) -> bool {
         false

@@ -23,7 +23,8 @@ pub struct BackgroundConfig {
     /// Time constant with which moving pixels that look like the background beside them enter it, s, above 0.
     pub ghost_time_s: f64,
     /// Time in which the background is learned at first, s, 0... : at its end every pixel's background becomes the median of
-    /// samples from this time, so that passing targets leave no trace. Before that it is a running mean.
+    /// samples from this time, so that passing targets leave no trace. A recording is read ahead for it; of a stream the
+    /// background is a running mean before.
     pub start_s: f64,
     /// Whether the light of the whole frame is followed at once (clouds, automatic exposure).
     pub follow_light: bool,

@@ -105,6 +105,20 @@ impl<T: BackgroundPixel> Background<T> {
     /// # Errors
     /// No frame, or frames of different sizes.
     pub fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        self.learn_from(frames, 0)
+    }
+
+    /// As [`Background::prime`], from the few frames of the start: their noise is averaged over pixels nearby.
+    pub(super) fn start_from(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        self.learn_from(frames, NOISE_REACH)
+    }
+
+    /// Time in which the background is learned at first, s; 0 if it knows one.
+    pub(super) fn start_s(&self) -> f64 {
+        if self.n_averaged == 0 { self.config.start_s } else { 0.0 }
+    }
+
+    fn learn_from(&mut self, frames: &[&Image<T>], reach: usize) -> Result<()> {
         let Some(first) = frames.first() else {
             return Err(Error::new(ErrorKind::Config, "expected at least one frame to learn the background from"));
         };
@@ -113,7 +127,7 @@ impl<T: BackgroundPixel> Background<T> {
             return Err(size_changed(w, h, other.width(), other.height()));
         }
         self.restart(w, h);
-        self.learn_median(frames, 0);
+        self.learn_median(frames, reach);
         Ok(())
     }
 

@@ -20,6 +20,14 @@ impl<T: Pixel> Segmenter<T> for Background<T> {
         true
     }
 
+    fn prime_s(&self) -> f64 {
+        self.start_s()
+    }
+
+    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+        self.start_from(frames)
+    }
+
     fn weight(&self) -> PixelWeight {
         PixelWeight::Alike
     }
