@@ -6,7 +6,7 @@
 use crate::{Scan, TrackState};
 
 /// Most scans and detections of the first pass: half a minute of most videos, or of a table; a guard of time and memory.
-pub const MOST_SCANS: usize = 1000;
+pub const MOST_SCANS: usize = crate::io::MOST_FRAMES;
 const MOST_DETECTIONS: usize = 2_000_000;
 
 /// The scans to learn from: the first ones, as many as the limits allow.

@@ -45,7 +45,7 @@ pub use open::{is_table, open};
 pub use options::{Colour, OpenOptions, RawFormat, RawType, StopFlag};
 pub use pixels::gray_of_rgb8;
 pub use replay::Replay;
-pub(crate) use replay::{MOST_BYTES, frames_ahead};
+pub(crate) use replay::{MOST_BYTES, MOST_FRAMES, frames_ahead};
 pub use same_file::{is_same_file, refuse_to_overwrite};
 #[cfg(feature = "images")]
 pub use stack::gif::GifFrames;

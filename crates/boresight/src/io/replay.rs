@@ -104,6 +104,9 @@ impl FrameSource for Replay {
     }
 }
 
+/// Most frames that are read ahead: half a minute of most videos. A run with a configuration and the choice that wrote it hold the same ones.
+pub(crate) const MOST_FRAMES: usize = 1000;
+
 /// Most memory that frames read ahead take, bytes.
 pub(crate) const MOST_BYTES: usize = 256 << 20;
 

@@ -2,12 +2,9 @@
 //!
 //! Limits: a stream is not held up, and a recording whose first seconds take too much memory is not read ahead; its background is learnt as it goes.
 
-use crate::io::{MOST_BYTES, Replay, frames_ahead};
+use crate::io::{MOST_BYTES, MOST_FRAMES, Replay, frames_ahead};
 use crate::vision::Detector;
 use crate::{FrameSource, SourceInfo};
-
-/// Most frames that are read ahead: three seconds of 300 frames each.
-const MOST_FRAMES: usize = 1000;
 
 /// Whether a detector wants to see the first seconds of such a source.
 fn wants(detector: &dyn Detector, info: &SourceInfo) -> bool {

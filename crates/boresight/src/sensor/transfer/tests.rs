@@ -98,7 +98,6 @@ fn motion_flicker_and_unequal_pixels_change_little() {
         let scene = Scene { light: busy, unequal, ..PLAIN };
         let curve = gather(&scene.frames(40, seed)).curve().unwrap();
         let line = curve.line.unwrap();
-        println!("{line:?}");
         assert!((line.slope / 2.3 - 1.0).abs() < 0.06, "{line:?} {:?}", curve.levels);
         // At 400 counts: 36 + 690.
         assert!(((line.intercept + 400.0 * line.slope) / 726.0 - 1.0).abs() < 0.06, "{line:?}");

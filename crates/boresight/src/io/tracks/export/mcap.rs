@@ -5,7 +5,7 @@
 //! holds the chunks' places and the counts. All sums of the standard are written.
 //! Limits: 65 535 channels; all messages in memory.
 
-use super::crc32::crc32;
+use crc32fast::hash as crc32;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Size from which a chunk is closed, bytes.

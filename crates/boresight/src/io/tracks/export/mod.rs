@@ -1,6 +1,5 @@
 //! Formats that are written for other programs and not read back.
 
-mod crc32;
 pub(super) mod cvat;
 pub(super) mod foxglove;
 pub(super) mod geff;

@@ -3,8 +3,8 @@
 //! Source: PKWARE, *.ZIP File Format Specification* 6.3.10, sections 4.3.7, 4.3.12, 4.3.16.
 //! Times are 1980-01-01, so that the same files give the same bytes. Limits: 4 GiB in all (no Zip64).
 
-use super::crc32::crc32;
 use crate::{Error, ErrorKind, Result};
+use crc32fast::hash as crc32;
 
 /// 1980-01-01 in the date of MS-DOS: year since 1980, month, day.
 const DATE: u16 = 1 << 5 | 1;
