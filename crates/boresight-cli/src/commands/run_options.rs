@@ -224,6 +224,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
             config = changed(config, args, tracker)?;
             let allowed = tracker.false_tracks_per_hour;
             auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons);
+            auto::report_whole(&mut config, &mut reasons);
         }
     }
     config = changed(config, args, tracker)?;

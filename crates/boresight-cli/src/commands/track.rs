@@ -97,7 +97,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
-    let mut observed = Observed::default();
+    let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
     let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, plan.config.detector.centroid.fit.is_some())?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));

@@ -67,6 +67,10 @@ impl TracksCsv {
 }
 
 impl Sink for TracksCsv {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.lines;
         out.clear();
