@@ -27,6 +27,8 @@ const EXAMPLES: &str = "Examples:
       one parameter changed, another filter
   boresight track detections.csv --rate-hz 30
       tracks from detections made elsewhere (also MOTChallenge det.txt)
+  boresight track det/det.txt --frames img1/
+      the same, drawn on its pictures
   boresight track flight.mp4 --also geff,cvat
       also for napari and CVAT
   boresight track rtsp://camera/stream --no-video
@@ -43,6 +45,9 @@ pub struct Args {
     /// Folder for the results; INPUT's name with `.tracks` if absent.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Pictures of a table of detections, to draw on: a folder, a quoted pattern or a video. MOTChallenge's frame 1 is 000001.jpg.
+    #[arg(long, value_name = "INPUT")]
+    frames: Option<String>,
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
@@ -87,9 +92,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let input = args.input.input.as_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
+    if let Some(frames) = &args.frames {
+        folder.spares(frames)?;
+    }
     let stop = Stop::on_signal()?;
     let opened = Instant::now();
-    let plan = run_options::plan(&args.input, &args.tracker)?;
+    let plan = run_options::plan(&args.input, &args.tracker, args.frames.as_deref())?;
     let looked = opened.elapsed();
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);

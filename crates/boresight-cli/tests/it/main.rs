@@ -8,6 +8,7 @@ mod help;
 mod interrupt;
 mod loss;
 mod outputs;
+mod pictures;
 mod sensor;
 mod streams;
 mod track;
