@@ -1,6 +1,7 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
 use super::also;
+use super::command_line;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
 use super::run_summary::RunSummary;
@@ -129,11 +130,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let verdict = observed.verdict(&settings, &done.summary);
     let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
+    let can_be_looked_at = args.input.config.is_none() && can_be_previewed(input);
+    let look = (verdict.is_to_be_looked_at && can_be_looked_at)
+        .then(|| format!("boresight preview {}", command_line::word(input)));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
         notes.verdict = Some((verdict.sentence.clone(), verdict.is_doubtful));
         notes.next = next.clone();
+        notes.look = look.clone();
         add_outcome(&mut notes, &done);
         if let Some(report) = report {
             done.unwritten.extend(report.write(&notes).err());
@@ -161,10 +166,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         say!("results: {}", folder.dir().display());
         say!("verdict: {}{}", if verdict.is_doubtful { "doubtful: " } else { "" }, verdict.sentence);
         if let Some(next) = next {
-            say!("try next: {}", command_with(&next));
+            say!("try next: {}", command_line::given_with(&next));
+        }
+        if let Some(look) = look {
+            say!("or look:  {look}");
         }
     }
     run_options::outcome(input, done)
+}
+
+/// Whether an input is frames on disk.
+fn can_be_previewed(input: &str) -> bool {
+    let on_disk = std::path::Path::new(input).exists() && !input.starts_with("/dev/");
+    (on_disk || (input.contains('*') && !input.contains("://"))) && !boresight::io::is_table(input)
 }
 
 /// Whether these options may stand beside those given.
@@ -177,19 +191,6 @@ fn can_be_added(args: &Args, options: &str) -> bool {
     } else {
         true
     }
-}
-
-/// The command that was given with more options, as a shell takes it.
-fn command_with(options: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
-    let mut command = String::from("boresight");
-    for word in std::env::args_os().skip(1) {
-        let word = word.to_string_lossy();
-        let is_plain = !word.is_empty() && word.chars().all(plain);
-        command.push(' ');
-        command.push_str(&if is_plain { word.into_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) });
-    }
-    format!("{command} {options}")
 }
 
 /// The files that a run with frames makes.

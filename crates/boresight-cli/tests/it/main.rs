@@ -9,6 +9,7 @@ mod interrupt;
 mod loss;
 mod outputs;
 mod pictures;
+mod preview;
 mod sensor;
 mod streams;
 mod track;

@@ -1,8 +1,8 @@
 //! A table of detections drawn on its pictures: which picture is which frame, what is missing, what does not fit.
 
 use crate::{run, run_ok, stderr};
-use boresight::io::OpenOptions;
 use boresight::Pixels;
+use boresight::io::OpenOptions;
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -7,6 +7,7 @@
 
 mod collect;
 mod consistency;
+mod contact_sheet;
 mod curves;
 mod notes;
 mod page;
@@ -15,5 +16,6 @@ mod sink;
 mod text;
 mod trajectories;
 
+pub use contact_sheet::{ContactSheet, SheetMark, SheetPicture, SheetRow};
 pub use notes::Notes;
 pub use sink::{HtmlReport, ReportSink};

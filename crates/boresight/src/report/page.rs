@@ -63,6 +63,7 @@ fn verdict(notes: &Notes) -> Markup {
         section class=(if *doubtful { "verdict doubtful" } else { "verdict" }) aria-label="Verdict" {
             p { strong { @if *doubtful { "Doubtful: " } } (printable(sentence)) }
             @if let Some(next) = &notes.next { p { "Try next the same command with " code { (printable(next)) } } }
+            @if let Some(look) = &notes.look { p { "See what each detector finds: " code { (printable(look)) } } }
         }
     }
 }

@@ -138,6 +138,7 @@ mod tests {
             input: evil.into(),
             verdict: Some((evil.into(), true)),
             next: Some(evil.into()),
+            look: Some(evil.into()),
             facts: vec![(evil.into(), evil.into())],
             settings: vec![evil.into()],
             configuration: Some(evil.into()),
