@@ -7,7 +7,7 @@ use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
 use super::run_summary::RunSummary;
 use crate::console::say;
 use crate::progress;
-use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder, Thumbnail};
+use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, Thumbnail};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
@@ -107,7 +107,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
     let mut observed = Observed::default();
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, plan.config.detector.centroid.fit.is_some())?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -130,7 +130,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let verdict = observed.verdict(&settings, &done.summary);
     let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
-    let can_be_looked_at = args.input.config.is_none() && can_be_previewed(input);
+    let can_be_looked_at = args.input.config.is_none() && is_on_disk(input);
     let look = (verdict.is_to_be_looked_at && can_be_looked_at)
         .then(|| format!("boresight preview {}", command_line::word(input)));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
@@ -176,7 +176,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Whether an input is frames on disk.
-fn can_be_previewed(input: &str) -> bool {
+fn is_on_disk(input: &str) -> bool {
     let on_disk = std::path::Path::new(input).exists() && !input.starts_with("/dev/");
     (on_disk || (input.contains('*') && !input.contains("://"))) && !boresight::io::is_table(input)
 }
@@ -211,8 +211,9 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, with_fits: bool) -> boresight::Result<Vec<Box<dyn Sink>>> {
+fn sinks(folder: &RunFolder, plan: &Plan, input: &str) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+    let with_fits = plan.config.detector.centroid.fit.is_some();
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(folder.path("tracks.csv"))?),
         Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits)),
@@ -226,15 +227,29 @@ fn sinks(folder: &RunFolder, with_fits: bool) -> boresight::Result<Vec<Box<dyn S
     }
     if folder.makes("annotated.mp4") {
         let path = folder.path("annotated.mp4");
-        sinks.push(Box::new(AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?));
+        let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?;
+        sinks.push(Box::new(video.with_colours(colours(plan, input))));
     }
     if folder.makes("frames/") {
-        sinks.push(Box::new(PngFolder::create(folder.path("frames/"), DrawOptions::default())?));
+        let pictures = PngFolder::create(folder.path("frames/"), DrawOptions::default())?;
+        sinks.push(Box::new(pictures.with_colours(colours(plan, input))));
     }
     if folder.makes("thumbnail.png") {
         sinks.push(Box::new(Thumbnail::create(folder.path("thumbnail.png"), DrawOptions::default())?));
     }
     Ok(sinks)
+}
+
+/// The colours of a file that is detected in as grey, unless it is asked for as grey or mended.
+fn colours(plan: &Plan, input: &str) -> Option<Colours> {
+    use boresight::{PixelKind, io::Colour, io::OpenOptions};
+    let own = &plan.config.input;
+    let is_grey = plan.info.as_ref().is_some_and(|i| i.kind != PixelKind::Rgb8);
+    if !is_grey || own.colour == Colour::Gray || own.sensor.is_active() || !is_on_disk(input) {
+        return None;
+    }
+    let options = OpenOptions { colour: Colour::Rgb, ..own.open_options() };
+    boresight::io::open(input, &options).ok().and_then(Colours::of)
 }
 
 /// What the report says of the input and the settings.
