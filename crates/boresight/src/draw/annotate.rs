@@ -9,9 +9,9 @@
 use super::canvas::{Canvas, Pen, Rgb};
 use super::colours::Colours;
 use super::labels::{Labels, Rect};
-use super::palette::track_colour;
 use super::text::Lettering;
 use super::tone::{Tone, legible_scale};
+use crate::palette::track_colour;
 use crate::{CameraMotion, Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
 use nalgebra::Vector2;
 use schemars::JsonSchema;

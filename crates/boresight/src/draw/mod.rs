@@ -6,18 +6,17 @@ mod annotated_video;
 mod canvas;
 mod colours;
 mod labels;
-mod palette;
 mod png_folder;
 mod text;
 mod thumbnail;
 mod tone;
 
+pub use crate::palette::track_colour;
 pub use annotate::{Annotator, DrawOptions};
 #[cfg(feature = "encode")]
 pub use annotated_video::AnnotatedVideo;
 pub use canvas::{Canvas, Pen, Rgb};
 pub use colours::Colours;
-pub use palette::track_colour;
 pub use png_folder::{PngFolder, write_png};
 pub use text::Lettering;
 pub use thumbnail::Thumbnail;

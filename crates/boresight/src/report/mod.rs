@@ -9,6 +9,8 @@ mod collect;
 mod consistency;
 mod contact_sheet;
 mod curves;
+mod ground;
+mod key_frames;
 mod notes;
 mod page;
 mod picture;

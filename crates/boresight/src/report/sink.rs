@@ -173,6 +173,29 @@ mod tests {
     }
 
     #[test]
+    fn a_track_has_one_colour_in_video_overview_table_and_curves() {
+        let html = report(20, 3, Notes::default());
+        let [r, g, b] = crate::palette::track_colour(crate::TrackId(3));
+        let colour = format!("#{r:02x}{g:02x}{b:02x}");
+        assert_eq!(data(&html)["tracks"].as_array().unwrap()[2]["colour"], colour);
+        for place in [format!("stroke=\"{colour}\" data-track=\"3\""), format!("background:{colour}")] {
+            assert!(html.contains(&place), "{place}");
+        }
+        // Key frames stand before everything else.
+        assert!(html.find("class=\"keys\"").unwrap() < html.find("Summary").unwrap());
+    }
+
+    #[test]
+    fn only_the_longest_twenty_are_drawn_at_first() {
+        let html = report(30, 25, Notes::default());
+        let of = |group: &str| html.matches(&format!("class=\"path {group} pick\"")).count();
+        assert_eq!((of("few"), of("many"), of("never")), (20, 5, 0));
+        assert!(
+            html.contains("all 25 tracks, not the 20 longest") && html.contains("class=\"view hide-many hide-never\"")
+        );
+    }
+
+    #[test]
     fn a_long_run_with_many_tracks_gives_a_page_of_bounded_size() {
         let html = report(9000, 80, Notes::default());
         assert!(html.len() < 6_000_000, "{}", html.len());

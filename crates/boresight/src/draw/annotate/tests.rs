@@ -1,3 +1,5 @@
+//! What is drawn, looked at pixel by pixel.
+
 use super::*;
 use crate::{Detection, Extent, Frame, FrameIndex, Pixels, Scan};
 use boresight_filters::Gaussian;
