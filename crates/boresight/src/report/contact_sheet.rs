@@ -12,6 +12,8 @@ use std::fmt::Write;
 
 /// Longest side of a picture in the page, px.
 const MOST_SIDE: usize = 480;
+/// More marks than this on one picture are drawn as dots: boxes would hide it.
+const CROWD: usize = 120;
 /// Least size of a mark as a share of the picture's width.
 const LEAST_SHARE: f64 = 0.02;
 
@@ -200,11 +202,12 @@ impl ContactSheet {
     fn cell(&self, i: usize, picture: &SheetPicture, row: &SheetRow) -> Markup {
         let marks = row.marks.get(i).map_or(&[][..], Vec::as_slice);
         let [w, h] = self.size_px;
-        let outline = outline(marks, w as f64);
+        let is_crowd = marks.len() > CROWD;
+        let outline = if is_crowd { dots(marks) } else { outline(marks, w as f64) };
         html! {
             figure class="cell" {
                 div class={ "moment p" (i) } role="img" aria-label={ "frame " (picture.frame) ", " (marks.len()) " detections" } {
-                    svg viewBox={ "-0.5 -0.5 " (w) " " (h) } preserveAspectRatio="none" {
+                    svg class=[is_crowd.then_some("crowd")] viewBox={ "-0.5 -0.5 " (w) " " (h) } preserveAspectRatio="none" {
                         path class="under" d=(outline) {}
                         path class="over" d=(outline) {}
                     }
@@ -217,6 +220,15 @@ impl ContactSheet {
 
 fn gain(row: &SheetRow) -> String {
     row.gain.map_or("none".to_string(), |g| if g.abs() < 0.5 { "0".to_string() } else { format!("{g:.0}") })
+}
+
+/// The middles of the marks as one path of SVG.
+fn dots(marks: &[SheetMark]) -> String {
+    let mut path = String::new();
+    for SheetMark([left, top, w, h]) in marks.iter().filter(|m| m.0.iter().all(|v| v.is_finite())) {
+        let _ = write!(path, "M{:.1} {:.1}h0", left + w / 2.0, top + h / 2.0);
+    }
+    path
 }
 
 /// The marks as one path of SVG.
@@ -296,6 +308,14 @@ mod tests {
         assert_eq!(around, "M9.4 19.4h10.3v6.3h-10.3z");
         let point = outline(&[SheetMark([30.0, 20.0, 0.0, 0.0]), SheetMark([f64::NAN; 4])], 1000.0);
         assert_eq!(point, "M20.0 10.0h20.0v20.0h-20.0z");
+    }
+
+    #[test]
+    fn many_marks_are_dots_so_that_the_picture_stays_in_sight() {
+        let mut many = sheet("a.mp4");
+        assert!(!many.html().contains("class=\"crowd\""));
+        many.rows[0].marks[0] = vec![SheetMark([10.0, 20.0, 4.0, 2.0]); CROWD + 1];
+        assert!(many.html().contains("class=\"crowd\"") && many.html().contains("M12.0 21.0h0M12.0 21.0h0"));
     }
 
     #[test]
