@@ -26,6 +26,8 @@ enum Command {
     /// Track what a camera or a stream shows while it happens: on a page, on a wire, in a record.
     #[cfg(feature = "live")]
     Live(Box<commands::live::Args>),
+    /// See what each detector finds in an input, on one page, before anything is run.
+    Preview(commands::preview::Args),
     /// Track many videos, each in a process of its own; go on after a kill; verify.
     Batch(commands::batch::Args),
     /// Detect what stands out in a video or an image sequence.
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
         Command::Track(args) => commands::track::run(args),
         #[cfg(feature = "live")]
         Command::Live(args) => commands::live::run_live(&args),
+        Command::Preview(args) => commands::preview::run(args),
         Command::Batch(args) => commands::batch::run(args),
         Command::Detect(args) => commands::detect::run(args),
         Command::Evaluate(args) => commands::evaluate::run(*args),

@@ -166,3 +166,27 @@ fn cells_keep_their_parents_and_a_missing_input_is_named() {
     assert_eq!(o.status.code(), Some(3));
     assert!(text(&o.stderr).contains("no-such.txt"), "{}", text(&o.stderr));
 }
+
+#[test]
+fn the_table_of_trackpy_holds_measured_rows_with_their_mass() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put(
+        "tracks.csv",
+        "frame,time_s,track_id,status,x_px,y_px,detection\n0,0,1,confirmed,5,6,1\n1,0.1,1,coasting,6,6,\n2,0.2,1,confirmed,7,6,0\n",
+    );
+    put("detections.csv", "frame,time_s,x_px,y_px,sum\n0,0,50,60,9\n0,0,5,6,30.5\n2,0.2,7,6,41\n");
+    let columns = |more: &[&str]| -> Vec<Vec<String>> {
+        let out = dir.path().join("p.csv");
+        let args = [dir.path().join("tracks.csv"), out.clone()];
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_boresight"));
+        let run = command.arg("convert").args(args).args(["--to", "trackpy"]).args(more).output().unwrap();
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let text = std::fs::read_to_string(out).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        let at = ["frame", "particle", "x", "y", "mass"].map(|n| rows[0].iter().position(|c| *c == n).expect(n));
+        rows[1..].iter().map(|r| at.iter().map(|i| r[*i].to_string()).collect()).collect()
+    };
+    assert_eq!(columns(&[]), [["0", "1", "5", "6", "30.5"], ["2", "1", "7", "6", "41"]]);
+    assert_eq!(columns(&["--predicted"])[1], ["1", "1", "6", "6", ""]);
+}

@@ -245,3 +245,15 @@ fn two_images_are_compared_by_the_numbers_of_the_worked_example() {
     assert_eq!(out.status.code(), Some(2));
     assert!(text(&out.stderr).contains("3 x 3") && text(&out.stderr).contains("2 x 2"), "{}", text(&out.stderr));
 }
+
+#[test]
+fn a_truth_whose_classes_are_words_is_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let rows = |class: &str| -> String { (0..20).map(|k| format!("{k},1,{},20,10,8{class}\n", 10 + k)).collect() };
+    let (truth, result) = (dir.path().join("gt.csv"), dir.path().join("tracks.csv"));
+    std::fs::write(&truth, format!("frame,id,bb_left,bb_top,bb_width,bb_height,class\n{}", rows(",DRONE"))).unwrap();
+    std::fs::write(&result, format!("frame,track_id,left,top,width,height\n{}", rows(""))).unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_boresight"));
+    let run = command.arg("evaluate").args([&truth, &result]).args(["--require", "MOTA=0.99"]).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}

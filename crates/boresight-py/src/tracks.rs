@@ -4,7 +4,7 @@ use crate::arrow;
 use crate::columns::{Columns, STATUS};
 use crate::config::PyConfig;
 use crate::errors::{OrRaise, raised, refused};
-use boresight::io::tracks::{Format, write_path};
+use boresight::io::tracks::{Dialect, Format, measured_rows, write_path};
 use boresight::io::{JsonLines, MotWriter, TRACKS_HEADER, TracksCsv};
 use boresight::pipeline::Summary;
 use boresight::report::{HtmlReport, Notes};
@@ -136,7 +136,11 @@ impl Tracks {
                     let Some(format) = all.find(|f| f.name() == other && *f != Format::Ctc) else {
                         return Ok(None);
                     };
-                    return write_path(&self.columns.table(&self.label, false)?, format, Some(&path)).map(Some);
+                    let mut table = self.columns.table(&self.label, false)?;
+                    if format == Format::Named(Dialect::Trackpy) {
+                        table = measured_rows(&table);
+                    }
+                    return write_path(&table, format, Some(&path)).map(Some);
                 }
             };
             self.columns.replay(sink.as_mut())?;

@@ -123,6 +123,10 @@ pub trait FrameSource: Send {
     fn want_only(&mut self, wanted: Wanted) {
         drop(wanted);
     }
+    /// Numbers of the frames at which it can go on without reading those before, where frames that nobody wants are passed over; none if it must read them all.
+    fn entries(&self) -> Vec<u64> {
+        Vec::new()
+    }
     /// Whether it reads on a thread of its own already, ahead of the caller.
     fn reads_ahead(&self) -> bool {
         false

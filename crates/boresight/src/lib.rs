@@ -80,6 +80,8 @@ pub mod fuse;
 mod image;
 pub mod io;
 pub mod metrics;
+#[cfg(any(feature = "draw", feature = "report"))]
+mod palette;
 pub mod pipeline;
 mod record;
 #[cfg(feature = "report")]

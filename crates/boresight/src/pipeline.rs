@@ -35,6 +35,9 @@ pub enum Input {
     Frames(Box<dyn FrameSource>, Box<dyn Detector>),
     /// Detections made before, in time order.
     Scans(Vec<Scan>),
+    /// Detections made before, and a frame for each of them, to be drawn on: all are tracked before the first is shown, so that the tracks are those of the
+    /// detections alone however many frames fit into memory.
+    Pictured(Box<dyn FrameSource>, Vec<Scan>),
 }
 
 opaque_debug!(Input);
@@ -120,22 +123,43 @@ fn drive(
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
 ) -> Result<()> {
     // Whether there is more to be done.
-    let mut next = |run: &mut Run<'_, '_>, scans: Option<&mut Scans>| {
-        if run.give_out(false, scans).is_break() {
-            return ControlFlow::Break(());
-        }
-        run.summary.interrupted = go_on(run.summary).is_break();
-        if run.summary.interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let mut asked = |summary: &mut Summary| {
+        let answer = go_on(summary);
+        summary.interrupted = answer.is_break();
+        answer
     };
     match input {
         Input::Scans(scans) => {
             for scan in scans {
                 run.track(None, 0, scan);
-                if next(&mut run, None).is_break() {
+                if run.give_out(false, None).is_break() || asked(run.summary).is_break() {
                     break;
                 }
             }
             let _ = run.give_out(true, None);
+            Ok(())
+        }
+        Input::Pictured(mut pictures, scans) => {
+            let mut tracked = Vec::with_capacity(scans.len());
+            for scan in scans {
+                run.track(None, 0, scan);
+                tracked.extend(std::iter::from_fn(|| run.held.pop(false)));
+            }
+            tracked.extend(std::iter::from_fn(|| run.held.pop(true)));
+            run.summary.frames = 0;
+            for held in tracked {
+                let started = Instant::now();
+                let frame = pictures.next_frame();
+                run.summary.times.read += started.elapsed();
+                run.summary.warnings.clear();
+                run.summary.warnings.extend_from_slice(pictures.warnings());
+                let frame = frame?.filter(|f| f.index == held.scan.index);
+                run.summary.frames += 1;
+                if run.put(frame.as_ref(), &held).is_break() || asked(run.summary).is_break() {
+                    break;
+                }
+                frame.into_iter().for_each(|f| pictures.recycle(f));
+            }
             Ok(())
         }
         Input::Frames(source, mut detector) => {
@@ -162,7 +186,7 @@ fn drive(
                     None
                 };
                 run.track(frame, bytes, made.scan);
-                if next(&mut run, Some(&mut scans)).is_break() {
+                if run.give_out(false, Some(&mut scans)).is_break() || asked(run.summary).is_break() {
                     break Ok(());
                 }
             };
@@ -215,13 +239,20 @@ impl Run<'_, '_> {
         }
     }
 
+    /// Gives every sink a scan with its tracks; breaks when no sink is left.
+    fn put(&mut self, frame: Option<&Frame>, held: &Held) -> ControlFlow<()> {
+        let started = Instant::now();
+        let written = self.outputs.put(&View { frame, scan: &held.scan, tracks: &held.tracks });
+        self.summary.times.write += started.elapsed();
+        self.counts.add(&held.tracks, self.summary);
+        written
+    }
+
     /// Gives every sink the scans that need not wait any longer, or all of them; breaks when no sink is left.
     fn give_out(&mut self, all: bool, mut scans: Option<&mut Scans>) -> ControlFlow<()> {
-        while let Some(Held { frame, scan, tracks, .. }) = self.held.pop(all) {
-            let started = Instant::now();
-            let written = self.outputs.put(&View { frame: frame.as_ref(), scan: &scan, tracks: &tracks });
-            self.summary.times.write += started.elapsed();
-            self.counts.add(&tracks, self.summary);
+        while let Some(held) = self.held.pop(all) {
+            let written = self.put(held.frame.as_ref(), &held);
+            let Held { frame, scan, tracks, .. } = held;
             self.held.recycle(tracks);
             match (frame, &mut scans) {
                 (Some(frame), Some(scans)) => scans.recycle(frame, scan),

@@ -70,6 +70,8 @@ pub struct Verdict {
     pub is_doubtful: bool,
     /// Options of `boresight track` to try next.
     pub next: Option<String>,
+    /// Whether a look at what each detector finds (`boresight preview`) may help to choose another one.
+    pub is_to_be_looked_at: bool,
 }
 
 /// Counts what a verdict needs; writes nothing.
@@ -147,7 +149,12 @@ impl Observed {
     pub fn verdict(&self, config: &Config, summary: &Summary) -> Verdict {
         let mut all = self.clone();
         std::mem::take(&mut all.lives).values().for_each(|life| all.end(life));
-        let doubt = |sentence: String, next: Option<String>| Verdict { sentence, is_doubtful: true, next };
+        let doubt = |sentence: String, next: Option<String>| {
+            // Another detector is a matter of looking, another parameter is not.
+            let is_to_be_looked_at =
+                summary.detections == 0 || next.as_ref().is_some_and(|n| n.starts_with("--detector"));
+            Verdict { sentence, is_doubtful: true, next, is_to_be_looked_at }
+        };
         let frames = counted(summary.frames, "frame");
         if summary.detections == 0 {
             return doubt(format!("no track: nothing was detected in {frames}."), more_sensitive(config));
@@ -215,7 +222,12 @@ impl Observed {
                 _ => format!("; the covariances are {words} (mean NIS {n:.2}, 2 is honest)"),
             }
         });
-        Verdict { sentence: format!("{}{honest}.", self.found(mean_s, summary)), is_doubtful: false, next: None }
+        Verdict {
+            sentence: format!("{}{honest}.", self.found(mean_s, summary)),
+            is_doubtful: false,
+            next: None,
+            is_to_be_looked_at: false,
+        }
     }
 
     /// What was found, without the opinion.
@@ -336,6 +348,7 @@ mod tests {
         let doubted = |v: Verdict, word: &str, next: &str| {
             assert!(v.is_doubtful && v.sentence.contains(word), "{v:?}");
             assert_eq!(v.next.as_deref(), Some(next), "{v:?}");
+            assert_eq!(v.is_to_be_looked_at, next.starts_with("--detector"), "{v:?}");
         };
         let [all, moving] = [Report::All, Report::Moving].map(isolated);
         doubted(run(&all, 0, |_| vec![]), "nothing was detected in 100 frames", "--detector cfar");

@@ -1,5 +1,6 @@
 //! The formats of other programs that `track --also` writes beside its own tables, made of the finished `tracks.csv`.
 
+use super::convert::of_trackpy;
 use super::run_folder::RunFolder;
 use crate::console::say;
 use boresight::io::tracks::{Dialect, Format, ReadOptions, read, write_path};
@@ -41,7 +42,13 @@ pub fn write(folder: &RunFolder, names: &[&'static str], size_px: Option<[u32; 2
     };
     file.table.size_px = size_px;
     let one = |&(format, name): &(Format, &str)| -> Result<()> {
-        let dropped = write_path(&file.table, format, Some(&folder.path(name)))?;
+        let dropped = match format {
+            Format::Named(Dialect::Trackpy) => {
+                let table = of_trackpy(file.table.clone(), &folder.path("tracks.csv"), false, quiet);
+                write_path(&table, format, Some(&folder.path(name)))?
+            }
+            _ => write_path(&file.table, format, Some(&folder.path(name)))?,
+        };
         if !dropped.is_empty() && !quiet {
             say!("note: {} does not hold: {}", format.name(), dropped.join(", "));
         }

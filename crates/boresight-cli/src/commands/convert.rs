@@ -2,9 +2,12 @@
 
 use crate::console::{self, say};
 use boresight::io::refuse_to_overwrite;
-use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc_write, read, write, write_path};
-use boresight::{Error, ErrorKind};
-use std::path::PathBuf;
+use boresight::io::tracks::{
+    Dialect, Format, ReadOptions, TrackFile, add_mass, ctc_write, measured_rows, read, write, write_path,
+};
+use boresight::io::{TableOptions, read_detections};
+use boresight::{Error, ErrorKind, TrackTable};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Converts a table of tracks into another format.
@@ -17,6 +20,7 @@ stays the same place.",
   boresight convert out/tracks.csv result.txt --to mot         for a MOTChallenge evaluation
   boresight convert 0006.txt cars.csv --to csv                 KITTI labels, all columns kept
   boresight convert spots.csv RES --to ctc --size 1024x1024    a folder of label images and res_track.txt
+  boresight convert out/tracks.csv p.csv --to trackpy          measured rows with mass; --predicted keeps the others
   boresight convert out/tracks.csv tracks.geff --to geff       a graph with covariance ellipsoids, for napari and others
   boresight convert gt.txt - --to trackpy --lossless           fails if a column would be lost"
 )]
@@ -43,6 +47,9 @@ pub struct Args {
     /// Size of the frames as WIDTHxHEIGHT, px, for ctc, cvat and vmti; without it they reach to the last row.
     #[arg(long, value_parser = super::evaluate::size)]
     size: Option<(f64, f64)>,
+    /// Keep rows that were only predicted in trackpy's table, which holds measured ones.
+    #[arg(long)]
+    predicted: bool,
     /// Fail if anything would be lost.
     #[arg(long)]
     lossless: bool,
@@ -63,6 +70,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     if file.bad.without_track > 0 {
         say!("note: {} rows belong to no track and were left out", file.bad.without_track);
+    }
+    if args.to == Format::Named(Dialect::Trackpy) {
+        file.table = of_trackpy(file.table, &args.input, args.predicted, false);
     }
     let to_stdout = args.output.as_os_str() == "-";
     if args.to.is_folder() && (to_stdout || args.output.is_file()) {
@@ -110,6 +120,28 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.to.name()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// A run's table as trackpy would have it: measured rows, unless predicted ones are asked for, with the mass that `detections.csv` beside it says.
+pub fn of_trackpy(mut table: TrackTable, path: &Path, predicted: bool, quiet: bool) -> TrackTable {
+    let names_detections = (0..table.n_rows()).any(|r| table.states.detection.get(r).is_some());
+    if names_detections {
+        let beside = path.with_file_name("detections.csv");
+        let found = read_detections(&beside, &TableOptions::default());
+        let has_mass = found.is_ok_and(|d| add_mass(&mut table, &d.scans));
+        if !has_mass && !quiet {
+            say!("note: no column mass: {} does not say it", beside.display());
+        }
+    }
+    if predicted {
+        return table;
+    }
+    let measured = measured_rows(&table);
+    let n = table.n_rows() - measured.n_rows();
+    if n > 0 && !quiet {
+        say!("note: {n} predicted rows are left out");
+    }
+    measured
 }
 
 /// Writes a folder of label images.

@@ -31,7 +31,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         boresight::io::refuse_to_overwrite(&args.input.input, [path.as_path()])?;
     }
     let stop = Stop::on_signal()?;
-    let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
+    let plan = run_options::plan(&args.input, &TrackerArgs::default(), None)?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
     let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some());
     if !args.input.quiet {

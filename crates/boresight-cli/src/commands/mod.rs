@@ -2,6 +2,7 @@
 
 mod also;
 pub mod batch;
+mod command_line;
 pub mod completions;
 pub mod config;
 pub mod convert;
@@ -10,6 +11,7 @@ pub mod evaluate;
 pub mod fuse;
 #[cfg(feature = "live")]
 pub mod live;
+pub mod preview;
 pub mod reproduce;
 mod run_folder;
 mod run_options;

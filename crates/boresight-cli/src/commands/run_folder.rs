@@ -54,10 +54,17 @@ impl RunFolder {
                 .hint("give a folder; `boresight detect INPUT -o -` writes a table to standard output"));
         }
         let folder = Self { dir, made };
-        let outputs: Vec<PathBuf> = folder.made.iter().map(|name| folder.path(name)).collect();
-        boresight::io::refuse_to_overwrite(input, outputs.iter().map(PathBuf::as_path))
-            .map_err(|e| e.hint("give a folder of its own with --output DIR"))?;
+        folder.spares(input)?;
         Ok(folder)
+    }
+
+    /// Refuses an input in the place of an output.
+    /// # Errors
+    /// [`ErrorKind::Output`] that names both.
+    pub fn spares(&self, input: &str) -> boresight::Result<()> {
+        let outputs: Vec<PathBuf> = self.made.iter().map(|name| self.path(name)).collect();
+        boresight::io::refuse_to_overwrite(input, outputs.iter().map(PathBuf::as_path))
+            .map_err(|e| e.hint("give a folder of its own with --output DIR"))
     }
 
     /// Takes back names: detections from elsewhere have no pictures to draw on.

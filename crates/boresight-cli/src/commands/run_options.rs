@@ -4,6 +4,7 @@ use crate::console::say;
 use anyhow::Context;
 use boresight::FrameSource as _;
 use boresight::auto;
+use boresight::io::{Pictures, SequenceInfo};
 use boresight::pipeline::{Input, Outcome};
 use boresight::{Config, Error, ErrorKind, vision};
 use std::ops::ControlFlow;
@@ -97,8 +98,8 @@ impl Plan {
     }
 }
 
-/// Opens the input and settles the configuration.
-pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
+/// Opens the input and settles the configuration; `frames` are the pictures of a table.
+pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> anyhow::Result<Plan> {
     if let Some(mb) = args.max_memory {
         boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
     }
@@ -137,7 +138,13 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         base = base.with(set)?;
     }
     if boresight::io::is_table(&args.input) {
-        return plan_table(args, tracker, given, base);
+        return plan_table(args, tracker, given, base, frames);
+    }
+    if let Some(frames) = frames {
+        return Err(Error::new(ErrorKind::Config, "only a table of detections needs pictures beside it")
+            .at(format!("--frames {frames}"))
+            .hint("leave --frames out: the input is frames itself")
+            .into());
     }
     if given.is_some() {
         let source = base.input.mend(boresight::io::open(&args.input, &base.input.open_options())?)?;
@@ -194,8 +201,22 @@ fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyho
     Ok(config)
 }
 
-fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, base: Config) -> anyhow::Result<Plan> {
+fn plan_table(
+    args: &InputArgs,
+    tracker: &TrackerArgs,
+    given: Option<Config>,
+    base: Config,
+    frames: Option<&str>,
+) -> anyhow::Result<Plan> {
     let mut base = base;
+    let sequence = SequenceInfo::beside(Path::new(&args.input));
+    if let Some(frames) = frames.filter(|_| given.is_none() && args.rate_hz.is_none()) {
+        // A table that says nothing of time is as fast as the video it was made from.
+        let info = boresight::io::open(frames, &base.input.open_options())?.info().clone();
+        if let Some(rate) = info.rate_hz.filter(|_| info.true_times) {
+            base.input.rate_hz = rate;
+        }
+    }
     let options = &mut base.input.table;
     if let Some(columns) = &args.columns {
         options.columns = boresight::io::Columns::parse(columns)?;
@@ -229,7 +250,21 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
     }
     config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);
-    Ok(Plan { input: Input::Scans(table.scans), config, reasons, lost: table.lost, info: None, n_scans })
+    let (input, info) = match frames {
+        Some(frames) => {
+            let pictures = Pictures::open(frames, &config.input.open_options(), &table, &sequence)?;
+            let info = pictures.info().clone();
+            reasons.push(format!("Drawn on the pictures of {frames}, read as {}.", info.reader));
+            (Input::Pictured(Box::new(pictures), table.scans), Some(info))
+        }
+        None => {
+            reasons.extend(
+                sequence.pictures.map(|p| format!("Its pictures are at hand: --frames {} draws on them.", p.display())),
+            );
+            (Input::Scans(table.scans), None)
+        }
+    };
+    Ok(Plan { input, config, reasons, lost: table.lost, info, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.

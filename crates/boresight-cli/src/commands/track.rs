@@ -1,12 +1,13 @@
 //! `boresight track`: frames (or detections) in, tracks out.
 
 use super::also;
+use super::command_line;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
 use super::run_summary::RunSummary;
 use crate::console::say;
 use crate::progress;
-use boresight::draw::{AnnotatedVideo, DrawOptions, PngFolder, Thumbnail};
+use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, Thumbnail};
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
@@ -27,6 +28,8 @@ const EXAMPLES: &str = "Examples:
       one parameter changed, another filter
   boresight track detections.csv --rate-hz 30
       tracks from detections made elsewhere (also MOTChallenge det.txt)
+  boresight track det/det.txt --frames img1/
+      the same, drawn on its pictures
   boresight track flight.mp4 --also geff,cvat
       also for napari and CVAT
   boresight track rtsp://camera/stream --no-video
@@ -43,6 +46,9 @@ pub struct Args {
     /// Folder for the results; INPUT's name with `.tracks` if absent.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Pictures of a table of detections, to draw on: a folder, a quoted pattern or a video. MOTChallenge's frame 1 is 000001.jpg.
+    #[arg(long, value_name = "INPUT")]
+    frames: Option<String>,
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
@@ -87,9 +93,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let input = args.input.input.as_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
+    if let Some(frames) = &args.frames {
+        folder.spares(frames)?;
+    }
     let stop = Stop::on_signal()?;
     let opened = Instant::now();
-    let plan = run_options::plan(&args.input, &args.tracker)?;
+    let plan = run_options::plan(&args.input, &args.tracker, args.frames.as_deref())?;
     let looked = opened.elapsed();
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
@@ -98,7 +107,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
     let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, plan.config.detector.centroid.fit.is_some())?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -121,11 +130,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     let verdict = observed.verdict(&settings, &done.summary);
     let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
+    let can_be_looked_at = args.input.config.is_none() && is_on_disk(input);
+    let look = (verdict.is_to_be_looked_at && can_be_looked_at)
+        .then(|| format!("boresight preview {}", command_line::word(input)));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
         notes.verdict = Some((verdict.sentence.clone(), verdict.is_doubtful));
         notes.next = next.clone();
+        notes.look = look.clone();
         add_outcome(&mut notes, &done);
         if let Some(report) = report {
             done.unwritten.extend(report.write(&notes).err());
@@ -153,10 +166,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         say!("results: {}", folder.dir().display());
         say!("verdict: {}{}", if verdict.is_doubtful { "doubtful: " } else { "" }, verdict.sentence);
         if let Some(next) = next {
-            say!("try next: {}", command_with(&next));
+            say!("try next: {}", command_line::given_with(&next));
+        }
+        if let Some(look) = look {
+            say!("or look:  {look}");
         }
     }
     run_options::outcome(input, done)
+}
+
+/// Whether an input is frames on disk.
+fn is_on_disk(input: &str) -> bool {
+    let on_disk = std::path::Path::new(input).exists() && !input.starts_with("/dev/");
+    (on_disk || (input.contains('*') && !input.contains("://"))) && !boresight::io::is_table(input)
 }
 
 /// Whether these options may stand beside those given.
@@ -169,19 +191,6 @@ fn can_be_added(args: &Args, options: &str) -> bool {
     } else {
         true
     }
-}
-
-/// The command that was given with more options, as a shell takes it.
-fn command_with(options: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
-    let mut command = String::from("boresight");
-    for word in std::env::args_os().skip(1) {
-        let word = word.to_string_lossy();
-        let is_plain = !word.is_empty() && word.chars().all(plain);
-        command.push(' ');
-        command.push_str(&if is_plain { word.into_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) });
-    }
-    format!("{command} {options}")
 }
 
 /// The files that a run with frames makes.
@@ -202,8 +211,9 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, with_fits: bool) -> boresight::Result<Vec<Box<dyn Sink>>> {
+fn sinks(folder: &RunFolder, plan: &Plan, input: &str) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+    let with_fits = plan.config.detector.centroid.fit.is_some();
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         Box::new(TracksCsv::create(folder.path("tracks.csv"))?),
         Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits)),
@@ -217,15 +227,29 @@ fn sinks(folder: &RunFolder, with_fits: bool) -> boresight::Result<Vec<Box<dyn S
     }
     if folder.makes("annotated.mp4") {
         let path = folder.path("annotated.mp4");
-        sinks.push(Box::new(AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?));
+        let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?;
+        sinks.push(Box::new(video.with_colours(colours(plan, input))));
     }
     if folder.makes("frames/") {
-        sinks.push(Box::new(PngFolder::create(folder.path("frames/"), DrawOptions::default())?));
+        let pictures = PngFolder::create(folder.path("frames/"), DrawOptions::default())?;
+        sinks.push(Box::new(pictures.with_colours(colours(plan, input))));
     }
     if folder.makes("thumbnail.png") {
         sinks.push(Box::new(Thumbnail::create(folder.path("thumbnail.png"), DrawOptions::default())?));
     }
     Ok(sinks)
+}
+
+/// The colours of a file that is detected in as grey, unless it is asked for as grey or mended.
+fn colours(plan: &Plan, input: &str) -> Option<Colours> {
+    use boresight::{PixelKind, io::Colour, io::OpenOptions};
+    let own = &plan.config.input;
+    let is_grey = plan.info.as_ref().is_some_and(|i| i.kind != PixelKind::Rgb8);
+    if !is_grey || own.colour == Colour::Gray || own.sensor.is_active() || !is_on_disk(input) {
+        return None;
+    }
+    let options = OpenOptions { colour: Colour::Rgb, ..own.open_options() };
+    boresight::io::open(input, &options).ok().and_then(Colours::of)
 }
 
 /// What the report says of the input and the settings.

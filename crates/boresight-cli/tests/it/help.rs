@@ -45,3 +45,14 @@ fn detect_offers_nothing_that_only_tracks_have() {
     let text = stdout(&run_ok(["detect", "--help"]));
     assert!(!text.contains("--filter") && !text.contains("--associator"), "{text}");
 }
+
+#[test]
+fn the_help_of_evaluate_begins_with_the_usual() {
+    let text = stdout(&run_ok(["evaluate", "--help"]));
+    let at = |word: &str| text.find(word).unwrap_or_else(|| panic!("{word}: {text}"));
+    let (reading, measures) = (at("How tables are read:"), at("Parameters of measures:"));
+    for usual in ["--match", "--threshold", "--distance", "--compare", "--require", "--mot-only", "--html", "--csv"] {
+        assert!(at(&format!("      {usual}")) < reading, "{usual}");
+    }
+    assert!(reading < at("--truth-format") && at("--truth-format") < measures && measures < at("--switch-cost"));
+}

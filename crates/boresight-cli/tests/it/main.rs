@@ -8,6 +8,8 @@ mod help;
 mod interrupt;
 mod loss;
 mod outputs;
+mod pictures;
+mod preview;
 mod sensor;
 mod streams;
 mod track;

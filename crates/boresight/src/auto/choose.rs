@@ -35,7 +35,28 @@ pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choi
 /// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
 pub(super) fn choose_seen(
     frames: &[Frame],
-    mut scene: Scene,
+    scene: Scene,
+    second: &[Frame],
+    info: &SourceInfo,
+    base: &Config,
+    request: &Request,
+) -> Result<Choice> {
+    choose_looked(frames, &looked_again(scene, second, info)?, second, info, base, request)
+}
+
+/// What the frames of the second look show as a whole, if there are any, on the ground of the first ones.
+pub(super) fn looked_again(scene: Scene, second: &[Frame], info: &SourceInfo) -> Result<Scene> {
+    let Some(frame) = second.first() else { return Ok(scene) };
+    let mut seen = scene::look(second, &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
+    // The ground is that of the first frames, whose order and gaps motion is told by.
+    seen.ground = scene.ground;
+    Ok(seen)
+}
+
+/// As [`choose_seen`], where the scene is that of the second look already.
+pub(super) fn choose_looked(
+    frames: &[Frame],
+    scene: &Scene,
     second: &[Frame],
     info: &SourceInfo,
     base: &Config,
@@ -60,21 +81,15 @@ pub(super) fn choose_seen(
         if info.true_times { "the file's times" } else { "no times in the input: the given rate" },
         if n_looked == 1 { "frame" } else { "frames" },
     ));
-    if let Some(frame) = second.first() {
-        // The ground is that of the first frames, whose order and gaps motion is told by.
-        let ground = std::mem::take(&mut scene.ground);
-        scene = scene::look(second, &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
-        scene.ground = ground;
-    }
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
     if let Some(kind) = request.detector {
-        asked::configure(kind, frames, second, &scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
-    } else if let Some(reference) = coloured.then(|| colour::look(second, &scene)).flatten() {
+        asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
+    } else if let Some(reference) = coloured.then(|| colour::look(second, scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
-    } else if let Some(explained) = moving::look(looked, &scene, info, n_threads)? {
-        moving::configure(&scene, explained, info, &mut config, &mut reasons);
-    } else if let Some(seen) = particles::look(frames, &scene, info, n_threads)? {
+    } else if let Some(explained) = moving::look(looked, scene, info, n_threads)? {
+        moving::configure(scene, explained, info, &mut config, &mut reasons);
+    } else if let Some(seen) = particles::look(frames, scene, info, n_threads)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
         let cells = cells::look(frames, info, n_threads)?;

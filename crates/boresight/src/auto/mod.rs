@@ -23,6 +23,8 @@ mod moving;
 mod noise;
 mod open;
 mod particles;
+#[cfg(feature = "report")]
+mod preview;
 mod request;
 mod scene;
 mod score_statistics;
@@ -38,5 +40,7 @@ pub use crate::io::Replay;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
 pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose, report_whole};
+#[cfg(feature = "report")]
+pub use preview::preview;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

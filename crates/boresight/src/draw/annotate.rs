@@ -1,22 +1,35 @@
-//! What is drawn on a frame: detections, tracks with box, number, fading trail and 95 % ellipse, and a line of facts.
+//! What is drawn on a frame: detections that no track took, tracks with box, number, fading trail and 95 % ellipse, and a line of facts.
 //!
-//! Confirmed tracks have a solid box, coasting ones a dashed box, tentative ones a thin dashed box without a number.
-//! Ellipses hold the true position with 95 %: k² = 5.991, the chi-square quantile with 2 degrees of freedom.
+//! Confirmed tracks have a solid box, coasting ones a dashed box, tentative ones (if asked for) a thin dashed box without a number. Large boxes are drawn
+//! first, small ones above them; labels stand where they cover nothing ([`super::labels`]). Above [`CROWD`] tracks only dots and trails are drawn.
+//! Text and lines grow with the picture's height.
+//! Ellipses hold the true position with 95 %: k² = 5.991, the chi-square quantile with 2 degrees of freedom; one longer than [`MOST_ELLIPSE`] of the
+//! picture says nothing that can be read, and is left out.
 
 use super::canvas::{Canvas, Pen, Rgb};
-use super::palette::track_colour;
+use super::colours::Colours;
+use super::labels::{Labels, Rect};
 use super::text::Lettering;
 use super::tone::{Tone, legible_scale};
+use crate::palette::track_colour;
 use crate::{CameraMotion, Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Standard deviations of the 95 % ellipse: sqrt(5.991), chi-square, 2 degrees of freedom.
 const SIGMAS_95: f64 = 2.4477;
 /// Most points of a trail; older ones are dropped.
 const MAX_TRAIL: usize = 512;
+/// More tracks at once than this are drawn as dots with trails.
+const CROWD: usize = 60;
+/// Longest half axis of an ellipse as a share of the picture's shorter side.
+const MOST_ELLIPSE: f64 = 0.08;
+/// Opacity of a trail's oldest and newest piece.
+const TRAIL_ALPHA: [f32; 2] = [0.25, 1.0];
+/// A dark edge keeps lines in sight on ground of their own brightness: its opacity.
+const EDGE_ALPHA: f32 = 0.5;
 
 /// What is drawn, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,7 +39,7 @@ pub struct DrawOptions {
     pub scale: u32,
     /// Length of the trails, s, 0..=3600; 0 draws none.
     pub trail_s: f64,
-    /// Whether detections are marked with a small cross.
+    /// Whether detections that no track took are marked with a small cross.
     pub detections: bool,
     /// Whether tracks that are not confirmed yet are drawn.
     pub tentative: bool,
@@ -46,7 +59,7 @@ impl Default for DrawOptions {
             scale: 0,
             trail_s: 2.0,
             detections: true,
-            tentative: true,
+            tentative: false,
             ellipses: true,
             boxes: true,
             labels: true,
@@ -84,6 +97,10 @@ pub struct Annotator {
     lettering: Option<(f32, Lettering)>,
     trails: BTreeMap<TrackId, Trail>,
     points: Vec<(f64, f64)>,
+    labels: Labels,
+    /// Place of each label in the frame before.
+    places: BTreeMap<TrackId, usize>,
+    colours: Option<Colours>,
 }
 
 opaque_debug!(Annotator);
@@ -104,7 +121,21 @@ impl Annotator {
     /// [`ErrorKind::Config`] if an option is out of range.
     pub fn new(options: DrawOptions) -> Result<Self> {
         options.validate("draw")?;
-        Ok(Self { options, tone: Tone::default(), lettering: None, trails: BTreeMap::new(), points: Vec::new() })
+        Ok(Self {
+            options,
+            tone: Tone::default(),
+            lettering: None,
+            trails: BTreeMap::new(),
+            points: Vec::new(),
+            labels: Labels::default(),
+            places: BTreeMap::new(),
+            colours: None,
+        })
+    }
+
+    /// Draws on the same frames in colour from now on, where they can be had.
+    pub fn set_colours(&mut self, colours: Option<Colours>) {
+        self.colours = colours;
     }
 
     /// Draws a view into `out`, which is made as large as needed.
@@ -120,32 +151,38 @@ impl Annotator {
             0 => legible_scale(frame.pixels.width(), frame.pixels.height()),
             n => n as usize,
         };
-        self.tone.render(&frame.pixels, scale, out);
+        let coloured = self.colours.as_mut().and_then(|c| c.pixels(view.scan.index));
+        let coloured = coloured.filter(|p| (p.width(), p.height()) == (frame.pixels.width(), frame.pixels.height()));
+        self.tone.render(coloured.unwrap_or(&frame.pixels), scale, out);
         self.remember(view);
         let height = out.height() as f32;
-        let size_px = (height / 60.0).clamp(13.0, 32.0).round();
+        let size_px = (height / 54.0).clamp(12.0, 44.0).round();
         if self.lettering.as_ref().is_none_or(|(s, _)| *s != size_px) {
             self.lettering = Some((size_px, Lettering::new(size_px)?));
         }
-        let width_px = (height / 700.0).clamp(1.0, 3.0);
+        let width_px = (height / 600.0).clamp(1.0, 4.0);
         let mut canvas = Canvas::new(out);
         let zoom = Zoom(scale as f64);
-        if self.options.detections {
-            let arm = f64::from(width_px) * 3.0;
-            let pen = Pen { alpha: 0.8, ..Pen::solid([255, 255, 255], width_px) };
-            for d in &view.scan.detections {
-                let (x, y) = zoom.point(d.position.x, d.position.y);
-                canvas.line((x - arm, y), (x + arm, y), &pen);
-                canvas.line((x, y - arm), (x, y + arm), &pen);
-            }
-        }
         let tentative = self.options.tentative;
-        let drawn = |t: &&TrackState| tentative || t.status != TrackStatus::Tentative;
-        for track in view.tracks.iter().filter(drawn) {
+        let mut tracks: Vec<&TrackState> =
+            view.tracks.iter().filter(|t| tentative || t.status != TrackStatus::Tentative).collect();
+        // Small ones above large ones.
+        let area = |t: &TrackState| t.extent.width_px * t.extent.height_px;
+        tracks.sort_by(|a, b| area(b).total_cmp(&area(a)).then(a.id.cmp(&b.id)));
+        let is_crowd = tracks.len() > CROWD;
+        if self.options.detections && !is_crowd {
+            draw_untaken(&mut canvas, view, &tracks, zoom, width_px);
+        }
+        for track in &tracks {
             self.draw_trail(&mut canvas, track, view.scan.time, zoom, width_px);
         }
-        for track in view.tracks.iter().filter(drawn) {
-            self.draw_track(&mut canvas, track, zoom, width_px);
+        if is_crowd {
+            tracks.iter().for_each(|track| draw_dot(&mut canvas, track, zoom, width_px));
+        } else {
+            tracks.iter().for_each(|track| self.draw_track(&mut canvas, track, zoom, width_px));
+            if self.options.labels {
+                self.draw_labels(&mut canvas, view, &tracks, zoom, width_px);
+            }
         }
         if self.options.caption {
             self.draw_caption(&mut canvas, view);
@@ -187,90 +224,144 @@ impl Annotator {
         let colour = track_colour(track.id);
         self.points.clear();
         self.points.extend(trail.iter().map(|(_, (x, y))| zoom.point(*x, *y)));
+        let edge = Pen { alpha: 0.35, ..Pen::solid([0; 3], width_px * 1.2 + 1.5) };
+        self.points.windows(2).for_each(|pair| canvas.line(pair[0], pair[1], &edge));
         for (pair, (time, _)) in self.points.windows(2).zip(trail.iter().skip(1)) {
-            let age = now.seconds_since(*time) / self.options.trail_s;
-            let alpha = (1.0 - age).clamp(0.05, 1.0) as f32 * 0.9;
-            canvas.line(pair[0], pair[1], &Pen { alpha, ..Pen::solid(colour, width_px) });
+            let age = (now.seconds_since(*time) / self.options.trail_s).clamp(0.0, 1.0) as f32;
+            let alpha = TRAIL_ALPHA[1] + age * (TRAIL_ALPHA[0] - TRAIL_ALPHA[1]);
+            canvas.line(pair[0], pair[1], &Pen { alpha, ..Pen::solid(colour, width_px * 1.2) });
         }
     }
 
     fn draw_track(&self, canvas: &mut Canvas<'_>, track: &TrackState, zoom: Zoom, width_px: f32) {
         let colour = track_colour(track.id);
-        let mean = &track.kinematics.mean;
-        let (x, y) = zoom.point(mean[0], mean[2]);
-        if !(x.is_finite() && y.is_finite()) {
-            return;
-        }
-        let dash = f64::from(width_px) as f32;
+        let Some(bounds) = bounds(track, zoom, width_px) else { return };
         let pen = match track.status {
-            TrackStatus::Confirmed => Pen::solid(colour, width_px * 1.5),
+            TrackStatus::Confirmed => Pen::solid(colour, width_px * 1.8),
             TrackStatus::Coasting => {
-                Pen { dash_px: Some((6.0 * dash, 4.0 * dash)), ..Pen::solid(colour, width_px * 1.5) }
+                Pen { dash_px: Some((6.0 * width_px, 4.0 * width_px)), ..Pen::solid(colour, width_px * 1.8) }
             }
             TrackStatus::Tentative => {
-                Pen { alpha: 0.7, dash_px: Some((2.0 * dash, 4.0 * dash)), ..Pen::solid(colour, width_px) }
+                Pen { alpha: 0.7, dash_px: Some((2.0 * width_px, 4.0 * width_px)), ..Pen::solid(colour, width_px) }
             }
         };
         if self.options.ellipses {
-            let c = &track.kinematics.cov;
+            let (c, mean) = (&track.kinematics.cov, &track.kinematics.mean);
             let cov = [c[(0, 0)], c[(0, 2)], c[(2, 2)]].map(|v| v * zoom.0 * zoom.0);
-            let thin = Pen { alpha: pen.alpha * 0.8, width_px, ..pen };
-            canvas.ellipse((x, y), cov, SIGMAS_95, &thin);
-        }
-        // A box a little larger than the target, so that the target stays in sight; small ones are given a least size.
-        let e = &track.extent;
-        let least = f64::from(width_px) * 8.0;
-        let half = |size_px: f64| {
-            let size = if size_px.is_finite() { size_px.clamp(0.0, 1e5) * zoom.0 } else { 0.0 };
-            (size / 2.0 + f64::from(width_px) * 2.0).max(least)
-        };
-        let (hw, hh) = (half(e.width_px), half(e.height_px));
-        if self.options.boxes {
-            canvas.rectangle((x - hw).round(), (y - hh).round(), (x + hw).round(), (y + hh).round(), &pen);
-        }
-        if let (true, Some((_, lettering))) =
-            (self.options.labels && track.status != TrackStatus::Tentative, &self.lettering)
-        {
-            let text = track.id.0.to_string();
-            let (w, h) = (lettering.width_px(&text), lettering.height_px());
-            let inside = |v: f64, size: f64, limit: usize| v.clamp(0.0, (limit as f64 - size).max(0.0));
-            // Above the box, or below where there is no room above.
-            let above = y - hh - h - 3.0;
-            let top = if above >= 0.0 { above } else { y + hh + 3.0 };
-            // A target out of the picture has no label at its edge.
-            if x + hw < 0.0 || y + hh < 0.0 || x - hw > canvas.width() as f64 || y - hh > canvas.height() as f64 {
-                return;
+            let longest = SIGMAS_95 * (cov[0] + cov[2]).sqrt();
+            if longest <= MOST_ELLIPSE * canvas.width().min(canvas.height()) as f64 {
+                let thin = Pen { alpha: pen.alpha * 0.8, width_px, ..pen };
+                canvas.ellipse(zoom.point(mean[0], mean[2]), cov, SIGMAS_95, &thin);
             }
-            let (left, top) = (inside(x - hw, w + 4.0, canvas.width()), inside(top, h, canvas.height()));
-            canvas.fill(left, top, left + w + 4.0, top + h, [0, 0, 0], 0.55);
-            lettering.draw(canvas, left + 2.0, top, &text, colour, 1.0);
         }
+        if self.options.boxes {
+            let [left, top, right, bottom] = bounds;
+            if track.status != TrackStatus::Tentative {
+                let edge = Pen { alpha: EDGE_ALPHA, colour: [0; 3], width_px: pen.width_px + 1.6, ..pen };
+                canvas.rectangle(left, top, right, bottom, &edge);
+            }
+            canvas.rectangle(left, top, right, bottom, &pen);
+        }
+    }
+
+    /// Numbers, white on dark plates with an edge of the track's colour.
+    fn draw_labels(
+        &mut self,
+        canvas: &mut Canvas<'_>,
+        view: &View<'_>,
+        tracks: &[&TrackState],
+        zoom: Zoom,
+        width_px: f32,
+    ) {
+        let Some((_, lettering)) = &self.lettering else { return };
+        let (w, h) = (canvas.width() as f64, canvas.height() as f64);
+        self.labels.begin(w, h);
+        if self.options.caption {
+            let [right, bottom] = caption_size(lettering, &caption(view));
+            self.labels.occupy([0.0, 0.0, right, bottom]);
+        }
+        let all: Vec<Option<Rect>> = tracks.iter().map(|t| bounds(t, zoom, width_px)).collect();
+        all.iter().flatten().for_each(|r| self.labels.occupy(*r));
+        let mut places = BTreeMap::new();
+        for (track, bounds) in tracks.iter().zip(&all).rev() {
+            let Some(bounds) = bounds.filter(|_| track.status != TrackStatus::Tentative) else { continue };
+            // A target out of the picture has no label at its edge.
+            if bounds[2] < 0.0 || bounds[3] < 0.0 || bounds[0] > w || bounds[1] > h {
+                continue;
+            }
+            let text = track.id.0.to_string();
+            let edge_px = f64::from(width_px).round().max(1.0);
+            let size = [lettering.width_px(&text) + 4.0 + 2.0 * edge_px, lettering.height_px() + 2.0 * edge_px];
+            let before = self.places.get(&track.id).copied();
+            let Some((place, [x, y])) = self.labels.place(&bounds, size, before) else { continue };
+            places.insert(track.id, place);
+            let (right, bottom) = (x + size[0], y + size[1]);
+            canvas.fill(x, y, right, bottom, track_colour(track.id), 1.0);
+            canvas.fill(x + edge_px, y + edge_px, right - edge_px, bottom - edge_px, [18, 18, 18], 1.0);
+            lettering.draw(canvas, x + 2.0 + edge_px, y + edge_px, &text, [255; 3], 1.0);
+        }
+        self.places = places;
     }
 
     fn draw_caption(&self, canvas: &mut Canvas<'_>, view: &View<'_>) {
         let Some((_, lettering)) = &self.lettering else { return };
-        let n = view.tracks.iter().filter(|t| t.status != TrackStatus::Tentative).count();
-        let plural = if n == 1 { "track" } else { "tracks" };
-        let text = format!("frame {}  {:.3} s  {n} {plural}", view.scan.index.0, view.scan.time.as_secs_f64());
-        canvas.fill(0.0, 0.0, lettering.width_px(&text) + 10.0, lettering.height_px() + 4.0, [0, 0, 0], 0.55);
+        let text = caption(view);
+        let [right, bottom] = caption_size(lettering, &text);
+        canvas.fill(0.0, 0.0, right, bottom, [0, 0, 0], 0.55);
         lettering.draw(canvas, 5.0, 2.0, &text, [235, 235, 235], 1.0);
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The line of facts.
+fn caption(view: &View<'_>) -> String {
+    let n = view.tracks.iter().filter(|t| t.status != TrackStatus::Tentative).count();
+    let plural = if n == 1 { "track" } else { "tracks" };
+    format!("frame {}  {:.2} s  {n} {plural}", view.scan.index.0, view.scan.time.as_secs_f64())
+}
 
-    #[test]
-    fn an_option_out_of_range_names_its_key() {
-        let err = DrawOptions { trail_s: -1.0, ..DrawOptions::default() }.validate("draw").unwrap_err();
-        assert!(err.to_string().starts_with("draw.trail-s = -1: expected seconds"), "{err}");
-    }
+/// Width and height of the line of facts, px.
+fn caption_size(lettering: &Lettering, text: &str) -> [f64; 2] {
+    [lettering.width_px(text) + 10.0, lettering.height_px() + 4.0]
+}
 
-    #[test]
-    fn the_centre_of_a_pixel_stays_the_centre_of_its_block() {
-        let zoom = Zoom(3.0);
-        assert_eq!(zoom.point(0.0, 0.0), (1.0, 1.0));
-        assert_eq!(zoom.point(-0.5, 1.0), (-0.5, 4.0));
+/// The box that is drawn around a track, a little larger than the target, so that the target stays in sight, and of a least size; canvas px.
+fn bounds(track: &TrackState, zoom: Zoom, width_px: f32) -> Option<Rect> {
+    let mean = &track.kinematics.mean;
+    let (x, y) = zoom.point(mean[0], mean[2]);
+    let least = f64::from(width_px) * 8.0;
+    let half = |size_px: f64| {
+        let size = if size_px.is_finite() { size_px.clamp(0.0, 1e5) * zoom.0 } else { 0.0 };
+        (size / 2.0 + f64::from(width_px) * 2.0).max(least)
+    };
+    let (hw, hh) = (half(track.extent.width_px), half(track.extent.height_px));
+    (x.is_finite() && y.is_finite()).then(|| [(x - hw).round(), (y - hh).round(), (x + hw).round(), (y + hh).round()])
+}
+
+/// Crosses on the detections that none of the tracks drawn took.
+fn draw_untaken(canvas: &mut Canvas<'_>, view: &View<'_>, tracks: &[&TrackState], zoom: Zoom, width_px: f32) {
+    let taken: BTreeSet<usize> = tracks.iter().filter_map(|t| t.detection.map(|d| d as usize)).collect();
+    let arm = f64::from(width_px) * 3.0;
+    for (_, d) in view.scan.detections.iter().enumerate().filter(|(i, _)| !taken.contains(i)) {
+        let (x, y) = zoom.point(d.position.x, d.position.y);
+        for (colour, alpha, width_px) in [([0; 3], 0.4, width_px + 1.4), ([255; 3], 0.8, width_px)] {
+            let pen = Pen { alpha, ..Pen::solid(colour, width_px) };
+            canvas.line((x - arm, y), (x + arm, y), &pen);
+            canvas.line((x, y - arm), (x, y + arm), &pen);
+        }
     }
 }
+
+/// One of many tracks: a dot, hollow while it coasts.
+fn draw_dot(canvas: &mut Canvas<'_>, track: &TrackState, zoom: Zoom, width_px: f32) {
+    let mean = &track.kinematics.mean;
+    let at = zoom.point(mean[0], mean[2]);
+    let dot = |canvas: &mut Canvas<'_>, colour, width_px| canvas.line(at, at, &Pen::solid(colour, width_px));
+    dot(canvas, [0; 3], width_px * 3.5 + 1.4);
+    dot(canvas, track_colour(track.id), width_px * 3.5);
+    if track.status == TrackStatus::Coasting {
+        dot(canvas, [0; 3], width_px * 1.5);
+    }
+}
+
+#[cfg(test)]
+mod tests;

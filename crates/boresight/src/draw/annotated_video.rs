@@ -2,6 +2,7 @@
 
 use super::annotate::{Annotator, DrawOptions};
 use super::canvas::Rgb;
+use super::colours::Colours;
 use crate::io::video::{MAX_SIZE, Mp4Options, Mp4Writer};
 use crate::{Image, Result, Sink, View};
 use std::path::PathBuf;
@@ -31,6 +32,13 @@ impl AnnotatedVideo {
     pub fn create(path: impl Into<PathBuf>, draw: DrawOptions, options: Mp4Options) -> Result<Self> {
         let (path, annotator) = (path.into(), Annotator::new(draw)?);
         Ok(Self { path, annotator, options, writer: None, large: Image::default() })
+    }
+
+    /// Draws on the same frames in colour.
+    #[must_use]
+    pub fn with_colours(mut self, colours: Option<Colours>) -> Self {
+        self.annotator.set_colours(colours);
+        self
     }
 }
 

@@ -4,17 +4,19 @@ mod annotate;
 #[cfg(feature = "encode")]
 mod annotated_video;
 mod canvas;
-mod palette;
+mod colours;
+mod labels;
 mod png_folder;
 mod text;
 mod thumbnail;
 mod tone;
 
+pub use crate::palette::track_colour;
 pub use annotate::{Annotator, DrawOptions};
 #[cfg(feature = "encode")]
 pub use annotated_video::AnnotatedVideo;
 pub use canvas::{Canvas, Pen, Rgb};
-pub use palette::track_colour;
+pub use colours::Colours;
 pub use png_folder::{PngFolder, write_png};
 pub use text::Lettering;
 pub use thumbnail::Thumbnail;

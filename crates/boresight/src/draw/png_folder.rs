@@ -2,6 +2,7 @@
 
 use super::annotate::{Annotator, DrawOptions};
 use super::canvas::Rgb;
+use super::colours::Colours;
 use crate::io::{AtomicFile, AtomicFolder, remove_folder};
 use crate::{Error, ErrorKind, Image, Result, Sink, View};
 use std::fs::File;
@@ -26,6 +27,13 @@ impl PngFolder {
     pub fn create(folder: impl Into<PathBuf>, draw: DrawOptions) -> Result<Self> {
         let annotator = Annotator::new(draw)?;
         Ok(Self { folder: AtomicFolder::create(folder, is_frame)?, annotator, picture: Image::default() })
+    }
+
+    /// Draws on the same frames in colour.
+    #[must_use]
+    pub fn with_colours(mut self, colours: Option<Colours>) -> Self {
+        self.annotator.set_colours(colours);
+        self
     }
 
     /// Removes the frames of an earlier run, and the folder if nothing else is in it.

@@ -1,8 +1,8 @@
 //! From any pixel type to 8 bits to look at, steady over time, and integer enlargement.
 //!
-//! 8-bit pictures stay as they are. Others: the 0.5 % and 99.5 % quantiles of a sample of pixels become black and
-//! white; they follow the scene slowly (a tenth of the way each frame), so that the picture does not flicker, but jump
-//! when the scene leaves them by far (a range more than three times as wide or as narrow).
+//! The 0.5 % and 99.5 % quantiles of a sample of pixels become black and white; they follow the scene slowly (a tenth of the way each
+//! frame), so that the picture does not flicker, but jump when the scene leaves them by far (a range more than three times as wide or as narrow).
+//! Of 8-bit pictures only dark ones are stretched: fully up to a 99.5 % quantile of [`DARK`], not at all from [`BRIGHT`] on, partly in between.
 
 use super::canvas::Rgb;
 use crate::{Image, Pixels};
@@ -11,6 +11,12 @@ use crate::{Image, Pixels};
 const SAMPLE: usize = 4096;
 /// How far the levels follow each frame.
 const FOLLOW: f32 = 0.1;
+
+/// Quantiles of 8-bit pictures between which the stretch fades out, counts.
+const DARK: f32 = 120.0;
+const BRIGHT: f32 = 200.0;
+/// A dark picture is made at most so many times as bright: beyond it noise is shown.
+const MOST_GAIN: f32 = 8.0;
 
 /// The levels that are shown black and white.
 #[derive(Clone, Debug, Default)]
@@ -28,8 +34,14 @@ impl Tone {
             out.reset(w * scale, h * scale, [0; 3]);
         }
         match pixels {
-            Pixels::Gray8(i) => enlarge(i, scale, out, |v| [v; 3]),
-            Pixels::Rgb8(i) => enlarge(i, scale, out, |v| v),
+            Pixels::Gray8(i) => {
+                let shown = self.bytes(i.as_slice().iter().map(|v| f32::from(*v)));
+                enlarge(i, scale, out, |v| [shown[usize::from(v)]; 3]);
+            }
+            Pixels::Rgb8(i) => {
+                let shown = self.bytes(i.as_slice().iter().map(|p| f32::from(p[0].max(p[1]).max(p[2]))));
+                enlarge(i, scale, out, |p| p.map(|v| shown[usize::from(v)]));
+            }
             Pixels::Gray16(i) => {
                 let (low, gain) = self.follow(i.as_slice().iter().map(|v| f32::from(*v)));
                 enlarge(i, scale, out, |v| [((f32::from(v) - low) * gain) as u8; 3]);
@@ -39,6 +51,18 @@ impl Tone {
                 enlarge(i, scale, out, |v| [((v - low) * gain) as u8; 3]);
             }
         }
+    }
+
+    /// What each of the 256 values of a picture is shown as.
+    fn bytes(&mut self, pixels: impl ExactSizeIterator<Item = f32>) -> [u8; 256] {
+        self.follow(pixels);
+        let (low, high) = self.levels.unwrap_or((0.0, 255.0));
+        let share = ((BRIGHT - high) / (BRIGHT - DARK)).clamp(0.0, 1.0);
+        // An even picture has nothing to be stretched.
+        let share = if high - low < 2.0 { 0.0 } else { share };
+        let black = share * low;
+        let gain = (255.0 / (share * high + (1.0 - share) * 255.0 - black)).min(MOST_GAIN);
+        std::array::from_fn(|v| if share > 0.0 { ((v as f32 - black) * gain).round() as u8 } else { v as u8 })
     }
 
     /// Updates the levels; returns black and the gain to 0..=255.
@@ -102,6 +126,26 @@ mod tests {
         let mut out = Image::default();
         Tone::default().render(&Pixels::Gray8(image), 2, &mut out);
         assert_eq!(out.as_slice(), [[7; 3], [7; 3], [200; 3], [200; 3], [7; 3], [7; 3], [200; 3], [200; 3]]);
+    }
+
+    #[test]
+    fn a_dark_picture_of_bytes_is_stretched_and_a_bright_one_is_not() {
+        let ramp = |top: u8| {
+            let data: Vec<u8> = (0..10_000usize).map(|i| (i * usize::from(top) / 10_000) as u8).collect();
+            Pixels::Gray8(Image::from_vec(100, 100, data).unwrap())
+        };
+        let shown = |top: u8| {
+            let mut out = Image::default();
+            Tone::default().render(&ramp(top), 1, &mut out);
+            out.as_slice().iter().map(|p| p[0]).max().unwrap()
+        };
+        assert_eq!(shown(230), 229);
+        assert!(shown(60) >= 250 && shown(20) >= 150, "{} {}", shown(60), shown(20));
+        // Partly in between: brighter than it is, and no jump.
+        assert!(shown(160) > 175 && shown(160) < 250, "{}", shown(160));
+        let mut out = Image::default();
+        Tone::default().render(&Pixels::Gray8(Image::filled(4, 4, 7)), 1, &mut out);
+        assert_eq!(out.get(0, 0), Some([7; 3]), "an even picture");
     }
 
     #[test]

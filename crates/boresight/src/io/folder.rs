@@ -11,7 +11,7 @@ use super::sniff::{self, Content, sniff};
 use super::stack::tiff::{TiffPages, count_pages};
 use super::still;
 use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
+    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp, Wanted,
 };
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -36,6 +36,8 @@ pub struct ImageFiles {
     options: OpenOptions,
     bytes: Vec<u8>,
     warnings: Vec<String>,
+    /// Which frames are wanted, if not all.
+    wanted: Option<Wanted>,
 }
 
 opaque_debug!(ImageFiles);
@@ -71,6 +73,7 @@ impl ImageFiles {
             options: options.clone(),
             bytes: Vec::new(),
             warnings: Vec::new(),
+            wanted: None,
         };
         let first = source.read_pixels().map_err(|(_, e)| e)?;
         let (_, first) = first.ok_or_else(|| Error::new(ErrorKind::Damaged, "it holds no image").at(label))?;
@@ -146,11 +149,21 @@ impl ImageFiles {
             let at = self.next_file;
             let Some(path) = self.files.get(at) else { return Ok(None) };
             self.next_file += 1;
+            if self.is_unwanted(at) {
+                return Ok(Some((at, Pixels::Gray8(Image::default()))));
+            }
             match open_image(path, &self.options, &mut self.bytes).map_err(|e| (at, e.at(path.display())))? {
                 Opened::Still(pixels) => return Ok(Some((at, pixels))),
                 Opened::Pages(pages) => self.pages = Some((at, *pages)),
             }
         }
+    }
+
+    /// Whether a file of one picture is a frame that nobody wants.
+    fn is_unwanted(&self, at: usize) -> bool {
+        let place = self.numbering.as_ref().map_or(Some(at as u64), |n| n.place(at as u64));
+        let one_each = self.info.n_frames == Some(self.files.len() as u64);
+        one_each && self.wanted.as_ref().zip(place).is_some_and(|(wanted, place)| !wanted(place))
     }
 
     /// Whether nothing but empty files follows the file at `at`.
@@ -219,6 +232,7 @@ impl FrameSource for ImageFiles {
             Some(first) => (0, first),
             None => match self.read_pixels() {
                 Ok(None) => return Ok(None),
+                Ok(Some((at, nothing))) if nothing.width() == 0 => (at, nothing),
                 Ok(Some((at, pixels))) => {
                     let pixels = same_kind(pixels, self.info.kind);
                     if (pixels.width(), pixels.height()) != (self.info.width, self.info.height) {
@@ -264,6 +278,18 @@ impl FrameSource for ImageFiles {
         }
         let time = Timestamp::from_secs_f64(self.place as f64 / self.options.rate_hz);
         Ok(Some(Frame { index: FrameIndex(self.place), time, pixels }))
+    }
+
+    fn want_only(&mut self, wanted: Wanted) {
+        self.wanted = Some(wanted);
+    }
+
+    fn entries(&self) -> Vec<u64> {
+        match (&self.numbering, self.info.n_frames) {
+            (Some(numbering), Some(_)) => numbering.places.clone(),
+            (None, Some(n)) if n == self.files.len() as u64 => (0..n).collect(),
+            _ => Vec::new(),
+        }
     }
 
     fn warnings(&self) -> &[String] {

@@ -15,6 +15,7 @@ mod open;
 mod options;
 #[cfg(feature = "images")]
 mod pattern;
+mod pictures;
 mod pixels;
 mod replay;
 mod same_file;
@@ -43,6 +44,7 @@ pub use folder::ImageFiles;
 pub use natural::natural_order;
 pub use open::{is_table, open};
 pub use options::{Colour, OpenOptions, RawFormat, RawType, StopFlag};
+pub use pictures::Pictures;
 pub use pixels::gray_of_rgb8;
 pub use replay::Replay;
 pub(crate) use replay::{MOST_BYTES, MOST_FRAMES, frames_ahead};
@@ -52,6 +54,6 @@ pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
-    CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, StateTable, TableOptions, TracksCsv,
-    read_detections, read_tracks,
+    CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, SequenceInfo, StateTable, TableOptions,
+    TracksCsv, read_detections, read_tracks,
 };

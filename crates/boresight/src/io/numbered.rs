@@ -29,25 +29,27 @@ impl Numbering {
 
 /// Finds holes in the numbering of files in natural order; `None` if there are none, or no numbering.
 pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
-    let name = |f: &PathBuf| f.file_stem().map(|s| s.to_string_lossy().into_owned());
-    let names: Vec<String> = files.iter().map(name).collect::<Option<_>>()?;
-    let (head, tail) = split(names.first()?).map(|(head, _, tail)| (head.to_string(), tail.to_string()))?;
-    let numbers: Vec<u64> = names
-        .iter()
-        .map(|n| split(n).filter(|(h, _, t)| *h == head && *t == tail).and_then(|(_, digits, _)| digits.parse().ok()))
-        .collect::<Option<_>>()?;
-    let rises: Vec<u64> = numbers.windows(2).map(|w| w[1].checked_sub(w[0])).collect::<Option<_>>()?;
+    let numbers = numbers(files)?;
+    let rises: Vec<u64> = numbers.windows(2).map(|w| w[1] - w[0]).collect();
     let step = *rises.iter().min()?;
-    if step == 0
-        || rises.iter().any(|r| r % step != 0)
-        || rises.iter().filter(|r| **r == step).count() * 2 < rises.len()
-    {
+    if rises.iter().any(|r| r % step != 0) || rises.iter().filter(|r| **r == step).count() * 2 < rises.len() {
         return None;
     }
     let places: Vec<u64> = numbers.iter().map(|n| (n - numbers[0]) / step).collect();
     let n_missing = places.last()? + 1 - places.len() as u64;
     let at = rises.iter().position(|r| *r > step)?;
     (n_missing <= places.len() as u64).then_some(Numbering { places, n_missing, first_hole: (at, at + 1) })
+}
+
+/// The numbers of files in natural order, which must rise; `None` for names of any other form.
+pub(crate) fn numbers(files: &[PathBuf]) -> Option<Vec<u64>> {
+    let name = |f: &PathBuf| f.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let names: Vec<String> = files.iter().map(name).collect::<Option<_>>()?;
+    let (head, tail) = split(names.first()?).map(|(head, _, tail)| (head.to_string(), tail.to_string()))?;
+    let number =
+        |n: &String| split(n).filter(|(h, _, t)| *h == head && *t == tail).and_then(|(_, d, _)| d.parse().ok());
+    let numbers: Vec<u64> = names.iter().map(number).collect::<Option<_>>()?;
+    numbers.windows(2).all(|w| w[0] < w[1]).then_some(numbers)
 }
 
 /// The beginnings of names that make several numbered sequences, each of two files or more; `None` if all are one, or hardly any.

@@ -49,7 +49,7 @@ impl Counts {
     pub fn add(&mut self, tracks: &[TrackState], summary: &mut Summary) {
         let mut now = 0;
         for t in tracks.iter().filter(|t| t.status != TrackStatus::Tentative) {
-            now += 1;
+            now += u64::from(t.detection.is_some());
             self.confirmed.insert(t.id.0);
             if let Some(i) = &t.innovation {
                 self.nis_sum += i.nis;

@@ -28,7 +28,7 @@ pub struct Summary {
     pub fits: [u64; 2],
     /// Tracks that were confirmed at some time.
     pub confirmed_tracks: u64,
-    /// Most confirmed tracks in one frame.
+    /// Most confirmed tracks with a detection in one frame.
     pub most_at_once: u64,
     /// Mean normalised innovation squared of confirmed tracks (2 if the filter is consistent), and their number.
     pub mean_nis: Option<(f64, u64)>,

@@ -4,6 +4,8 @@
 //! the longest keep their curves. Statistics (NIS, numbers of frames and updates) count every frame of every kept track.
 
 use super::consistency::Nis;
+use super::ground::Ground;
+use super::key_frames::KeyFrames;
 use super::picture::Picture;
 use crate::{TrackId, TrackState, TrackStatus, View};
 use std::collections::BTreeMap;
@@ -12,6 +14,8 @@ use std::collections::BTreeMap;
 const MAX_POINTS: usize = 2000;
 /// Most points of a path in the overview.
 const MAX_PATH: usize = 256;
+/// Most detections of the overview.
+const MAX_DETECTIONS: usize = 6000;
 /// Most samples of all tracks together before short tracks lose their curves.
 const MAX_SAMPLES: usize = 240_000;
 /// Tracks that keep their curves then.
@@ -36,7 +40,7 @@ impl<T, const MAX: usize> Default for Thinned<T, MAX> {
 }
 
 impl<T, const MAX: usize> Thinned<T, MAX> {
-    fn put(&mut self, value: T) {
+    pub fn put(&mut self, value: T) {
         if self.n.is_multiple_of(self.stride) {
             if self.values.len() >= MAX {
                 let mut k = 0;
@@ -65,6 +69,8 @@ pub(super) struct Sample {
     pub frame: u64,
     pub time_s: f64,
     pub status: TrackStatus,
+    /// Where it is on the steady ground.
+    pub ground: [f32; 2],
     /// x, vx, y, vy
     pub mean: [f32; 4],
     /// Their standard deviations.
@@ -84,9 +90,10 @@ pub(super) struct TrackLog {
     pub n_frames: u64,
     pub n_coasting: u64,
     pub nis: Nis,
-    pub path: Thinned<[f32; 2], MAX_PATH>,
+    /// Places in the image and on the steady ground.
+    pub path: Thinned<[f32; 4], MAX_PATH>,
     /// The end of the path, which thinning may have dropped.
-    pub end: [f32; 2],
+    pub end: [f32; 4],
     pub detail: Option<Thinned<Sample, MAX_POINTS>>,
 }
 
@@ -116,6 +123,10 @@ pub(super) struct Collected {
     pub per_bucket: u64,
     pub tracks: BTreeMap<TrackId, TrackLog>,
     pub picture: Option<Picture>,
+    pub key_frames: KeyFrames,
+    pub ground: Ground,
+    /// Places of detections, in the image and on the steady ground.
+    pub detections: Thinned<[f32; 4], MAX_DETECTIONS>,
     pub nis: Nis,
     n_samples: usize,
     highest_id: Option<TrackId>,
@@ -135,6 +146,9 @@ impl Default for Collected {
             per_bucket: 1,
             tracks: BTreeMap::new(),
             picture: None,
+            key_frames: KeyFrames::default(),
+            ground: Ground::default(),
+            detections: Thinned::default(),
             nis: Nis::default(),
             n_samples: 0,
             highest_id: None,
@@ -154,6 +168,13 @@ impl Collected {
             && (self.n_frames == 0 || self.n_frames.is_power_of_two())
         {
             self.picture = Some(Picture::of_frame(f));
+        }
+        self.key_frames.put(view);
+        self.ground.put(view);
+        for d in &view.scan.detections {
+            let [x, y] = [d.position.x as f32, d.position.y as f32];
+            let [gx, gy] = self.ground.place(x, y);
+            self.detections.put([x, y, gx, gy]);
         }
         self.n_frames += 1;
         self.n_detections += view.scan.detections.len() as u64;
@@ -190,7 +211,9 @@ impl Collected {
 
     fn put_track(&mut self, frame: u64, time_s: f64, track: &TrackState) {
         let (mean, cov) = (&track.kinematics.mean, &track.kinematics.cov);
-        let place = [mean[0] as f32, mean[2] as f32];
+        let [x, y] = [mean[0] as f32, mean[2] as f32];
+        let ground = self.ground.place(x, y);
+        let place = [x, y, ground[0], ground[1]];
         let log = self.tracks.entry(track.id).or_insert_with(|| {
             // A dropped track that comes again is not a new one: identities only grow.
             if self.highest_id.is_none_or(|h| track.id > h) {
@@ -236,6 +259,7 @@ impl Collected {
                 frame,
                 time_s,
                 status: track.status,
+                ground,
                 mean: [0, 1, 2, 3].map(|k| mean[k] as f32),
                 std: [0, 1, 2, 3].map(|k| cov[(k, k)].sqrt() as f32),
                 innovation,

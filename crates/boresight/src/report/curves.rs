@@ -33,13 +33,13 @@ pub(super) fn json(seen: &Collected, detailed: &[&TrackLog]) -> String {
         if i > 0 {
             out.push(',');
         }
-        track_json(out, track, most);
+        track_json(out, track, most, seen.ground.is_steadied());
     }
     out.push_str("]}");
     std::mem::take(out)
 }
 
-fn track_json(out: &mut String, track: &TrackLog, most: usize) {
+fn track_json(out: &mut String, track: &TrackLog, most: usize, is_steadied: bool) {
     let Some(detail) = &track.detail else { return };
     let step = detail.values.len().div_ceil(most).max(1);
     let samples = || detail.values.iter().step_by(step);
@@ -86,5 +86,21 @@ fn track_json(out: &mut String, track: &TrackLog, most: usize) {
         let _ = write!(out, ",\"{name}\":");
         push_array(out, samples().map(|s| f64::from(get(s))), digits);
     }
-    out.push('}');
+    // Where the overview has its spot.
+    type Place = fn(&Sample) -> f32;
+    let places: [(&str, Place); 2] = match is_steadied {
+        true => [("px", |s| s.ground[0]), ("py", |s| s.ground[1])],
+        false => [("px", |s| s.mean[0]), ("py", |s| s.mean[2])],
+    };
+    for (name, get) in places {
+        let _ = write!(out, ",\"{name}\":");
+        push_array(out, samples().map(|s| f64::from(get(s))), 5);
+    }
+    let _ = write!(out, ",\"colour\":\"{}\"}}", css_colour(track.id));
+}
+
+/// The colour of a track, as in the video.
+pub(super) fn css_colour(id: crate::TrackId) -> String {
+    let [r, g, b] = crate::palette::track_colour(id);
+    format!("#{r:02x}{g:02x}{b:02x}")
 }

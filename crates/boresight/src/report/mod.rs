@@ -7,7 +7,10 @@
 
 mod collect;
 mod consistency;
+mod contact_sheet;
 mod curves;
+mod ground;
+mod key_frames;
 mod notes;
 mod page;
 mod picture;
@@ -15,5 +18,6 @@ mod sink;
 mod text;
 mod trajectories;
 
+pub use contact_sheet::{ContactSheet, SheetMark, SheetPicture, SheetRow};
 pub use notes::Notes;
 pub use sink::{HtmlReport, ReportSink};

@@ -11,6 +11,8 @@ pub struct Notes {
     pub verdict: Option<(String, bool)>,
     /// Options of the same command to try next.
     pub next: Option<String>,
+    /// The command that shows what each detector finds, where that may help.
+    pub look: Option<String>,
     /// Further lines of the summary: name and value.
     pub facts: Vec<(String, String)>,
     /// The settings chosen, each with its reason, one line each.

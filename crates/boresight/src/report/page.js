@@ -101,6 +101,10 @@
       if (spec.zero) see(0);
       if (!(hi >= lo)) { node("text", { x: W / 2, y: H / 2, "text-anchor": "middle" }, svg, "no values"); return; }
       if (hi === lo) { const d = Math.abs(hi) * 0.05 || 0.5; lo -= d; hi += d; }
+      this.span = hi - lo;
+      const other = spec.twin && this.group.charts.find(c => c !== this && c.spec && c.spec.twin === spec.twin);
+      const span = other ? Math.max(this.span, other.wanted(t0, t1)) : this.span, grow = (span - this.span) / 2;
+      lo -= grow; hi += grow;
       const pad = (hi - lo) * 0.05; if (!(spec.zero && lo === 0)) lo -= pad; hi += pad;
       const yTicks = ticks(lo, hi, 4, 3), labels = yTicks.map(v => show(v, 6));
       this.left = Math.max(34, 10 + 6.4 * Math.max(...labels.map(s => s.length)));
@@ -147,6 +151,19 @@
       this.brush = node("rect", { class: "brush", y: this.top, height: this.h, visibility: "hidden" }, svg);
     }
 
+    // The span of the values in a stretch of time.
+    wanted(t0, t1) {
+      let lo = Infinity, hi = -Infinity;
+      const see = v => { if (ok(v)) { lo = Math.min(lo, v); hi = Math.max(hi, v); } };
+      this.group.t.forEach((time, i) => {
+        if (time < t0 || time > t1) return;
+        (this.spec.lines || []).forEach(l => see(l.v[i]));
+        (this.spec.bands || []).forEach(b => { see(b.lo[i]); see(b.hi[i]); });
+      });
+      (this.spec.rules || []).forEach(r => see(r.y));
+      return hi > lo ? hi - lo : 0;
+    }
+
     mark(a, b) {
       if (!this.brush) return;
       const x = this.X(Math.min(a, b)), w = this.X(Math.max(a, b)) - x;
@@ -181,12 +198,14 @@
     const pm = (i, v, s, unit) => `${show(track[v][i], 6)} ± ${show(2 * track[s][i], 3)} ${unit}`;
     const wide = (v, s, sign) => track[v].map((m, i) => ok(m) && ok(track[s][i]) ? m + sign * 2 * track[s][i] : null);
     const around = (s, sign) => track[s].map(v => ok(v) ? sign * 2 * v : null);
+    // x and y of one thing are drawn on axes of one span.
+    const twin = title => title.replace(/^(Innovation in )?[xy]/, "$1");
     const state = (title, v, s, unit) => ({ chart: new Chart(charts, g, title, i => pm(i, v, s, unit)),
-      spec: () => ({ bands: [{ lo: wide(v, s, -1), hi: wide(v, s, 1) }], lines: [{ v: track[v], cls: "blue" }] }) });
+      spec: () => ({ bands: [{ lo: wide(v, s, -1), hi: wide(v, s, 1) }], lines: [{ v: track[v], cls: "own" }], twin: twin(title) }) });
     const sigma = (title, a, b, unit) => ({ chart: new Chart(charts, g, title, i => `x ${show(track[a][i], 3)}, y ${show(track[b][i], 3)} ${unit}`),
-      spec: () => ({ lines: [{ v: track[a], cls: "blue" }, { v: track[b], cls: "orange dash" }], zero: true }) });
+      spec: () => ({ lines: [{ v: track[a], cls: "blue broad" }, { v: track[b], cls: "orange dash" }], zero: true }) });
     const innovation = (title, v, s) => ({ chart: new Chart(charts, g, title, i => ok(track[v][i]) ? `${show(track[v][i])}, bounds ± ${show(2 * track[s][i], 3)} px` : "no update"),
-      spec: () => ({ bands: [{ lo: around(s, -1), hi: around(s, 1) }], lines: [{ v: track[v], dots: true }], rules: [{ y: 0, cls: "grey" }] }) });
+      spec: () => ({ bands: [{ lo: around(s, -1), hi: around(s, 1) }], lines: [{ v: track[v], dots: true }], rules: [{ y: 0, cls: "grey" }], twin: twin(title) }) });
     const panels = [
       state("x, px (band ± 2σ)", "x", "sx", "px"), state("y, px (band ± 2σ)", "y", "sy", "px"),
       state("x velocity, px/s (band ± 2σ)", "vx", "svx", "px/s"), state("y velocity, px/s (band ± 2σ)", "vy", "svy", "px/s"),
@@ -197,12 +216,14 @@
     ];
     const line = document.getElementById("reading"), view = document.getElementById("view"), spot = document.getElementById("spot");
     g.onpoint = i => {
-      line.textContent = `frame ${track.f[i]}, ${show(track.t[i], 8)} s, ${names[track.s[i]]}`;
-      if (spot) { spot.setAttribute("cx", track.x[i]); spot.setAttribute("cy", track.y[i]); spot.setAttribute("visibility", "visible"); }
+      line.textContent = `frame ${track.f[i]}, ${track.t[i].toFixed(2)} s, ${names[track.s[i]]}`;
+      if (spot) { spot.setAttribute("cx", track.px[i]); spot.setAttribute("cy", track.py[i]); spot.setAttribute("visibility", "visible"); }
     };
     const choose = id => {
       track = data.tracks.find(k => String(k.id) === String(id)) || data.tracks[0];
       select.value = String(track.id);
+      charts.style.setProperty("--track", track.colour); document.getElementById("swatch").style.background = track.colour;
+      document.querySelectorAll("#track-charts, #track-charts + .key").forEach(n => n.style.setProperty("--track", track.colour));
       const shades = [];
       for (let i = 0; i < track.t.length; i++) if (track.s[i] === "o") {
         const a = i > 0 ? track.t[i - 1] : track.t[i], last = shades[shades.length - 1];
@@ -234,6 +255,10 @@
     choose(data.tracks[0].id); scale();
     window.addEventListener("resize", scale);
   }
+  document.querySelectorAll("[data-show]").forEach(box => {
+    const set = () => document.querySelectorAll("#view, #tracks").forEach(n => n.classList.toggle("hide-" + box.dataset.show, !box.checked));
+    box.addEventListener("change", set); set();
+  });
   const drawAll = () => groups.forEach(g => g.draw());
   drawAll();
   let waiting = 0;

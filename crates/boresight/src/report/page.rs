@@ -37,6 +37,7 @@ pub(super) fn page(notes: &Notes, seen: &Collected) -> String {
                 main {
                     h1 { (title) }
                     (verdict(notes))
+                    (trajectories::key_frames(seen))
                     (warnings(notes))
                     div class="two" {
                         (summary(notes, seen))
@@ -63,6 +64,7 @@ fn verdict(notes: &Notes) -> Markup {
         section class=(if *doubtful { "verdict doubtful" } else { "verdict" }) aria-label="Verdict" {
             p { strong { @if *doubtful { "Doubtful: " } } (printable(sentence)) }
             @if let Some(next) = &notes.next { p { "Try next the same command with " code { (printable(next)) } } }
+            @if let Some(look) = &notes.look { p { "See what each detector finds: " code { (printable(look)) } } }
         }
     }
 }
@@ -95,20 +97,17 @@ fn summary(notes: &Notes, seen: &Collected) -> Markup {
         String::new()
     };
     rows.push(("Frames", format!("{}{rate}", seen.n_frames)));
-    rows.push(("Time", format!("{} s to {} s", short(seen.first_time_s, 7), short(seen.last_time_s, 7))));
+    rows.push(("Time", format!("{:.2} s to {:.2} s", seen.first_time_s, seen.last_time_s)));
     if let Some(picture) = &seen.picture {
         rows.push(("Size", format!("{} x {} px", picture.width, picture.height)));
     }
     let per_frame = if seen.n_frames > 0 { seen.n_detections as f64 / seen.n_frames as f64 } else { 0.0 };
-    rows.push(("Detections", format!("{}, {} per frame", seen.n_detections, short(per_frame, 4))));
+    rows.push(("Detections", format!("{}, {} a frame", seen.n_detections, short(per_frame, 3))));
     rows.push(("Confirmed tracks", format!("{} (of {} that were started)", seen.n_confirmed, seen.n_tracks)));
     if let Some(mean) = seen.nis.mean() {
-        let bounds = seen
-            .nis
-            .bounds()
-            .map_or(String::new(), |(a, b)| format!(", 95 % bounds {} to {}", short(a, 3), short(b, 3)));
-        let value = format!("mean NIS {} (2 expected{bounds}): {}", short(mean, 3), seen.nis.words());
-        rows.push(("Consistency of all confirmed tracks", value));
+        let bounds = seen.nis.bounds().map_or(String::new(), |(a, b)| format!(", 95 % bounds {a:.2} to {b:.2}"));
+        let value = format!("mean NIS {mean:.2} (2 expected{bounds}): {}", seen.nis.words());
+        rows.push(("Consistency", value));
     }
     html! {
         section {
@@ -149,10 +148,10 @@ fn table(seen: &Collected, detailed: &[&TrackLog]) -> Markup {
                 p { "No track was started." }
             } @else {
                 @if seen.n_tracks > detailed.len() as u64 {
-                    p class="soft" { "The " (detailed.len()) " longest of " (seen.n_tracks) " tracks, confirmed ones first." }
+                    p class="soft" { "The " (detailed.len()) " longest of " (seen.n_tracks) " tracks; those never confirmed show with the switch above." }
                 }
                 div class="scroll" tabindex="0" role="region" aria-label="Table of tracks" {
-                    table {
+                    table id="tracks" class="hide-never" {
                         thead { tr {
                             th scope="col" { "Track" }
                             th scope="col" { "At the end" }
@@ -179,22 +178,27 @@ fn table_row(t: &TrackLog) -> Markup {
         (true, TrackStatus::Coasting) => "coasting",
         (true, _) => "confirmed",
     };
-    let nis = t.nis.mean().map_or("none".to_string(), |m| short(m, 3));
-    let bounds = t.nis.bounds().map_or(String::new(), |(a, b)| format!("{} to {}", short(a, 3), short(b, 3)));
+    let nis = t.nis.mean().map_or("none".to_string(), |m| format!("{m:.2}"));
+    let bounds = t.nis.bounds().map_or(String::new(), |(a, b)| format!("{a:.2} to {b:.2}"));
     let coasting = 100.0 * t.n_coasting as f64 / t.n_frames.max(1) as f64;
     html! {
-        tr class="pick" data-track=(t.id.0) {
-            th scope="row" { button class="link" type="button" { (t.id.0) } }
+        tr class=(if t.confirmed { "pick" } else { "pick never" }) data-track=(t.id.0) {
+            th scope="row" { (swatch(t.id)) button class="link" type="button" { (t.id.0) } }
             td { (status) }
-            td class="number" { (short(t.first.1, 6)) }
-            td class="number" { (short(t.last.1, 6)) }
+            td class="number" { (format!("{:.2}", t.first.1)) }
+            td class="number" { (format!("{:.2}", t.last.1)) }
             td class="number" { (t.n_frames) }
-            td class="number" { (short(coasting, 2)) " %" }
+            td class="number" { (format!("{coasting:.0}")) " %" }
             td class="number" { (nis) }
             td class="number" { (bounds) }
             td { (t.nis.words()) }
         }
     }
+}
+
+/// The colour of a track as a small square.
+fn swatch(id: crate::TrackId) -> Markup {
+    html! { i class="swatch" style={ "background:" (curves::css_colour(id)) } {} }
 }
 
 /// A line of a chart's key: its colour and what it stands for.
@@ -212,7 +216,7 @@ fn charts(detailed: &[&TrackLog]) -> Markup {
             div class="bar" {
                 button type="button" id="before" aria-label="track before" { "\u{25c0}" }
                 label {
-                    "Track "
+                    i class="swatch" id="swatch" {} "Track "
                     select id="choose" {
                         @for t in detailed { option value=(t.id.0) { (t.id.0) " (" (t.n_frames) " frames)" } }
                     }
@@ -226,8 +230,9 @@ fn charts(detailed: &[&TrackLog]) -> Markup {
             p class="key" {
                 (key("band", "95 % band (± 2 standard deviations)"))
                 (key("coast", "coasting: no detection"))
-                (key("blue", "x, estimates, updates"))
-                (key("orange", "y (dashed)"))
+                (key("own", "estimates, in the track's colour"))
+                (key("blue", "x (broad), updates"))
+                (key("orange", "y (thin, dashed)"))
             }
             p class="soft" {
                 "Point at a curve to read values in all of them; drag sideways to look closer, double-click to see all again."

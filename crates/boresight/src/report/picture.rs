@@ -21,9 +21,14 @@ pub(super) struct Picture {
 
 impl Picture {
     pub fn of_frame(frame: &Frame) -> Self {
+        Self::of_frame_within(frame, MAX_WIDTH)
+    }
+
+    /// With no side longer than `most` px.
+    pub fn of_frame_within(frame: &Frame, most: usize) -> Self {
         let (width, height) = (frame.pixels.width(), frame.pixels.height());
         // At least as coarse as needed for the height too, so that no picture grows without bound.
-        let block = width.div_ceil(MAX_WIDTH).max(height.div_ceil(MAX_WIDTH)).max(1);
+        let block = block(width, height, most);
         let (small_width, small_height) = (width.div_ceil(block), height.div_ceil(block));
         let means = match &frame.pixels {
             Pixels::Gray8(i) => means(i, block, |v| f32::from(*v)),
@@ -48,24 +53,30 @@ impl Picture {
 
     /// The picture as a `data:` address; `None` if it cannot be coded (it has no pixels).
     pub fn data_url(&self) -> Option<String> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(
-            &mut bytes,
-            u32::try_from(self.small_width).ok()?,
-            u32::try_from(self.small_height).ok()?,
-        );
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::High);
-        let mut writer = encoder.write_header().ok()?;
-        writer.write_image_data(&self.gray).ok()?;
-        writer.finish().ok()?;
-        Some(format!("data:image/png;base64,{}", base64(&bytes)))
+        png_url(self.small_width, self.small_height, png::ColorType::Grayscale, &self.gray)
     }
 }
 
+/// Samples of 8 bits as the `data:` address of a PNG; `None` if they make no picture.
+pub(super) fn png_url(width: usize, height: usize, colour: png::ColorType, samples: &[u8]) -> Option<String> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, u32::try_from(width).ok()?, u32::try_from(height).ok()?);
+    encoder.set_color(colour);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let mut writer = encoder.write_header().ok()?;
+    writer.write_image_data(samples).ok()?;
+    writer.finish().ok()?;
+    Some(format!("data:image/png;base64,{}", base64(&bytes)))
+}
+
+/// Side of the blocks that make one pixel of a picture of which no side is longer than `most`, px.
+pub(super) fn block(width: usize, height: usize, most: usize) -> usize {
+    width.div_ceil(most).max(height.div_ceil(most)).max(1)
+}
+
 /// Means of blocks of `block` x `block` pixels, without those that are not finite; NaN where none is.
-fn means<T: Copy>(image: &Image<T>, block: usize, value: impl Fn(&T) -> f32) -> Vec<f32> {
+pub(super) fn means<T: Copy>(image: &Image<T>, block: usize, value: impl Fn(&T) -> f32) -> Vec<f32> {
     let across = image.width().div_ceil(block);
     let mut means = Vec::with_capacity(across * image.height().div_ceil(block));
     let mut sums = vec![(0.0f64, 0u32); across];

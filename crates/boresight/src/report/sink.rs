@@ -138,6 +138,7 @@ mod tests {
             input: evil.into(),
             verdict: Some((evil.into(), true)),
             next: Some(evil.into()),
+            look: Some(evil.into()),
             facts: vec![(evil.into(), evil.into())],
             settings: vec![evil.into()],
             configuration: Some(evil.into()),
@@ -169,6 +170,29 @@ mod tests {
         assert_eq!(track["s"].as_str().unwrap(), "ccccccoccccccocccccc");
         assert_eq!(data["counts"]["c"][0].as_f64(), Some(2.0));
         assert_eq!(data["counts"]["o"][6].as_f64(), Some(2.0));
+    }
+
+    #[test]
+    fn a_track_has_one_colour_in_video_overview_table_and_curves() {
+        let html = report(20, 3, Notes::default());
+        let [r, g, b] = crate::palette::track_colour(crate::TrackId(3));
+        let colour = format!("#{r:02x}{g:02x}{b:02x}");
+        assert_eq!(data(&html)["tracks"].as_array().unwrap()[2]["colour"], colour);
+        for place in [format!("stroke=\"{colour}\" data-track=\"3\""), format!("background:{colour}")] {
+            assert!(html.contains(&place), "{place}");
+        }
+        // Key frames stand before everything else.
+        assert!(html.find("class=\"keys\"").unwrap() < html.find("Summary").unwrap());
+    }
+
+    #[test]
+    fn only_the_longest_twenty_are_drawn_at_first() {
+        let html = report(30, 25, Notes::default());
+        let of = |group: &str| html.matches(&format!("class=\"path {group} pick\"")).count();
+        assert_eq!((of("few"), of("many"), of("never")), (20, 5, 0));
+        assert!(
+            html.contains("all 25 tracks, not the 20 longest") && html.contains("class=\"view hide-many hide-never\"")
+        );
     }
 
     #[test]

@@ -97,6 +97,10 @@ impl FrameSource for MendedSource {
         self.inner.recycle(frame);
     }
 
+    fn entries(&self) -> Vec<u64> {
+        self.inner.entries()
+    }
+
     fn want_only(&mut self, wanted: Wanted) {
         self.inner.want_only(wanted);
     }

@@ -1,7 +1,8 @@
 //! Tables of other programs, as they really come: counts and numbers taken from the files with other tools.
 
 use crate::needs::{data, real_tests};
-use boresight::io::{TableOptions, read_detections, read_tracks};
+use boresight::io::{Colour, OpenOptions, Pictures, SequenceInfo, TableOptions, open, read_detections, read_tracks};
+use boresight::FrameSource;
 
 real_tests! {
     trackpy_btrack_and_mot_tables_are_read_whole
@@ -12,6 +13,8 @@ real_tests! {
             "ir_drone_svanstrom/IR_BIRD_027.gt.csv",
         ];
     the_rate_of_a_mot_sequence_is_found_beside_its_table needs ["pets09_vtest/det_acf.txt"];
+    pictures_of_a_mot_sequence_are_those_of_its_table
+        needs ["mot15_text/TUD-Campus/det_acf.txt", "dctracking_pets_tud/TUD-Campus/img1/000071.jpg"];
     btrack_tracks_keep_their_identities needs ["btrack_examples/tracks.csv"];
 }
 
@@ -51,6 +54,24 @@ fn the_rate_of_a_mot_sequence_is_found_beside_its_table() {
     let ini = std::fs::read_to_string(path.with_file_name("seqinfo.ini")).unwrap();
     let rate: f64 = ini.lines().find_map(|l| l.strip_prefix("frameRate=")).unwrap().trim().parse().unwrap();
     assert_eq!(table.rate_hz, rate);
+}
+
+fn pictures_of_a_mot_sequence_are_those_of_its_table() {
+    let (path, folder) = (data("mot15_text/TUD-Campus/det_acf.txt"), data("dctracking_pets_tud/TUD-Campus/img1"));
+    let table = read_detections(&path, &TableOptions::default()).unwrap();
+    let sequence = SequenceInfo::beside(&path);
+    assert_eq!((sequence.n_frames, sequence.size_px), (Some(71), Some((640.0, 480.0))));
+    let options = OpenOptions::default();
+    let mut pictures = Pictures::open(folder.to_str().unwrap(), &options, &table, &sequence).unwrap();
+    for want in &table.scans {
+        let frame = pictures.next_frame().unwrap().unwrap();
+        assert_eq!((frame.index, frame.time), (want.index, want.time));
+        let one = folder.join(format!("{:06}.jpg", want.index.0 + 1));
+        let rgb = OpenOptions { colour: Colour::Rgb, ..options.clone() };
+        let alone = open(one.to_str().unwrap(), &rgb).unwrap().next_frame().unwrap().unwrap();
+        assert!(frame.pixels == alone.pixels, "{}", one.display());
+    }
+    assert!(pictures.next_frame().unwrap().is_none() && pictures.warnings().is_empty(), "{:?}", pictures.warnings());
 }
 
 fn btrack_tracks_keep_their_identities() {

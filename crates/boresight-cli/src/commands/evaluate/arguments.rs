@@ -10,6 +10,10 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::PathBuf;
 
+/// Headings of what is seldom needed.
+const READING: &str = "How tables are read";
+const MEASURES: &str = "Parameters of measures";
+
 /// Judges results against the truth.
 #[derive(Debug, clap::Args)]
 #[command(long_about = "Judges results against the truth.\n\n\
@@ -32,18 +36,6 @@ pub struct Args {
     pub truth: String,
     /// The result, likewise.
     pub result: String,
-    /// Further results to compare with the first, with confidence intervals.
-    #[arg(long, num_args = 1.., value_name = "RESULT")]
-    pub compare: Vec<String>,
-    /// Format of the truth, if its look deceives.
-    #[arg(long, value_parser = format())]
-    pub truth_format: Option<Format>,
-    /// Format of the results, if their look deceives.
-    #[arg(long, value_parser = format())]
-    pub result_format: Option<Format>,
-    /// What is left out before counting.
-    #[arg(long, value_enum, default_value = "auto")]
-    pub rules: RulesArg,
     /// What makes a truth and a result match: overlap of boxes, or nearness of centres. Points always match by centres.
     #[arg(long = "match", value_enum, default_value = "iou")]
     pub matching: MatchArg,
@@ -53,83 +45,95 @@ pub struct Args {
     /// Distance up to which centres match, px.
     #[arg(long, default_value_t = 5.0)]
     pub distance: f64,
-    /// How CLEAR counts: as TrackEval, or as py-motmetrics and the MATLAB kit.
-    #[arg(long, value_enum, default_value = "trackeval")]
-    pub convention: Convention,
-    /// Cutoff c of OSPA and GOSPA, px.
-    #[arg(long, default_value_t = 10.0)]
-    pub cutoff: f64,
-    /// Order p of OSPA and GOSPA.
-    #[arg(long, default_value_t = 2.0)]
-    pub order: f64,
-    /// Switch cost of trajectory GOSPA, px; half the cutoff if not given.
-    #[arg(long)]
-    pub switch_cost: Option<f64>,
-    /// Unknowns of a window up to which trajectory GOSPA is computed; with more it takes long.
-    #[arg(long, default_value_t = 10_000)]
-    pub max_unknowns: usize,
-    /// Detections that the result was made from (boresight's detections.csv, {seq} allowed), for the NIS.
-    #[arg(long)]
-    pub detections: Option<String>,
-    /// Measurement noise that the tracker added to the detections' own (tracker.extra-noise-px), px, for the NIS.
-    #[arg(long, default_value_t = 0.0)]
-    pub extra_noise: f64,
-    /// The part of it in proportion to a detection's box (tracker.extra-noise-per-height), for the NIS.
-    #[arg(long, default_value_t = 0.0)]
-    pub extra_noise_per_height: f64,
-    /// Posterior Cramer-Rao bound of a constant-velocity target: variance of a measurement per axis (px²), density of its
-    /// acceleration (px²/s³), and if wanted its probability of detection: R,Q or R,Q,PD.
-    #[arg(long, value_name = "R,Q[,PD]", value_parser = bound)]
-    pub bound: Option<BoundModel>,
-    /// Largest value a pixel can have, for the PSNR of images; 255 or 65535 by their type if not given.
-    #[arg(long)]
-    pub peak: Option<f64>,
-    /// Window of OSPA(2) and trajectory GOSPA, frames.
-    #[arg(long, default_value = "50")]
-    pub window: std::num::NonZeroUsize,
-    /// Assign OSPA by plain distances, as Stone Soup does, instead of by their p-th powers.
-    #[arg(long)]
-    pub stonesoup_ospa: bool,
-    /// Frames per second, for rates per hour and times; taken from seqinfo.ini where there is one.
-    #[arg(long)]
-    pub rate: Option<f64>,
-    /// Size of the frames as WIDTHxHEIGHT, px, for rates per megapixel; taken from seqinfo.ini where there is one.
-    #[arg(long, value_parser = size)]
-    pub size: Option<(f64, f64)>,
-    /// Leave out malformed rows and count them.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
-    /// Count rows of boresight's tables whose status is tentative.
-    #[arg(long)]
-    pub tentative: bool,
-    /// Frames of MOTChallenge truths count from 0 in the file.
-    #[arg(long)]
-    pub truth_from_zero: bool,
-    /// Frames of MOTChallenge results count from 0 in the file.
-    #[arg(long)]
-    pub result_from_zero: bool,
+    /// Further results to compare with the first, with confidence intervals.
+    #[arg(long, num_args = 1.., value_name = "RESULT")]
+    pub compare: Vec<String>,
     /// Demand a score, for instance HOTA=0.4 (at least), GOSPA=5 (at most) or ANEES=1.5..2.5 (within); exit code 1 if it is
     /// not met.
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = demand)]
     pub require: Vec<Demand>,
+    /// Print CLEAR, identity and HOTA only, and compute nothing else.
+    #[arg(long)]
+    pub mot_only: bool,
+    /// Write a report with plots.
+    #[arg(long)]
+    pub html: Option<PathBuf>,
     /// Write the scores of each sequence as CSV.
     #[arg(long)]
     pub csv: Option<PathBuf>,
     /// Write all scores and curves as JSON.
     #[arg(long)]
     pub json: Option<PathBuf>,
-    /// Write a report with plots.
-    #[arg(long)]
-    pub html: Option<PathBuf>,
+    /// Format of the truth, if its look deceives.
+    #[arg(help_heading = READING, long, value_parser = format())]
+    pub truth_format: Option<Format>,
+    /// Format of the results, if their look deceives.
+    #[arg(help_heading = READING, long, value_parser = format())]
+    pub result_format: Option<Format>,
+    /// Frames of MOTChallenge truths count from 0 in the file.
+    #[arg(help_heading = READING, long)]
+    pub truth_from_zero: bool,
+    /// Frames of MOTChallenge results count from 0 in the file.
+    #[arg(help_heading = READING, long)]
+    pub result_from_zero: bool,
+    /// What is left out before counting.
+    #[arg(help_heading = READING, long, value_enum, default_value = "auto")]
+    pub rules: RulesArg,
+    /// Leave out malformed rows and count them.
+    #[arg(help_heading = READING, long)]
+    pub skip_bad_rows: bool,
+    /// Count rows of boresight's tables whose status is tentative.
+    #[arg(help_heading = READING, long)]
+    pub tentative: bool,
+    /// Frames per second, for rates per hour and times; taken from seqinfo.ini where there is one.
+    #[arg(help_heading = READING, long)]
+    pub rate: Option<f64>,
+    /// Size of the frames as WIDTHxHEIGHT, px, for rates per megapixel; taken from seqinfo.ini where there is one.
+    #[arg(help_heading = READING, long, value_parser = size)]
+    pub size: Option<(f64, f64)>,
+    /// How CLEAR counts: as TrackEval, or as py-motmetrics and the MATLAB kit.
+    #[arg(help_heading = MEASURES, long, value_enum, default_value = "trackeval")]
+    pub convention: Convention,
+    /// Cutoff c of OSPA and GOSPA, px.
+    #[arg(help_heading = MEASURES, long, default_value_t = 10.0)]
+    pub cutoff: f64,
+    /// Order p of OSPA and GOSPA.
+    #[arg(help_heading = MEASURES, long, default_value_t = 2.0)]
+    pub order: f64,
+    /// Switch cost of trajectory GOSPA, px; half the cutoff if not given.
+    #[arg(help_heading = MEASURES, long)]
+    pub switch_cost: Option<f64>,
+    /// Unknowns of a window up to which trajectory GOSPA is computed; with more it takes long.
+    #[arg(help_heading = MEASURES, long, default_value_t = 10_000)]
+    pub max_unknowns: usize,
+    /// Detections that the result was made from (boresight's detections.csv, {seq} allowed), for the NIS.
+    #[arg(help_heading = MEASURES, long)]
+    pub detections: Option<String>,
+    /// Measurement noise that the tracker added to the detections' own (tracker.extra-noise-px), px, for the NIS.
+    #[arg(help_heading = MEASURES, long, default_value_t = 0.0)]
+    pub extra_noise: f64,
+    /// The part of it in proportion to a detection's box (tracker.extra-noise-per-height), for the NIS.
+    #[arg(help_heading = MEASURES, long, default_value_t = 0.0)]
+    pub extra_noise_per_height: f64,
+    /// Posterior Cramer-Rao bound of a constant-velocity target: variance of a measurement per axis (px²), density of its
+    /// acceleration (px²/s³), and if wanted its probability of detection: R,Q or R,Q,PD.
+    #[arg(help_heading = MEASURES, long, value_name = "R,Q[,PD]", value_parser = bound)]
+    pub bound: Option<BoundModel>,
+    /// Largest value a pixel can have, for the PSNR of images; 255 or 65535 by their type if not given.
+    #[arg(help_heading = MEASURES, long)]
+    pub peak: Option<f64>,
+    /// Window of OSPA(2) and trajectory GOSPA, frames.
+    #[arg(help_heading = MEASURES, long, default_value = "50")]
+    pub window: std::num::NonZeroUsize,
+    /// Assign OSPA by plain distances, as Stone Soup does, instead of by their p-th powers.
+    #[arg(help_heading = MEASURES, long)]
+    pub stonesoup_ospa: bool,
     /// Draws of the bootstrap.
-    #[arg(long, default_value = "1000")]
+    #[arg(help_heading = MEASURES, long, default_value = "1000")]
     pub draws: std::num::NonZeroUsize,
     /// Seed of the bootstrap.
-    #[arg(long, default_value_t = 1)]
+    #[arg(help_heading = MEASURES, long, default_value_t = 1)]
     pub seed: u64,
-    /// Print CLEAR, identity and HOTA only, and compute nothing else.
-    #[arg(long)]
-    pub mot_only: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

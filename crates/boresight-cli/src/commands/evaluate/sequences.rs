@@ -1,5 +1,6 @@
 //! Finds the sequences of a truth and a result: single tables, folders, or paths with `{seq}`.
 
+use boresight::io::SequenceInfo;
 use boresight::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
@@ -10,32 +11,7 @@ pub struct Sequence {
     pub truth: PathBuf,
     /// `None` where the result has no table for this sequence.
     pub result: Option<PathBuf>,
-    pub info: Info,
-}
-
-/// What seqinfo.ini says.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Info {
-    pub n_frames: Option<usize>,
-    pub rate_hz: Option<f64>,
-    pub size_px: Option<(f64, f64)>,
-}
-
-fn info(truth: &Path) -> Info {
-    let folders = [truth.parent(), truth.parent().and_then(Path::parent)];
-    let text = folders.into_iter().flatten().find_map(|f| std::fs::read_to_string(f.join("seqinfo.ini")).ok());
-    let Some(text) = text else { return Info::default() };
-    let value = |key: &str| {
-        text.lines().find_map(|l| {
-            let (k, v) = l.split_once('=')?;
-            if k.trim().eq_ignore_ascii_case(key) { v.trim().parse::<f64>().ok().filter(|v| *v > 0.0) } else { None }
-        })
-    };
-    Info {
-        n_frames: value("seqLength").map(|n| n as usize),
-        rate_hz: value("frameRate"),
-        size_px: value("imWidth").zip(value("imHeight")),
-    }
+    pub info: SequenceInfo,
 }
 
 fn names_in(folder: &Path) -> Result<Vec<String>> {
@@ -85,7 +61,7 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
     if truth.contains("{seq}") {
         for name in names_of_pattern(truth)? {
             let path = PathBuf::from(truth.replace("{seq}", &name));
-            out.push(Sequence { info: info(&path), truth: path, result: result_of(&name), name });
+            out.push(Sequence { info: SequenceInfo::beside(&path), truth: path, result: result_of(&name), name });
         }
     } else if truth_path.is_dir() && !single(truth_path) {
         for name in names_in(truth_path)? {
@@ -98,7 +74,12 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
             };
             if let Some(table) = table {
                 let short = name.trim_end_matches(".txt").to_string();
-                out.push(Sequence { info: info(&table), truth: table, result: result_of(&short), name: short });
+                out.push(Sequence {
+                    info: SequenceInfo::beside(&table),
+                    truth: table,
+                    result: result_of(&short),
+                    name: short,
+                });
             }
         }
     } else {
@@ -108,7 +89,12 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
             }
         }
         let name = truth_path.file_stem().map_or_else(|| truth.to_string(), |s| s.to_string_lossy().into_owned());
-        out.push(Sequence { name, info: info(truth_path), truth: truth_path.into(), result: Some(result_path.into()) });
+        out.push(Sequence {
+            name,
+            info: SequenceInfo::beside(truth_path),
+            truth: truth_path.into(),
+            result: Some(result_path.into()),
+        });
     }
     if out.is_empty() {
         return Err(Error::new(ErrorKind::NotFound, "no sequences here")

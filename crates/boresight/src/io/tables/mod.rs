@@ -35,6 +35,7 @@ pub use mot_writer::MotWriter;
 pub use options::TableOptions;
 pub use read_detections::{DetectionTable, read_detections};
 pub use read_tracks::{StateTable, read_tracks};
+pub use seqinfo::SequenceInfo;
 pub(crate) use tracks_csv::COVARIANCE_COLUMNS;
 pub(crate) use tracks_csv::status_word;
 pub use tracks_csv::{TRACKS_HEADER, TracksCsv};

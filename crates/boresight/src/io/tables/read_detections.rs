@@ -18,6 +18,8 @@ pub struct DetectionTable {
     pub scans: Vec<Scan>,
     /// Rate, frames/s: given, or found from the times.
     pub rate_hz: f64,
+    /// The number that the table gives to its first frame, which is frame 0 here: 1 in MOTChallenge text.
+    pub first_frame: u64,
     /// What kind of table it was, for the summary: `boresight detections`, `MOTChallenge`, `CSV (frame, x, y)`.
     pub format: String,
     /// Names of the classes, by [`crate::ClassId`], if the table has names instead of numbers.
@@ -39,7 +41,7 @@ pub fn read_detections(path: impl AsRef<Path>, options: &TableOptions) -> Result
     options.validate("table")?;
     let path = path.as_ref();
     let mut table = Table::open(path, &options.columns)?;
-    detections_of(&mut table, options, super::seqinfo::rate_beside(path))
+    detections_of(&mut table, options, super::seqinfo::SequenceInfo::beside(path).rate_hz)
 }
 
 fn detections_of(table: &mut Table, options: &TableOptions, rate_beside: Option<f64>) -> Result<DetectionTable> {
@@ -62,6 +64,7 @@ pub(crate) fn identified_of(
     let mut out = DetectionTable {
         scans: Vec::new(),
         rate_hz: 0.0,
+        first_frame: options.first_frame.unwrap_or_else(|| table.first_frame()),
         format: RowReader::format(&table.form),
         class_names: Vec::new(),
         n_rows: 0,

@@ -38,7 +38,7 @@ pub fn read_tracks(path: impl AsRef<Path>, options: &TableOptions) -> Result<Sta
     if table.form.layout.has_states() {
         return own_tracks(&mut table, options);
     }
-    foreign_tracks(&mut table, options, super::seqinfo::rate_beside(path))
+    foreign_tracks(&mut table, options, super::seqinfo::SequenceInfo::beside(path).rate_hz)
 }
 
 /// A table of states, as our own: nothing is guessed, every number comes back to the bit.

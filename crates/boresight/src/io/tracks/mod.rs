@@ -7,6 +7,7 @@ pub mod ctc;
 pub mod ctc_write;
 mod export;
 mod format;
+mod measured;
 mod options;
 mod parents;
 mod read;
@@ -17,6 +18,7 @@ pub use crate::io::tables::Dialect;
 #[cfg(feature = "parquet")]
 pub use export::parquet::write_parquet;
 pub use format::Format;
+pub use measured::{add_mass, measured_rows};
 pub use options::{BadRows, ReadOptions};
 pub use read::{TrackFile, read, sniff};
 pub use write::{write, write_path};

@@ -165,6 +165,23 @@ impl SpotConfig {
 }
 
 impl ThresholdConfig {
+    /// Its word: the key below `detector.threshold`.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Band(_) => "band",
+            Self::Level(_) => "level",
+            Self::Otsu(_) => "otsu",
+            Self::Local(_) => "local",
+            Self::Moving(_) => "moving",
+            Self::Difference(_) => "difference",
+            Self::Colour(_) => "colour",
+            Self::Isolated(_) => "isolated",
+            Self::Spot(_) => "spot",
+            Self::Cfar(_) => "cfar",
+            Self::Integrate(_) => "integrate",
+        }
+    }
+
     /// Checks every parameter; `at` is the path of this table.
     /// # Errors
     /// The first parameter out of its range.

@@ -37,6 +37,11 @@ impl<T> Reorder<T> {
         Self { order, held: BTreeMap::new(), next: 0, lost: VecDeque::new(), ranks: Vec::new() }
     }
 
+    /// Whether the file's own times say the order.
+    pub fn is_by_rank(&self) -> bool {
+        self.order == Order::Rank
+    }
+
     /// Takes a decoded picture with its period, order count and rank; gives out what is due, with the rank it is
     /// shown at.
     pub fn push(&mut self, period: u32, count: i32, rank: u64, picture: T, out: &mut Vec<(u64, T)>) {

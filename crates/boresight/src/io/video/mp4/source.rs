@@ -29,6 +29,8 @@ pub(in crate::io::video) struct Mp4Source {
     frames: Option<Receiver<Message>>,
     spare: Sender<Pixels>,
     wanted: Arc<OnceLock<Wanted>>,
+    /// Numbers of the frames at sync samples.
+    entries: Vec<u64>,
     n_frames: u64,
 }
 
@@ -66,6 +68,7 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
     let ranks = ranks(&movie.steps);
     let n_frames = movie.steps.iter().filter(|s| s.shown).count() as u64;
     let rate_hz = rate(&movie);
+    let entries = entries(&movie, &ranks);
     let (frame_in, frame_out) = sync_channel(AHEAD);
     let (spare_in, spare_out) = channel();
     let units = Decoders::new(configurations, options.max_pixels);
@@ -119,6 +122,7 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
         frames: Some(frame_out),
         spare: spare_in,
         wanted,
+        entries,
         n_frames,
     })))
 }
@@ -132,6 +136,15 @@ fn ranks(steps: &[Step]) -> Vec<Option<u64>> {
         ranks[i] = Some(rank as u64);
     }
     ranks
+}
+
+/// Places of the shown pictures at sync samples, in their order.
+fn entries(movie: &Movie, ranks: &[Option<u64>]) -> Vec<u64> {
+    let is_sync = |s: &Step| movie.samples.get(s.sample as usize).is_some_and(|s| s.sync);
+    let mut entries: Vec<u64> =
+        movie.steps.iter().zip(ranks).filter(|(s, _)| is_sync(s)).filter_map(|(_, rank)| *rank).collect();
+    entries.sort_unstable();
+    entries
 }
 
 /// Mean rate of the shown pictures, frames/s.
@@ -202,11 +215,62 @@ impl FrameSource for Mp4Source {
         let _ = self.wanted.set(wanted);
     }
 
+    fn entries(&self) -> Vec<u64> {
+        self.entries.clone()
+    }
+
     fn reads_ahead(&self) -> bool {
         true
     }
 
     fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::Colour;
+
+    /// The frames of a clip with pixels, of those that are wanted.
+    fn frames(name: &str, wanted: Option<Vec<u64>>) -> Vec<Frame> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/video").join(name);
+        let options = OpenOptions { colour: Colour::Native, ..OpenOptions::default() };
+        let Ok(Opened::Source(mut source)) = open(&path, &options) else { panic!("{name}") };
+        let all = wanted.is_none();
+        if let Some(wanted) = wanted.clone() {
+            source.want_only(Box::new(move |k| wanted.contains(&k)));
+        }
+        let mut frames = Vec::new();
+        while let Some(frame) = source.next_frame().unwrap() {
+            let is_wanted = wanted.as_ref().is_some_and(|w| w.contains(&frame.index.0));
+            frames.extend((all || is_wanted).then_some(frame));
+        }
+        assert!(source.warnings().is_empty(), "{name}: {:?}", source.warnings());
+        frames
+    }
+
+    #[test]
+    fn frames_behind_what_is_passed_over_are_those_of_the_whole_file() {
+        let names =
+            ["b_frames", "slices", "open_gop", "cropped", "edit_list", "fragmented", "variable_rate", "interlaced"];
+        for name in names.map(|n| format!("{n}.mp4")) {
+            let all = frames(&name, None);
+            let n = all.len() as u64;
+            for wanted in [vec![n - 1], vec![n / 2], vec![n / 3, n - 2], vec![0, 7, 8, n - 5], vec![]] {
+                let want: Vec<&Frame> = all.iter().filter(|f| wanted.contains(&f.index.0)).collect();
+                let got = frames(&name, Some(wanted.clone()));
+                assert!(got.iter().collect::<Vec<_>>() == want, "{name}: {wanted:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn sync_samples_are_where_reading_can_begin() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/video/b_frames.mp4");
+        let Ok(Opened::Source(source)) = open(&path, &OpenOptions::default()) else { panic!() };
+        let entries = source.entries();
+        assert!(entries.first() == Some(&0) && entries.windows(2).all(|w| w[0] < w[1]), "{entries:?}");
     }
 }

@@ -86,7 +86,29 @@ impl Worker {
         let mut pictures = Vec::new();
         let mut due = Vec::new();
         let mut wait_for_sync = false;
-        for step in 0..self.movie.steps.len() {
+        let (mut step, mut look_at) = (0, 0);
+        while step < self.movie.steps.len() {
+            if step >= look_at && reorder.is_by_rank() && self.wanted.get().is_some() {
+                match self.next_wanted(step) {
+                    Err(wanted) => look_at = wanted + 1,
+                    Ok(next) => {
+                        self.units.finish(&mut pictures);
+                        self.place(&mut pictures, reorder, &mut due);
+                        for rank in (step..next).filter_map(|s| self.ranks.get(s).copied().flatten()) {
+                            reorder.push(0, 0, rank, nothing(), &mut due);
+                        }
+                        self.send(&mut due, tally)?;
+                        // What begins here depends on nothing that was passed over.
+                        self.units.reset();
+                        wait_for_sync = false;
+                        step = next;
+                        continue;
+                    }
+                }
+            }
+            let at = step;
+            step += 1;
+            let step = at;
             let Some(sample) = self.movie.steps.get(step).and_then(|s| self.movie.samples.get(s.sample as usize))
             else {
                 continue;
@@ -134,6 +156,24 @@ impl Worker {
         reorder.finish(&mut due);
         self.send(&mut due, tally)?;
         Ok(None)
+    }
+
+    /// The sync sample at which decoding can go on, since nobody wants a picture from this step on up to there; or else the step that is wanted.
+    fn next_wanted(&self, step: usize) -> Result<usize, usize> {
+        let n = self.movie.steps.len();
+        let rank = |s: usize| self.ranks.get(s).copied().flatten();
+        let is_sync = |s: usize| {
+            self.movie.steps.get(s).and_then(|s| self.movie.samples.get(s.sample as usize)).is_some_and(|s| s.sync)
+        };
+        let wanted = (step..n).find(|&s| rank(s).is_some_and(|rank| is_wanted(&self.wanted, rank)));
+        // Pictures behind a sync sample that are shown before it may need what was passed over.
+        let is_closed = |s: usize| {
+            let behind = (s + 1..n).take_while(|&k| !is_sync(k));
+            rank(s).is_some_and(|own| behind.filter_map(rank).all(|rank| rank > own))
+        };
+        let Some(wanted) = wanted else { return Ok(n) };
+        let entry = (step + 1..=wanted).rev().find(|&s| is_sync(s) && is_closed(s));
+        entry.ok_or(wanted)
     }
 
     fn place(&mut self, pictures: &mut Vec<Picture>, reorder: &mut Reorder<Pixels>, due: &mut Vec<(u64, Pixels)>) {

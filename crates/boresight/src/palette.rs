@@ -4,15 +4,14 @@
 //! The dark ones are lightened, since most pictures here are dark, and black is left out. From the eighth track on the
 //! hues come again in a lighter and a stronger version.
 
-use super::canvas::Rgb;
 use crate::TrackId;
 
 /// Orange, sky blue, green, yellow, blue, vermilion, purple.
-const BASE: [Rgb; 7] =
+const BASE: [[u8; 3]; 7] =
     [[240, 165, 20], [86, 190, 245], [20, 200, 145], [245, 232, 70], [110, 120, 255], [245, 110, 40], [230, 130, 190]];
 
 /// The colour of a track.
-pub fn track_colour(id: TrackId) -> Rgb {
+pub fn track_colour(id: TrackId) -> [u8; 3] {
     let n = id.0.wrapping_sub(1);
     let base = BASE[(n % 7) as usize];
     match (n / 7) % 3 {

@@ -1,0 +1,31 @@
+//! Words of a command line, as a shell takes them back.
+
+/// A word, in quotes where a shell would part or change it.
+pub fn word(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
+    let is_plain = !word.is_empty() && word.chars().all(plain);
+    if is_plain { word.to_string() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+/// The command that was given with more options.
+pub fn given_with(options: &str) -> String {
+    let mut command = String::from("boresight");
+    for given in std::env::args_os().skip(1) {
+        command.push(' ');
+        command.push_str(&word(&given.to_string_lossy()));
+    }
+    format!("{command} {options}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::word;
+
+    #[test]
+    fn a_shell_takes_every_word_as_it_was() {
+        assert_eq!(
+            ["a/b-1.mp4", "my clip.mp4", "it's", "*.png", ""].map(word),
+            ["a/b-1.mp4", "'my clip.mp4'", "'it'\\''s'", "'*.png'", "''"]
+        );
+    }
+}
