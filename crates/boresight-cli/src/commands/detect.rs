@@ -33,7 +33,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &TrackerArgs::default())?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
-    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some());
+    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
+    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(unit);
     if !args.input.quiet {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }

@@ -87,6 +87,8 @@ pub struct Plan {
     pub lost: Vec<String>,
     /// What is known of the source.
     pub info: Option<boresight::SourceInfo>,
+    /// Where the radar was, of a radar's plots.
+    pub radar: Option<boresight::io::RadarPicture>,
     n_scans: Option<u64>,
 }
 
@@ -147,7 +149,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
         let input = Input::Frames(source, detector);
-        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None });
+        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None });
     }
     let request = auto::Request {
         detector: args.detector,
@@ -162,7 +164,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs) -> anyhow::Result<Plan> {
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None })
+    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None })
 }
 
 /// A sentence that names the detector's keys that are set in vain.
@@ -208,13 +210,21 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
             .at(&args.input)
             .into());
     }
-    let mut reasons = vec![format!(
-        "{} detections in {} frames at {} frames/s, read as {}.",
-        table.n_rows - table.n_skipped,
-        table.scans.len(),
-        table.rate_hz,
-        table.format
-    )];
+    let n_read = table.n_rows - table.n_skipped;
+    let mut reasons = vec![match &table.radar {
+        Some(radar) => format!(
+            "{n_read} plots of range and azimuth in {} scans, one in {:.3} s; positions in {} east and north.",
+            table.scans.len(),
+            radar.turn_s,
+            radar.unit.sign()
+        ),
+        None => format!(
+            "{n_read} detections in {} frames at {} frames/s, read as {}.",
+            table.scans.len(),
+            table.rate_hz,
+            table.format
+        ),
+    }];
     reasons.extend(table.warnings.iter().filter(|w| !table.lost.contains(w)).cloned());
     let mut config = base;
     match given {
@@ -223,12 +233,23 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
             // The first pass runs with the filter that is asked for.
             config = changed(config, args, tracker)?;
             let allowed = tracker.false_tracks_per_hour;
-            auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons);
+            match &table.radar {
+                Some(radar) => auto::for_radar(&table.scans, radar.turn_s, &mut config, &mut reasons),
+                None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
+            }
         }
     }
     config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);
-    Ok(Plan { input: Input::Scans(table.scans), config, reasons, lost: table.lost, info: None, n_scans })
+    Ok(Plan {
+        input: Input::Scans(table.scans),
+        config,
+        reasons,
+        lost: table.lost,
+        info: None,
+        radar: table.radar,
+        n_scans,
+    })
 }
 
 /// INPUT's name beside the working directory, with an ending.

@@ -52,6 +52,6 @@ pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
-    CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, StateTable, TableOptions, TracksCsv,
-    read_detections, read_tracks,
+    AzimuthFrom, CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, LengthUnit, MotWriter, RadarOptions,
+    RadarPicture, StateTable, TableOptions, TracksCsv, read_detections, read_tracks,
 };

@@ -8,6 +8,7 @@
 mod collect;
 mod consistency;
 mod curves;
+mod map;
 mod notes;
 mod page;
 mod picture;
