@@ -234,7 +234,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
             config = changed(config, args, tracker)?;
             let allowed = tracker.false_tracks_per_hour;
             match &table.radar {
-                Some(radar) => auto::for_radar(&table.scans, radar.turn_s, &mut config, &mut reasons),
+                Some(radar) => auto::for_radar(&table.scans, radar.turn_s, radar.unit, &mut config, &mut reasons),
                 None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
             }
         }

@@ -9,6 +9,7 @@
 use super::digits::round;
 use super::first_scans::first;
 use super::noise;
+use crate::io::LengthUnit;
 use crate::track::{
     ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, Report,
 };
@@ -26,8 +27,8 @@ const SPEED_RESERVE: f64 = 1.5;
 /// Tracks whose speeds tell.
 const LEAST_TRACKS: usize = 3;
 
-/// Writes the tracker's configuration for a radar's plots; `turn_s` is the time of a turn of the antenna.
-pub fn for_radar(scans: &[Scan], turn_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
+/// Writes the tracker's configuration for a radar's plots; `turn_s` is the time of a turn of the antenna, `unit` what positions are in.
+pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
     let turn_s = if turn_s.is_finite() && turn_s > 0.0 { turn_s } else { 1.0 };
     let sigma = spread(scans);
     let t = &mut config.tracker;
@@ -42,37 +43,36 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, config: &mut Config, reasons: &mut
     t.coast_s = round(COAST_TURNS * turn_s);
     t.coast_scans = COAST_TURNS as u32;
     t.merged_measurements = MergedMeasurementsConfig::off();
-    reasons.push(format!(
-        "Plots of a radar, a turn in {turn_s:.3} s, to {sigma:.0} m at the median: a target may move by {} m/s, a track is unseen for at most {} s.",
+    let mut told = vec![format!(
+        "Plots of a radar, a turn in {turn_s:.3} s, to {sigma:.0} px at the median: a target may move by {} px/s, a track is unseen for at most {} s.",
         t.max_speed_px_per_s, t.coast_s
-    ));
+    )];
     let area = area_m2(scans);
-    let mut told = Vec::new();
     let _ = noise::learn(scans, area, config, &mut told);
     if let Some(speeds) = speeds(scans, config) {
         let t = &mut config.tracker;
         t.max_speed_px_per_s = round((SPEED_RESERVE * speeds.fastest).min(t.max_speed_px_per_s)).max(1.0);
         t.initiation = starting_with(speeds.rms.max(0.1 * t.max_speed_px_per_s));
         told.push(format!(
-            "The fastest of {} tracks moves at {:.1} m/s, their speeds are {:.1} m/s in the mean square: a target may move by {} m/s.",
+            "The fastest of {} tracks moves at {:.1} px/s, their speeds are {:.1} px/s in the mean square: a target may move by {} px/s.",
             speeds.n_tracks, speeds.fastest, speeds.rms, t.max_speed_px_per_s
         ));
         let mut again = Vec::new();
         let _ = noise::learn(scans, area, config, &mut again);
         if !again.is_empty() {
-            told.remove(0);
+            told.remove(1);
             told.extend(again);
         }
     }
-    reasons.extend(told.iter().map(|text| in_metres(text)));
+    reasons.extend(told.iter().map(|text| in_unit(text, unit)));
 }
 
-/// A sentence of the parts that speak of pixels, in metres: their unit of length is that of the positions.
-fn in_metres(text: &str) -> String {
+/// A sentence that speaks of pixels, in the unit of the positions.
+fn in_unit(text: &str, unit: LengthUnit) -> String {
     // Plots have no boxes.
     let text =
         text.replace(" and 0.0000 of a box height beyond them", " beyond them").replace(" and 0.0000 heights²/s³", "");
-    text.replace("px", "m")
+    text.replace("px", unit.sign())
 }
 
 fn starting_with(velocity_std: f64) -> InitiationConfig {

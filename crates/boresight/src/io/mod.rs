@@ -53,5 +53,5 @@ pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
     AzimuthFrom, CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, LengthUnit, MotWriter, RadarOptions,
-    RadarPicture, StateTable, TableOptions, TracksCsv, read_detections, read_tracks,
+    RadarPicture, ShipReports, StateTable, TableOptions, TracksCsv, read_detections, read_ship_reports, read_tracks,
 };

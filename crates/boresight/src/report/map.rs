@@ -128,7 +128,7 @@ pub(super) fn section(map: &Map, order: &[&TrackLog], detailed: &[&TrackLog]) ->
     let px = (width / SCREEN_PX[0]).max(height / SCREEN_PX[1]);
     let unit = map.unit();
     let own = map.radar.own_at(map.last_time_s);
-    let grid = round_step(height / STEPS);
+    let grid = round_step(height / STEPS / 1.5);
     let ring = round_step(map.radar.longest_range.max(height / 2.0) / STEPS);
     let rings: Vec<f64> = multiples(ring, map.radar.longest_range * 1.02 + ring, ring);
     let own_path = line_of(map.own_path());
@@ -152,7 +152,7 @@ pub(super) fn section(map: &Map, order: &[&TrackLog], detailed: &[&TrackLog]) ->
                     g stroke="#7fd1c7" stroke-opacity=".45" stroke-width="1" stroke-dasharray="2 4" {
                         @for r in &rings { circle cx=(round(own[0])) cy=(round(own[1])) r=(round(*r)) vector-effect="non-scaling-stroke" {} }
                     }
-                    path d=(plots) stroke="#dbe7ee" stroke-opacity=".38" stroke-width="2.4" stroke-linecap="round" vector-effect="non-scaling-stroke" {}
+                    path d=(plots) stroke="#dbe7ee" stroke-opacity=".5" stroke-width="2.4" stroke-linecap="round" vector-effect="non-scaling-stroke" {}
                     polyline points=(own_path) stroke="#ffffff" stroke-width="2" vector-effect="non-scaling-stroke" {}
                     g { @for t in tracks.iter().rev() { (path(t, detailed.iter().any(|d| d.id == t.id))) } }
                     g { @for t in tracks.iter().filter(|t| detailed.iter().any(|d| d.id == t.id)) {
@@ -165,26 +165,42 @@ pub(super) fn section(map: &Map, order: &[&TrackLog], detailed: &[&TrackLog]) ->
                     }
                     circle class="spot" id="spot" r=(round(7.0 * px)) visibility="hidden" {}
                 }
-                g style=(text(11.0)) text-anchor="middle" {
+                g style=(text(11.0)) {
                     @for r in &rings {
-                        text x=(round(own[0])) y=(round(-(own[1] + r) - 3.0 * px)) style="fill:#7fd1c7" { (length(*r, unit)) }
+                        @let away = (r + 4.0 * px) * std::f64::consts::FRAC_1_SQRT_2;
+                        text x=(round(own[0] + away)) y=(round(-(own[1] + away))) text-anchor="start" style="fill:#7fd1c7" { (length(*r, unit)) }
                     }
                 }
                 g style=(text(11.0)) {
                     @for x in multiples(x0 + 60.0 * px, x1 - 40.0 * px, grid) { text x=(round(x)) y=(round(-y0 - 5.0 * px)) text-anchor="middle" { (length(x, unit)) } }
                     @for y in multiples(y0 + 24.0 * px, y1 - 12.0 * px, grid) { text x=(round(x0 + 6.0 * px)) y=(round(-y + 4.0 * px)) { (length(y, unit)) } }
                 }
-                g { @for t in tracks.iter().filter(|t| detailed.iter().any(|d| d.id == t.id)) { (number(t, px)) } }
+                g { @for t in numbered(&tracks, detailed, px) { (number(t, px)) } }
                 (north(x1 - 34.0 * px, -y1 + 14.0 * px, px))
                 (scale_bar(x0 + 70.0 * px, -y0 - 30.0 * px, grid, px, unit))
             }
             p class="soft" {
                 "North is up; axes count " (if unit == LengthUnit::Metre { "metres" } else { "pixels" }) " east and north of where own ship's positions count from. Light dots: "
-                (n_plots) " plots" @if map.every > 1 { " (every " (map.every) "th)" } "; dashed rings: range from own ship at the end; white: own ship. A dot marks where a track began, its number where it ended. "
+                (n_plots) " plots" @if map.every > 1 { " (every " (map.every) "th)" } "; dashed rings: range from own ship at the end; white: own ship. A dot marks where a track began, its number where it ended, if there is room. "
                 "Click a track to see its curves below."
             }
         }
     }
+}
+
+/// The tracks whose numbers have room: the longest first, none over another.
+fn numbered<'t>(tracks: &[&'t TrackLog], detailed: &[&TrackLog], px: f64) -> Vec<&'t TrackLog> {
+    let mut kept: Vec<&TrackLog> = Vec::new();
+    for t in tracks.iter().filter(|t| detailed.iter().any(|d| d.id == t.id)) {
+        let free = |k: &&TrackLog| {
+            let d = [0, 1].map(|i| f64::from((k.end[i] - t.end[i]).abs()));
+            d[0] > 30.0 * px || d[1] > 13.0 * px
+        };
+        if kept.iter().all(free) {
+            kept.push(t);
+        }
+    }
+    kept
 }
 
 fn path(t: &TrackLog, has_curves: bool) -> Markup {
