@@ -251,3 +251,132 @@ impl PolarRegistration {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TrackId;
+    use boresight_filters::Gaussian;
+    use nalgebra::Vector4;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const RANGE_STD: f64 = 40.0;
+    const AZIMUTH_STD: f64 = 0.015;
+    const REPORT_STD: f64 = 10.0;
+
+    fn own(t: f64) -> [f64; 2] {
+        [100.0 + 2.0 * t, -50.0]
+    }
+
+    fn point(p: Vector2<f64>, v: Vector2<f64>, cov: Matrix2<f64>) -> Gaussian<4> {
+        let mut all = Matrix4::identity();
+        for i in 0..2 {
+            for j in 0..2 {
+                all[(2 * i, 2 * j)] = cov[(i, j)];
+            }
+        }
+        Gaussian { mean: Vector4::new(p.x, v.x, p.y, v.y), cov: all }
+    }
+
+    /// Ten ships as they report themselves (each with an antenna that lies `antenna` off, in the mean square), and as a radar with biases sees them, among clutter.
+    fn scene(seed: u64, bias: [f64; 2], antenna: f64) -> (Vec<Timeline>, Vec<Timeline>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut n = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        for k in 0..10 {
+            let turn = 0.6 * f64::from(k);
+            let start = (1500.0 + 400.0 * f64::from(k)) * Vector2::new(turn.cos(), turn.sin());
+            let v = Vector2::new(3.0 * n(), 3.0 * n());
+            let lies = antenna * Vector2::new(n(), n());
+            let at = |t: f64| start + v * t;
+            let (mut reports, mut plots) = (Vec::new(), Vec::new());
+            for i in 0..20 {
+                let t = 10.0 * f64::from(i);
+                let p = at(t) + lies + REPORT_STD * Vector2::new(n(), n());
+                reports.push((t, point(p, v, Matrix2::identity() * REPORT_STD.powi(2))));
+            }
+            for i in 0..40 {
+                // Seen when the others report, so that nothing is interpolated and their errors are as stated.
+                let t = 10.0 * f64::from(i / 2);
+                let o = Vector2::from(own(t));
+                let d = at(t) - o;
+                let (r, c) = (d.norm() + bias[0] + RANGE_STD * n(), d.y.atan2(d.x) + bias[1] + AZIMUTH_STD * n());
+                let z = o + r * Vector2::new(c.cos(), c.sin());
+                let u = (z - o) / r;
+                let w = Vector2::new(-u.y, u.x);
+                let cov = u * u.transpose() * RANGE_STD.powi(2) + w * w.transpose() * (r * AZIMUTH_STD).powi(2);
+                if i % 2 == 0 {
+                    plots.push((t, point(z, v, cov)));
+                }
+            }
+            a.push(Timeline { id: TrackId(k as u64), points: reports, size: [0.0; 2] });
+            b.push(Timeline { id: TrackId(k as u64), points: plots, size: [0.0; 2] });
+        }
+        // Land and buoys: nobody reports them.
+        for k in 0..30u64 {
+            let p = Vector2::new(4000.0 * n(), 4000.0 * n());
+            let cov = Matrix2::identity() * RANGE_STD.powi(2);
+            let points = (0..20).map(|i| (10.0 * f64::from(i), point(p, Vector2::zeros(), cov))).collect();
+            b.push(Timeline { id: TrackId(100 + k), points, size: [0.0; 2] });
+        }
+        (a, b)
+    }
+
+    /// Mean normalised squared error of both biases over scenes, and the share of scenes with the right pairs.
+    fn nees(bias: [f64; 2], antenna: f64) -> (f64, f64) {
+        let (mut sum, mut right) = (0.0, 0.0);
+        const N: u64 = 100;
+        for seed in 0..N {
+            let (a, b) = scene(seed, bias, antenna);
+            let found = register_polar(&a, &b, own, &PolarConfig::default()).unwrap();
+            let e = Vector2::new(found.range - bias[0], found.azimuth_rad - bias[1]);
+            sum += e.dot(&(found.cov.try_inverse().unwrap() * e));
+            let true_pairs = found.pairs.iter().filter(|(i, j)| i == j).count();
+            right += f64::from(u8::from(true_pairs == 10 && found.pairs.len() <= 12));
+        }
+        (sum / N as f64, right / N as f64)
+    }
+
+    #[test]
+    fn biases_are_found_among_clutter_as_well_as_their_covariance_says() {
+        for bias in [[0.0, 0.0], [60.0, -0.09], [-150.0, 0.12]] {
+            let (nees, right) = nees(bias, 0.0);
+            // 2 is expected of 200 degrees of freedom, 1.62 to 2.42 in 95 of 100; the scatter of ten pairs only ever widens the covariance.
+            assert!((1.2..2.42).contains(&nees), "{bias:?}: {nees}");
+            assert!(right > 0.9, "{bias:?}: {right}");
+        }
+    }
+
+    #[test]
+    fn antennas_off_by_a_ships_length_widen_the_covariance() {
+        // 30 m in every scan of a ship: with errors taken as white the error would be about 2.5 times what was stated (NEES 6).
+        let (nees, _) = nees([60.0, -0.09], 30.0);
+        assert!(nees < 3.0, "{nees}");
+    }
+
+    #[test]
+    fn one_bias_alone_leaves_the_other_and_taking_it_off_brings_the_radar_home() {
+        let (a, b) = scene(3, [0.0, 0.1], 0.0);
+        let config = PolarConfig { range: false, ..PolarConfig::default() };
+        let found = register_polar(&a, &b, own, &config).unwrap();
+        assert_eq!((found.range, found.cov[(0, 0)]), (0.0, 0.0));
+        assert!(
+            (found.azimuth_rad - 0.1).abs() < 4.0 * found.cov[(1, 1)].sqrt()
+                && found.mean_d2[0] > 5.0 * found.mean_d2[1]
+        );
+        let home = found.timeline(&b[4], own);
+        let rest = residuals(&a[4], &home, &own, &config);
+        let mean = rest.iter().map(|(d, _)| d[1]).sum::<f64>() / rest.len() as f64;
+        assert!(mean.abs() < 4.0 * AZIMUTH_STD / (rest.len() as f64).sqrt(), "{mean}");
+    }
+
+    #[test]
+    fn sensors_that_share_nothing_are_refused() {
+        let (a, b) = scene(1, [0.0, 0.0], 0.0);
+        let far: Vec<Timeline> = b[10..13].to_vec();
+        let e = register_polar(&a[..1], &far, own, &PolarConfig { limits: [1.0, 1e-4], ..PolarConfig::default() });
+        assert!(e.unwrap_err().to_string().contains("no track"));
+    }
+}

@@ -122,12 +122,31 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
 /// Standard deviation of a ship's report: the length of a ship, and a second of its way, m.
 const REPORT_STD_M: f64 = 30.0;
 
+/// Reports of a ship that hardly moved come every few minutes: it was there in between, at every so many seconds.
+const BERTH_S: f64 = 20.0;
+
+/// Reports with those added between two that lie no further apart than they are right.
+fn with_berths(reports: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut out = Vec::with_capacity(reports.len());
+    for (i, b) in reports.iter().enumerate() {
+        if let Some(a) = i.checked_sub(1).map(|i| reports[i])
+            && (b[1] - a[1]).hypot(b[2] - a[2]) < REPORT_STD_M
+            && b[0] - a[0] < 600.0
+        {
+            let n = ((b[0] - a[0]) / BERTH_S).ceil().max(1.0);
+            out.extend((1..n as u32).map(|k| [0, 1, 2].map(|j| a[j] + (b[j] - a[j]) * f64::from(k) / n)));
+        }
+        out.push(*b);
+    }
+    out
+}
+
 /// A table of ships' reports as a sensor; `None` where it is another table.
 fn ships(path: &Path, map: &PlaneMap) -> anyhow::Result<Option<Sensor>> {
     let Some(ships) = read_ship_reports(path, false)? else { return Ok(None) };
     let mut tracks: Vec<Timeline> = Vec::new();
     for ship in &ships {
-        let r = &ship.reports;
+        let r = &with_berths(&ship.reports);
         let velocity = |i: usize| {
             let (a, b) = (r[i.saturating_sub(1)], r[(i + 1).min(r.len() - 1)]);
             if b[0] > a[0] { [(b[1] - a[1]) / (b[0] - a[0]), (b[2] - a[2]) / (b[0] - a[0])] } else { [0.0; 2] }
