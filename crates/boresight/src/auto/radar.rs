@@ -8,7 +8,7 @@
 
 use super::digits::round;
 use super::first_scans::first;
-use super::noise;
+use super::{noise, speed};
 use crate::io::LengthUnit;
 use crate::track::{
     ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, Report,
@@ -48,10 +48,13 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
         t.max_speed_px_per_s, t.coast_s
     )];
     let area = area_m2(scans);
+    // A radar that measures well sees fast targets move far between its turns.
+    speed::learn(scans, area, config, &mut told);
+    let n_assumed = told.len();
     let _ = noise::learn(scans, area, config, &mut told);
     if let Some(speeds) = speeds(scans, config) {
         let t = &mut config.tracker;
-        t.max_speed_px_per_s = round((SPEED_RESERVE * speeds.fastest).min(t.max_speed_px_per_s)).max(1.0);
+        t.max_speed_px_per_s = round((SPEED_RESERVE * speeds.fastest).max(1.0));
         t.initiation = starting_with(speeds.rms.max(0.1 * t.max_speed_px_per_s));
         told.push(format!(
             "The fastest of {} tracks moves at {:.1} px/s, their speeds are {:.1} px/s in the mean square: a target may move by {} px/s.",
@@ -60,7 +63,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
         let mut again = Vec::new();
         let _ = noise::learn(scans, area, config, &mut again);
         if !again.is_empty() {
-            told.remove(1);
+            told.remove(n_assumed);
             told.extend(again);
         }
     }

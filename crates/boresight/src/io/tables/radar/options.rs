@@ -20,7 +20,7 @@ pub enum AzimuthFrom {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RadarOptions {
-    /// Table of own ship's positions and headings; absent: `ownship.csv` beside the plots, or else the radar stands at (0, 0).
+    /// Table of own ship's positions and headings; absent: `NAME-ownship.csv` beside `NAME-plots.csv`, or `ownship.csv`, or else the radar stands at (0, 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own_ship: Option<String>,
     /// What azimuths are counted from: `north` (clockwise), `bow` (clockwise, own ship's heading is added) or `x-axis` (towards +y).

@@ -193,16 +193,17 @@ fn plot(row: &Row<'_>, c: &RadarColumns, time_at: usize, time_scale: f64, option
     Ok(Plot { time_s, turn, range, azimuth_rad, std: [range_std, azimuth_std] })
 }
 
-/// The table of own ship: the one that is named, or the one beside the plots; `None` where there is neither.
+/// The table of own ship: the one that is named, or one beside the plots; `None` where there is neither.
 fn own_ship(path: &Path, options: &TableOptions) -> Result<Option<OwnShip>> {
-    let file = match &options.radar.own_ship {
-        Some(name) => PathBuf::from(name),
-        None => path.with_file_name(BESIDE),
+    let named = options.radar.own_ship.as_ref().map(PathBuf::from);
+    let beside = || {
+        // `harbour-polar.csv` has `harbour-ownship.csv` beside it, where several radars share a folder.
+        let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let of_name = stem.rsplit_once('-').map(|(name, _)| format!("{name}-{BESIDE}"));
+        let names = of_name.into_iter().chain([BESIDE.to_string()]);
+        names.map(|n| path.with_file_name(n)).find(|p| p.is_file())
     };
-    if options.radar.own_ship.is_none() && !file.is_file() {
-        return Ok(None);
-    }
-    OwnShip::read(&file, options.skip_bad_rows).map(Some)
+    named.or_else(beside).map(|file| OwnShip::read(&file, options.skip_bad_rows)).transpose()
 }
 
 /// A plot as a position east and north with its covariance.
