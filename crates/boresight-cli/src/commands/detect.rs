@@ -27,7 +27,9 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "detections.csv"));
     let to_stdout = path.as_os_str() == "-";
-    if !to_stdout {
+    if to_stdout {
+        crate::stdout_at_start::check()?;
+    } else {
         boresight::io::refuse_to_overwrite(&args.input.input, [path.as_path()])?;
     }
     let stop = Stop::on_signal()?;

@@ -43,7 +43,7 @@ pub struct InputArgs {
     /// Frames of even light, by which unequal response is divided out. Short for `--set input.sensor.flat=..`.
     #[arg(long, value_name = "INPUT")]
     pub flat: Option<String>,
-    /// Memory that reading one picture may take, MB; half of the machine's if absent.
+    /// Memory that reading one picture (of a file, a video, a stream), or the histories of one scan, may take, MB; half of the machine's if absent.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
     pub max_memory: Option<u64>,
     /// Threads to read, detect and write on; all the machine has if absent. The results are the same for any number.

@@ -3,8 +3,6 @@
 mod atomic;
 mod atomic_folder;
 #[cfg(feature = "images")]
-mod budget;
-#[cfg(feature = "images")]
 mod folder;
 #[cfg(feature = "images")]
 mod guard;
@@ -34,10 +32,9 @@ pub mod tracks;
 pub mod video;
 pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 
+pub use crate::memory_budget::set_memory_budget;
 pub use atomic::{AtomicFile, Output, write_whole};
 pub use atomic_folder::{AtomicFolder, remove_folder};
-#[cfg(feature = "images")]
-pub use budget::set_memory_budget;
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
 pub use natural::natural_order;

@@ -23,6 +23,7 @@ const LEAVES: &[&str] = &[
     "union_find",
     "validate",
     "cpu",
+    "memory_budget",
 ];
 
 /// room -> rooms it may use besides the leaves and itself.
