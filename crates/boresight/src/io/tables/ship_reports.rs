@@ -38,7 +38,7 @@ fn of(table: &mut Table, skip_bad_rows: bool) -> Result<Option<Vec<ShipReports>>
     while let Some(row) = table.next_row()? {
         let read = || -> Result<(u64, [f64; 3])> {
             let id = row.need_at(ship, "a ship's number")?;
-            if !(id >= 0.0 && id < 9e15 && id.fract() == 0.0) {
+            if !((0.0..9e15).contains(&id) && id.fract() == 0.0) {
                 return Err(row.wrong_at(ship, &id.to_string(), "a ship's number"));
             }
             let report =
