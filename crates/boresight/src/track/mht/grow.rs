@@ -56,7 +56,7 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
         let best = grown.first().map_or(0.0, |l| l.score);
         grown.retain(|l| l.score >= best - mht.max_score_gap);
         grown.truncate(mht.max_leaves as usize);
-        tree.leaves.extend(grown.drain(..));
+        tree.leaves.append(&mut grown);
         tree.chosen = None;
     }
     trees.retain(|t| !t.leaves.is_empty());
