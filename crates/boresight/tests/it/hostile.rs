@@ -248,7 +248,7 @@ fn radar_tables() -> [(&'static str, String); 3] {
     let plots = (0..60u32).map(|k| {
         let (turn, part) = (k / 3, 0.2 + 0.3 * f64::from(k % 3));
         let t = 2.5 * (f64::from(turn) + part);
-        format!("{t},{},{},0.0004,900\n", 6.283 * part, 900 + 10 * k)
+        format!("{t},{},{},0.0004,900\n", std::f64::consts::TAU * part, 900 + 10 * k)
     });
     let own = (0..30u32).map(|k| format!("{},{},-{k}.5,{}\n", 2 * k, 3 * k, 350 + k));
     let ships = (0..40u32).map(|k| format!("23500{},{},{},50,90,-1.1,50.7\n", k % 4, 3 * k, 10 * k));
