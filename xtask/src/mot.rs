@@ -4,9 +4,12 @@ use anyhow::{Context, Result};
 use boresight::io::mot_box_of_extent;
 use boresight::io::tracks::{Format, ReadOptions, read};
 use boresight::metrics::{MatchOptions, MotScores, Rules, mot_scores, preprocess};
+use boresight::pipeline::{Input, run};
 use boresight::track::{self, TrackerConfig};
-use boresight::{PixelOrigin, Scan, TrackRow, TrackStatus, TrackTable};
+use boresight::{PixelOrigin, Scan, Sink, TrackRow, TrackStatus, TrackTable, View};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Detections and rules of the sets of sequences.
 pub const SETS: [(&str, &str, Rules); 2] =
@@ -38,16 +41,34 @@ pub fn table(path: &Path) -> Result<TrackTable> {
     Ok(read.with_context(|| path.display().to_string())?.table)
 }
 
+struct Collect(Arc<Mutex<Vec<TrackRow>>>);
+
+impl Sink for Collect {
+    fn put(&mut self, view: &View<'_>) -> boresight::Result<()> {
+        let mut rows = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        for s in view.tracks.iter().filter(|s| s.status == TrackStatus::Confirmed) {
+            let bbox = mot_box_of_extent(&s.extent);
+            rows.push(TrackRow { frame: view.scan.index.0 as u32, id: s.id.0 as i64, bbox, ..TrackRow::default() });
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> boresight::Result<()> {
+        Ok(())
+    }
+}
+
 /// Runs the tracker over scans; rows are confirmed tracks with a detection in the frame.
 pub fn tracked(config: &TrackerConfig, scans: &[Scan]) -> Result<TrackTable> {
-    let mut tracker = track::build(config)?;
-    let mut rows = Vec::new();
-    for scan in scans {
-        for s in tracker.step(scan)?.iter().filter(|s| s.status == TrackStatus::Confirmed) {
-            let bbox = mot_box_of_extent(&s.extent);
-            rows.push(TrackRow { frame: scan.index.0 as u32, id: s.id.0 as i64, bbox, ..TrackRow::default() });
-        }
+    let rows = Arc::new(Mutex::new(Vec::new()));
+    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&rows)))];
+    let input = Input::Scans(scans.to_vec());
+    let (_, broken) =
+        run(input, Some(track::build(config)?), sinks, &mut |_| ControlFlow::Continue(())).all_written()?;
+    if let Some(e) = broken {
+        return Err(e.into());
     }
+    let rows = std::mem::take(&mut *rows.lock().unwrap_or_else(PoisonError::into_inner));
     Ok(TrackTable::from_rows("boresight", PixelOrigin::Pixel1, rows)?)
 }
 

@@ -97,6 +97,7 @@ impl Wishes {
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
         let (mut frames, mut choice) =
             auto::read_and_choose(base.input.mend(Box::new(frames))?, again, &base, &request)?;
+        auto::report_whole(&mut choice.config, &mut choice.reasons);
         choice.config = changed(choice.config, &self.sets)?;
         let detector = auto::learn(&mut frames, &mut choice, &request)?;
         self.chosen(frames, choice, detector)
@@ -178,6 +179,7 @@ impl Wishes {
                 Some((turn_s, unit)) => auto::for_radar(&scans, turn_s, unit, &mut config, &mut reasons),
                 None => auto::for_detections(&scans, rate_hz, self.false_tracks_per_hour, &mut config, &mut reasons),
             }
+            auto::report_whole(&mut config, &mut reasons);
             config = changed(config, &self.sets)?;
         }
         let total = Some(scans.len() as u64);

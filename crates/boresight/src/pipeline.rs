@@ -10,19 +10,24 @@
 
 mod finders;
 mod made;
+mod outputs;
 mod primed;
 mod read_ahead;
+mod retrospect;
 mod scans;
+mod summary;
 
+use self::outputs::{Counts, Outputs};
 pub(crate) use self::primed::prime;
+use self::retrospect::{Held, Retrospect};
 use self::scans::Scans;
+pub use self::summary::{StageTimes, Summary};
 use crate::track::Tracking;
 use crate::vision::Detector;
-use crate::{Error, FrameSource, PositionFit, Result, Scan, Sink, TrackStatus, View};
-use std::collections::BTreeSet;
+use crate::{Error, Frame, FrameSource, PositionFit, Result, Scan, Sink, Timestamp, View};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Where scans come from: frames through a detector, or detections made elsewhere.
 pub enum Input {
@@ -33,44 +38,6 @@ pub enum Input {
 }
 
 opaque_debug!(Input);
-
-/// Time spent in each stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StageTimes {
-    /// Reading and decoding (waiting for it).
-    pub read: Duration,
-    /// Frame to detections, of all threads together.
-    pub detect: Duration,
-    /// Detections to tracks.
-    pub track: Duration,
-    /// Tables, video, report.
-    pub write: Duration,
-}
-
-/// What a run gave.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Summary {
-    /// Frames done.
-    pub frames: u64,
-    /// Time from the first to the last frame, s.
-    pub duration_s: f64,
-    /// Detections in all frames.
-    pub detections: u64,
-    /// Of these, how many have the position of a fitted spot, and how many fell back to the centroid, where a fit was asked for.
-    pub fits: [u64; 2],
-    /// Tracks that were confirmed at some time.
-    pub confirmed_tracks: u64,
-    /// Most confirmed tracks in one frame.
-    pub most_at_once: u64,
-    /// Mean normalised innovation squared of confirmed tracks (2 if the filter is consistent), and their number.
-    pub mean_nis: Option<(f64, u64)>,
-    /// Time in each stage.
-    pub times: StageTimes,
-    /// Warnings of the source.
-    pub warnings: Vec<String>,
-    /// Whether the caller ended the run before the source did.
-    pub interrupted: bool,
-}
 
 /// How a run ended.
 #[derive(Debug)]
@@ -119,7 +86,17 @@ pub fn run_on(
     let mut summary = Summary::default();
     let mut counts = Counts::default();
     let mut outputs = Outputs { sinks, unwritten: Vec::new() };
-    let mut broken = drive(n_threads, input, &mut tracking, &mut outputs, go_on, &mut summary, &mut counts).err();
+    let held = Retrospect::new(tracking.as_ref().map_or(0.0, |t| t.retrospective_s()));
+    let run = Run {
+        tracking: &mut tracking,
+        outputs: &mut outputs,
+        summary: &mut summary,
+        counts: &mut counts,
+        held,
+        spare: Vec::new(),
+        first: None,
+    };
+    let mut broken = drive(n_threads, input, run, go_on).err();
     if let Some((n, first)) = counts.refused.take() {
         if n > summary.frames {
             broken.get_or_insert(first);
@@ -136,122 +113,35 @@ pub fn run_on(
     Outcome { summary, broken, unwritten }
 }
 
-/// The sinks that can still be written, and why others could not.
-struct Outputs<'s> {
-    sinks: Vec<Box<dyn Sink + 's>>,
-    unwritten: Vec<Error>,
-}
-
-impl Outputs<'_> {
-    /// Shows a view to every sink; one that fails is dropped unfinished. Breaks when the last one is gone.
-    fn put(&mut self, view: &View<'_>) -> ControlFlow<()> {
-        let before = self.sinks.len();
-        self.sinks.retain_mut(|sink| match sink.put(view) {
-            Ok(()) => true,
-            Err(e) => {
-                self.unwritten.push(e);
-                false
-            }
-        });
-        if before > 0 && self.sinks.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-
-    /// Finishes the sinks, each whatever became of the others; or drops them.
-    fn end(mut self, finish: bool) -> Vec<Error> {
-        if finish {
-            self.unwritten.extend(self.sinks.into_iter().filter_map(|sink| sink.finish().err()));
-        }
-        self.unwritten
-    }
-}
-
-#[derive(Default)]
-struct Counts {
-    confirmed: BTreeSet<u64>,
-    nis_sum: f64,
-    nis_n: u64,
-    /// Scans that the tracker refused, and why the first.
-    refused: Option<(u64, Error)>,
-}
-
-impl Counts {
-    fn into_summary(self, summary: &mut Summary) {
-        summary.confirmed_tracks = self.confirmed.len() as u64;
-        summary.mean_nis = (self.nis_n > 0).then(|| (self.nis_sum / self.nis_n as f64, self.nis_n));
-    }
-}
-
-/// What comes after a frame.
-#[derive(PartialEq)]
-enum Next {
-    GoOn,
-    /// The caller has enough.
-    Stop,
-    /// Nothing that is computed would be kept.
-    NoOutput,
-}
-
 fn drive(
     n_threads: usize,
     input: Input,
-    tracking: &mut Option<Box<dyn Tracking>>,
-    outputs: &mut Outputs<'_>,
+    mut run: Run<'_, '_>,
     go_on: &mut dyn FnMut(&Summary) -> ControlFlow<()>,
-    summary: &mut Summary,
-    counts: &mut Counts,
 ) -> Result<()> {
-    let mut first = None;
-    let mut one = |frame: Option<&crate::Frame>, scan: &Scan, summary: &mut Summary| -> Result<Next> {
-        let started = Instant::now();
-        let tracks = match tracking {
-            Some(t) => match t.step(scan) {
-                Ok(tracks) => tracks,
-                Err(e) => {
-                    counts.refused.get_or_insert((0, e)).0 += 1;
-                    return Ok(if go_on(summary).is_break() { Next::Stop } else { Next::GoOn });
-                }
-            },
-            None => &[],
-        };
-        let tracked = Instant::now();
-        summary.times.track += tracked - started;
-        let written = outputs.put(&View { frame, scan, tracks });
-        summary.times.write += tracked.elapsed();
-        summary.frames += 1;
-        summary.detections += scan.detections.len() as u64;
-        for fit in scan.detections.iter().filter_map(|d| d.fit) {
-            summary.fits[usize::from(fit == PositionFit::Centroid)] += 1;
+    // Whether there is more to be done.
+    let mut next = |run: &mut Run<'_, '_>, scans: Option<&mut Scans>| {
+        if run.give_out(false, scans).is_break() {
+            return ControlFlow::Break(());
         }
-        summary.duration_s = scan.time.seconds_since(*first.get_or_insert(scan.time));
-        let mut now = 0;
-        for t in tracks.iter().filter(|t| t.status != TrackStatus::Tentative) {
-            now += 1;
-            counts.confirmed.insert(t.id.0);
-            if let Some(i) = &t.innovation {
-                counts.nis_sum += i.nis;
-                counts.nis_n += 1;
-            }
-        }
-        summary.most_at_once = summary.most_at_once.max(now);
-        if written.is_break() {
-            return Ok(Next::NoOutput);
-        }
-        Ok(if go_on(summary).is_break() { Next::Stop } else { Next::GoOn })
+        run.summary.interrupted = go_on(run.summary).is_break();
+        if run.summary.interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     match input {
         Input::Scans(scans) => {
-            for scan in &scans {
-                match one(None, scan, summary)? {
-                    Next::GoOn => {}
-                    next => {
-                        summary.interrupted = next == Next::Stop;
-                        break;
-                    }
+            for scan in scans {
+                run.track(None, 0, scan);
+                if next(&mut run, None).is_break() {
+                    break;
                 }
             }
+            let _ = run.give_out(true, None);
             Ok(())
         }
         Input::Frames(source, mut detector) => {
+            let info = source.info();
+            let bytes = info.width.saturating_mul(info.height).saturating_mul(info.kind.bytes());
+            let wants_frames = run.outputs.sinks.iter().any(|s| s.needs_frames());
             let source = primed::primed(source, &mut *detector);
             let mut scans = Scans::of(source, detector, n_threads);
             let outcome = loop {
@@ -260,32 +150,95 @@ fn drive(
                     Ok(None) => break Ok(()),
                     Err(e) => break Err(e),
                 };
-                summary.times.read += made.read;
-                summary.times.detect += made.detect;
+                run.summary.times.read += made.read;
+                run.summary.times.detect += made.detect;
                 if let Some(warnings) = &made.warnings {
-                    summary.warnings.clone_from(warnings);
+                    run.summary.warnings.clone_from(warnings);
                 }
-                match one(Some(&made.frame), &made.scan, summary) {
-                    Ok(Next::GoOn) => scans.recycle(made),
-                    Ok(next) => {
-                        summary.interrupted = next == Next::Stop;
-                        break Ok(());
-                    }
-                    Err(e) => break Err(e),
+                let frame = if wants_frames {
+                    Some(made.frame)
+                } else {
+                    scans.recycle(made.frame, run.spare.pop().unwrap_or_default());
+                    None
+                };
+                run.track(frame, bytes, made.scan);
+                if next(&mut run, Some(&mut scans)).is_break() {
+                    break Ok(());
                 }
             };
+            let _ = run.give_out(true, Some(&mut scans));
             if let Some(warnings) = scans.last_warnings() {
-                summary.warnings = warnings;
+                run.summary.warnings = warnings;
             }
             outcome
         }
     }
 }
 
+/// What a run carries from scan to scan.
+struct Run<'r, 's> {
+    tracking: &'r mut Option<Box<dyn Tracking>>,
+    outputs: &'r mut Outputs<'s>,
+    summary: &'r mut Summary,
+    counts: &'r mut Counts,
+    held: Retrospect,
+    /// Scans without their frames, to be used again.
+    spare: Vec<Scan>,
+    first: Option<Timestamp>,
+}
+
+impl Run<'_, '_> {
+    /// Tracks one scan, whose frame takes so many bytes, and holds it back; one that the tracker refuses is left out.
+    fn track(&mut self, frame: Option<Frame>, bytes: usize, scan: Scan) {
+        let started = Instant::now();
+        let mut tracks = self.held.memory();
+        if let Some(tracking) = self.tracking {
+            match tracking.step(&scan) {
+                Ok(states) => tracks.extend_from_slice(states),
+                Err(e) => {
+                    self.counts.refused.get_or_insert((0, e)).0 += 1;
+                    return;
+                }
+            }
+        }
+        let summary = &mut *self.summary;
+        summary.times.track += started.elapsed();
+        summary.frames += 1;
+        summary.detections += scan.detections.len() as u64;
+        for fit in scan.detections.iter().filter_map(|d| d.fit) {
+            summary.fits[usize::from(fit == PositionFit::Centroid)] += 1;
+        }
+        summary.duration_s = scan.time.seconds_since(*self.first.get_or_insert(scan.time));
+        self.held.push(frame, bytes, scan, tracks);
+        if let Some(tracking) = self.tracking {
+            self.held.confirm(tracking.renamed());
+        }
+    }
+
+    /// Gives every sink the scans that need not wait any longer, or all of them; breaks when no sink is left.
+    fn give_out(&mut self, all: bool, mut scans: Option<&mut Scans>) -> ControlFlow<()> {
+        while let Some(Held { frame, scan, tracks, .. }) = self.held.pop(all) {
+            let started = Instant::now();
+            let written = self.outputs.put(&View { frame: frame.as_ref(), scan: &scan, tracks: &tracks });
+            self.summary.times.write += started.elapsed();
+            self.counts.add(&tracks, self.summary);
+            self.held.recycle(tracks);
+            match (frame, &mut scans) {
+                (Some(frame), Some(scans)) => scans.recycle(frame, scan),
+                _ => self.spare.push(scan),
+            }
+            if written.is_break() {
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Detection, ErrorKind, FrameIndex, Timestamp};
+    use crate::{Detection, ErrorKind, FrameIndex};
     use std::sync::{Arc, Mutex};
 
     /// A sink that fails at its `fails_at`th view (at `finish`: one behind the last), and writes down what it is asked.

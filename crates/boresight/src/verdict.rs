@@ -52,6 +52,8 @@ pub struct Observed {
     followed: u64,
     rows: u64,
     large_rows: u64,
+    /// Area of a frame, px², where there are frames.
+    frame_px2: Option<f64>,
     /// Products of innovations in a row and squares, both axes, in their deviations; number of the products.
     products: f64,
     squares: f64,
@@ -75,6 +77,11 @@ pub struct Verdict {
 pub struct ObservedSink<'a>(&'a mut Observed);
 
 impl Observed {
+    /// Of frames of this size, px.
+    pub fn of_frames(width: usize, height: usize) -> Self {
+        Self { frame_px2: Some((width * height) as f64), ..Self::default() }
+    }
+
     /// The sink through which a run is seen.
     pub fn sink(&mut self) -> ObservedSink<'_> {
         ObservedSink(self)
@@ -83,7 +90,7 @@ impl Observed {
     fn put(&mut self, view: &View<'_>) {
         let now = view.scan.time.ns;
         self.frames += 1;
-        let frame_px2 = view.frame.map(|f| (f.pixels.width() * f.pixels.height()) as f64);
+        let frame_px2 = self.frame_px2;
         let mut is_there = false;
         for t in view.tracks {
             let life = self.lives.entry(t.id.0).or_default();
@@ -222,6 +229,10 @@ impl Observed {
 }
 
 impl Sink for ObservedSink<'_> {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         self.0.put(view);
         Ok(())
@@ -277,7 +288,7 @@ mod tests {
 
     /// A run of 100 frames of 100 x 80 px at 10 a second: `tracks` tells (id, reported, side of the box in px, NIS) of each.
     fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, bool, f64, f64)>) -> Verdict {
-        let mut seen = Observed::default();
+        let mut seen = Observed::of_frames(100, 80);
         let mut sink = seen.sink();
         let (mut most_at_once, mut nis_sum, mut nis_n) = (0, 0.0, 0);
         for k in 0..100 {

@@ -19,6 +19,10 @@ pub trait Sink: Send {
     /// # Errors
     /// When the output cannot be written.
     fn put(&mut self, view: &View<'_>) -> Result<()>;
+    /// Whether it looks at the frames: a run that holds back its results keeps them only for sinks that do.
+    fn needs_frames(&self) -> bool {
+        true
+    }
     /// Ends the output so that the file is whole and readable.
     /// # Errors
     /// When the output cannot be written.

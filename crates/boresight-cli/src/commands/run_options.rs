@@ -237,6 +237,7 @@ fn plan_table(args: &InputArgs, tracker: &TrackerArgs, given: Option<Config>, ba
                 Some(radar) => auto::for_radar(&table.scans, radar.turn_s, radar.unit, &mut config, &mut reasons),
                 None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
             }
+            auto::report_whole(&mut config, &mut reasons);
         }
     }
     config = changed(config, args, tracker)?;

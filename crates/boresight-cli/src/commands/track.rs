@@ -109,7 +109,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(radar) = &plan.radar {
         report = report.map(|r| r.with_map(radar.clone()));
     }
-    let mut observed = Observed::default();
+    let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
     let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, plan.config.detector.centroid.fit.is_some(), unit)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));

@@ -38,7 +38,7 @@ mod summed;
 pub use crate::io::Replay;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
-pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose};
+pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose, report_whole};
 pub use radar::for_radar;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

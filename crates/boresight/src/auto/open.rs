@@ -26,6 +26,10 @@ pub const PROBE_FRAMES: usize = 48;
 /// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
 const FEW_STILL: f64 = 3.0;
 
+/// How long results of a recording are held back, s: longer than a target takes that is seen faintly or stands at first, and short enough that its frames fit into
+/// memory where they are small.
+const RETROSPECTIVE_S: f64 = 10.0;
+
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
     /// The frames, from the first on.
@@ -59,7 +63,10 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
         true => second_look::frames(input, base, PROBE_FRAMES),
         false => Vec::new(),
     };
-    let choice = choose_from(&mut frames, again, base, request)?;
+    let mut choice = choose_from(&mut frames, again, base, request)?;
+    if second_look::can_be_opened_twice(input) {
+        report_whole(&mut choice.config, &mut choice.reasons);
+    }
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
     }
@@ -82,6 +89,14 @@ pub fn read_and_choose(
     let again = || again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
     let choice = choose_from(&mut frames, again, base, request)?;
     Ok((frames, choice))
+}
+
+/// Has the tracks of a recording reported from their first detection on, since nobody waits for them, and says so; [`open_and_choose`] does it for files.
+pub fn report_whole(config: &mut Config, reasons: &mut Vec<String>) {
+    config.tracker.retrospective_s = RETROSPECTIVE_S;
+    reasons.push(format!(
+        "A confirmed track is reported from its first detection on, for {RETROSPECTIVE_S} s at most (from its confirmation on: --set tracker.retrospective-s=0)."
+    ));
 }
 
 /// The choice from frames read ahead; `again` gives those of the second look, which only a fixed camera or a colour asks for.

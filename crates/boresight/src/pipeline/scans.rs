@@ -63,12 +63,12 @@ impl Scans {
     }
 
     /// Takes memory back.
-    pub fn recycle(&mut self, made: Made) {
+    pub fn recycle(&mut self, frame: Frame, scan: Scan) {
         match self {
-            Self::Here(here) => here.recycle(made.frame, made.scan),
+            Self::Here(here) => here.recycle(frame, scan),
             Self::Ahead(ahead) => {
                 // A full queue means that there is memory enough.
-                let _ = ahead.spare.try_send((made.frame, made.scan));
+                let _ = ahead.spare.try_send((frame, scan));
             }
         }
     }
@@ -244,7 +244,7 @@ mod tests {
                 let made = scans.next().unwrap().unwrap();
                 assert_eq!((made.frame.index.0, made.scan.index.0), (k, k));
                 assert_eq!(made.warnings, (k == 2).then(|| vec!["third".to_string()]), "{n_threads}");
-                scans.recycle(made);
+                scans.recycle(made.frame, made.scan);
             }
             assert_eq!(scans.next().err().unwrap().to_string(), "over");
             assert_eq!(scans.last_warnings().unwrap(), ["third", "at the end"]);
@@ -291,7 +291,7 @@ mod tests {
                 let made = scans.next().unwrap().unwrap();
                 assert_eq!((made.frame.index.0, made.scan.index.0), (k, k));
                 assert!(made.scan.camera_motion.is_some());
-                scans.recycle(made);
+                scans.recycle(made.frame, made.scan);
             }
             assert_eq!(scans.next().err().unwrap().to_string(), "refused");
         }

@@ -92,6 +92,9 @@ pub struct TrackerConfig {
     pub merged_measurements: MergedMeasurementsConfig,
     /// Whether a target that was lost gets its old id when it is found again.
     pub reidentification: ReidentificationConfig,
+    /// A run on a file holds back its results this long, s, 0 or more, and reports a track that is confirmed within it from its first detection on
+    /// (shorter where frames and tracks of that time take more than 64 MiB each). 0 reports every scan at once, as a live run always does.
+    pub retrospective_s: f64,
     /// Two confirmed tracks that follow the same detections this long become one, s, above 0; the younger ends.
     pub duplicate_s: f64,
     /// How fast a track's box and intensity follow its detections, in (0, 1]; 1 takes the newest box as it is.
@@ -140,6 +143,7 @@ impl Default for TrackerConfig {
             two_stage: None,
             merged_measurements: MergedMeasurementsConfig::default(),
             reidentification: ReidentificationConfig::default(),
+            retrospective_s: 0.0,
             duplicate_s: 0.5,
             appearance_gain: 0.3,
             coast_s: 0.5,
@@ -275,6 +279,8 @@ impl TrackerConfig {
         }
         self.merged_measurements.validate(&format!("{at}.merged-measurements"))?;
         self.reidentification.validate(&format!("{at}.reidentification"))?;
+        let mend = "10 reports nearly every track whole, 0 reports at once";
+        not_negative(at, "retrospective-s", self.retrospective_s, mend)?;
         positive(at, "duplicate-s", self.duplicate_s, "half a second is usual")?;
         check(
             self.appearance_gain > 0.0 && self.appearance_gain <= 1.0,

@@ -7,7 +7,7 @@
 
 use super::tracking::Tracking;
 use crate::camera::SteadyGround;
-use crate::{Result, Scan, TrackState};
+use crate::{Result, Scan, TrackId, TrackState};
 
 /// Keeps the tracker inside on steady ground.
 pub struct Stabilised {
@@ -46,6 +46,14 @@ impl Tracking for Stabilised {
             });
         }
         Ok(&self.states)
+    }
+
+    fn renamed(&self) -> &[(TrackId, TrackId)] {
+        self.inner.renamed()
+    }
+
+    fn retrospective_s(&self) -> f64 {
+        self.inner.retrospective_s()
     }
 }
 

@@ -49,6 +49,8 @@ pub struct Tracker {
     lost: Reidentification,
     /// Tracks that were reported for the first time in this scan, by their place in `tracks`.
     new: Vec<u32>,
+    /// Tracks that got another id in this scan: the old one and the new one.
+    renamed: Vec<(TrackId, TrackId)>,
     weighted: Vec<Weighted>,
     /// Whether the associator is soft (then tracks may be duplicates), and which detections already have a track.
     is_soft: bool,
@@ -78,6 +80,7 @@ impl Tracker {
             merged: MergedMeasurements::default(),
             lost: Reidentification::default(),
             new: Vec::new(),
+            renamed: Vec::new(),
             weighted: Vec::new(),
             is_soft: config.associator.is_soft(),
             owned: Vec::new(),
@@ -198,7 +201,7 @@ impl Tracker {
     /// Gives tracks that their rule confirmed in this scan, or that are reported for the first time, the id of a lost one that they continue; states and
     /// tracks lie in one order. Those from `first_begun` on were begun in it.
     fn reidentify(&mut self, now: Timestamp, first_begun: usize) {
-        let Self { config, tracks, states, lost, new, clock, .. } = self;
+        let Self { config, tracks, states, lost, new, renamed, clock, .. } = self;
         let is_reported = |s: &TrackState| s.status != TrackStatus::Tentative;
         new.extend((first_begun..states.len()).filter(|&i| tracks[i].history.accepted).map(|i| i as u32));
         lost.forget(&config.reidentification, now);
@@ -228,6 +231,7 @@ impl Tracker {
             if !matches!(identity, Identity::New) {
                 tracks[i].motion.pass();
                 tracks[i].reported = true;
+                renamed.push((states[i].id, TrackId(tracks[i].id)));
                 states[i].id = TrackId(tracks[i].id);
                 states[i].status = status(&tracks[i].history, true, states[i].detection.is_some());
             }
@@ -244,6 +248,7 @@ impl Tracker {
 impl Tracking for Tracker {
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]> {
         let step_s = self.clock.step_s(scan)?;
+        self.renamed.clear();
         if scan.detections.len() >= u32::MAX as usize {
             return Err(Error::new(ErrorKind::Unsupported, "more than 2³² − 2 detections in one scan"));
         }
@@ -275,5 +280,13 @@ impl Tracking for Tracker {
         initiate(&context, &self.clutter, &mut self.association.used, &mut self.pending, &mut new);
         self.reidentify(scan.time, first_begun);
         Ok(&self.states)
+    }
+
+    fn renamed(&self) -> &[(TrackId, TrackId)] {
+        &self.renamed
+    }
+
+    fn retrospective_s(&self) -> f64 {
+        self.config.retrospective_s
     }
 }

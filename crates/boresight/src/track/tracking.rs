@@ -1,6 +1,6 @@
 //! The trait of everything that turns scans into tracks.
 
-use crate::{Result, Scan, TrackState};
+use crate::{Result, Scan, TrackId, TrackState};
 
 /// Turns scans into tracks: the tracker, or the multiple-hypothesis tracker.
 pub trait Tracking: Send {
@@ -8,4 +8,14 @@ pub trait Tracking: Send {
     /// # Errors
     /// A scan that runs back in time or holds values that are not finite; the tracks are then unchanged.
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]>;
+
+    /// Tracks that got another id in the newest scan, because they continue a lost one: the id they had until then, and the one they have now.
+    fn renamed(&self) -> &[(TrackId, TrackId)] {
+        &[]
+    }
+
+    /// For how long a run holds back its results, so that a track that is confirmed is reported from its first detection on, s; 0 gives them at once.
+    fn retrospective_s(&self) -> f64 {
+        0.0
+    }
 }

@@ -43,6 +43,10 @@ impl CameraCsv {
 }
 
 impl Sink for CameraCsv {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.line;
         out.clear();

@@ -58,6 +58,10 @@ impl DetectionsCsv {
 }
 
 impl Sink for DetectionsCsv {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.lines;
         for d in &view.scan.detections {

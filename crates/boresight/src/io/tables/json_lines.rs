@@ -111,6 +111,10 @@ fn track(out: &mut String, t: &TrackState) {
 }
 
 impl Sink for JsonLines {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.line;
         out.clear();

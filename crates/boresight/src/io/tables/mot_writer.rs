@@ -38,6 +38,10 @@ impl MotWriter {
 }
 
 impl Sink for MotWriter {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.lines;
         out.clear();

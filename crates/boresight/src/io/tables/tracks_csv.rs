@@ -79,6 +79,10 @@ impl TracksCsv {
 }
 
 impl Sink for TracksCsv {
+    fn needs_frames(&self) -> bool {
+        false
+    }
+
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         self.put_header()?;
         let out = &mut self.lines;
