@@ -1,5 +1,7 @@
 //! What the fuzz targets share: bytes as a file, and reading all frames of it with small limits.
 
+#![forbid(unsafe_code)]
+
 use boresight::io::{OpenOptions, open};
 use std::path::Path;
 

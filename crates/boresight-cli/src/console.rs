@@ -21,6 +21,7 @@ pub fn line(words: std::fmt::Arguments<'_>) {
 /// # Errors
 /// [`ErrorKind::Output`] if it cannot be written.
 pub fn print(bytes: &[u8]) -> boresight::Result<bool> {
+    crate::stdout_at_start::check()?;
     let mut out = std::io::stdout().lock();
     written(out.write_all(bytes).and_then(|()| out.flush()))
 }

@@ -18,11 +18,23 @@ pub const HELP: &str = "Exit codes:
 
 /// Shows what is asked for (help, version) or wrong in the arguments; returns the exit code.
 pub fn usage(words: &clap::Error) -> ExitCode {
+    if words.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        // clap does not say which; neither its form nor a list of options would help.
+        say!("error: a name among the arguments is not UTF-8: {}", not_utf8().join(", "));
+        say!("hint: rename it, or give it a name through a link: ln -s OLD new");
+        return ExitCode::from(2);
+    }
     let shown = words.print().and_then(|()| std::io::stdout().flush());
     if words.use_stderr() {
         return ExitCode::from(2);
     }
     console::written(shown).map_or_else(|e| report(&e.into()), |_| ExitCode::SUCCESS)
+}
+
+/// The arguments that are no UTF-8, with what is wrong in them as `\\xff`.
+fn not_utf8() -> Vec<String> {
+    let bad = std::env::args_os().skip(1).filter(|a| a.to_str().is_none());
+    bad.map(|a| a.as_encoded_bytes().escape_ascii().to_string()).collect()
 }
 
 /// Prints an error to standard error and returns its exit code.

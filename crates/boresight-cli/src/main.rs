@@ -7,6 +7,7 @@ mod console;
 mod exit;
 mod frame_writer;
 mod progress;
+mod stdout_at_start;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -97,7 +97,11 @@ impl Wishes {
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
         let (mut frames, mut choice) =
             auto::read_and_choose(base.input.mend(Box::new(frames))?, again, &base, &request)?;
-        auto::report_whole(&mut choice.config, &mut choice.reasons);
+        auto::report_whole(
+            frames.info().rate_hz.unwrap_or(base.input.rate_hz),
+            &mut choice.config,
+            &mut choice.reasons,
+        );
         choice.config = changed(choice.config, &self.sets)?;
         let detector = auto::learn(&mut frames, &mut choice, &request)?;
         self.chosen(frames, choice, detector)
@@ -149,7 +153,8 @@ impl Wishes {
             return Err(e.at(input));
         }
         let notes = table.warnings.iter().filter(|w| !table.lost.contains(w)).cloned().collect::<Vec<_>>();
-        let mut plan = self.for_scans(table.scans, table.rate_hz, base, table.format)?;
+        let turn = table.radar.as_ref().map(|r| (r.turn_s, r.unit));
+        let mut plan = self.of_scans(table.scans, table.rate_hz, turn, base, table.format)?;
         plan.reasons.splice(0..0, notes);
         plan.lost = table.lost;
         Ok(plan)
@@ -157,13 +162,28 @@ impl Wishes {
 
     /// The plan for detections made elsewhere.
     pub fn for_scans(self, scans: Vec<Scan>, rate_hz: f64, base: Config, reader: String) -> Result<Plan> {
+        self.of_scans(scans, rate_hz, None, base, reader)
+    }
+
+    /// As [`Self::for_scans`]; `turn` is the time of a turn of the antenna and the unit of length, of a radar's plots.
+    fn of_scans(
+        self,
+        scans: Vec<Scan>,
+        rate_hz: f64,
+        turn: Option<(f64, io::LengthUnit)>,
+        base: Config,
+        reader: String,
+    ) -> Result<Plan> {
         let mut config = changed(base, &self.sets)?;
         let mut reasons = Vec::new();
         if self.config.is_some() {
             reasons.push("Configuration as given.".to_string());
         } else {
-            auto::for_detections(&scans, rate_hz, self.false_tracks_per_hour, &mut config, &mut reasons);
-            auto::report_whole(&mut config, &mut reasons);
+            match turn {
+                Some((turn_s, unit)) => auto::for_radar(&scans, turn_s, unit, &mut config, &mut reasons),
+                None => auto::for_detections(&scans, rate_hz, self.false_tracks_per_hour, &mut config, &mut reasons),
+            }
+            auto::report_whole(rate_hz, &mut config, &mut reasons);
             config = changed(config, &self.sets)?;
         }
         let total = Some(scans.len() as u64);

@@ -79,6 +79,7 @@ mod frame;
 pub mod fuse;
 mod image;
 pub mod io;
+mod memory_budget;
 pub mod metrics;
 #[cfg(any(feature = "draw", feature = "report"))]
 mod palette;

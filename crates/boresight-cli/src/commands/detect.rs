@@ -1,6 +1,7 @@
 //! `boresight detect`: frames in, detections out.
 
-use super::run_options::{self, InputArgs, Stop, TrackerArgs};
+use super::run_options::{self, InputArgs, TrackerArgs};
+use super::stop::Stop;
 use crate::console::say;
 use crate::progress;
 use boresight::io::DetectionsCsv;
@@ -27,13 +28,16 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let path = args.output.clone().unwrap_or_else(|| run_options::default_folder(&args.input.input, "detections.csv"));
     let to_stdout = path.as_os_str() == "-";
-    if !to_stdout {
+    if to_stdout {
+        crate::stdout_at_start::check()?;
+    } else {
         boresight::io::refuse_to_overwrite(&args.input.input, [path.as_path()])?;
     }
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &TrackerArgs::default(), None)?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
-    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some());
+    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
+    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(unit);
     if !args.input.quiet {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }

@@ -1,12 +1,13 @@
 //! `boresight fuse`: two sensors' tracks or detections become one table of tracks.
 
 mod input;
+mod radar;
 
 use crate::console::say;
 use boresight::fuse::{
     FuseConfig, PlaneMap, Registration, RegistrationConfig, Rule, SensorScans, Timeline, fuse_tables, merge_scans,
 };
-use boresight::io::TracksCsv;
+use boresight::io::{LengthUnit, TracksCsv};
 use boresight::{Config, FrameIndex, Scan, Sink, Timestamp, TrackState, View};
 use input::{MapSpec, Sensor};
 use std::path::{Path, PathBuf};
@@ -32,6 +33,10 @@ enum Estimate {
     Rotation,
     /// Time offset.
     Time,
+    /// Range bias of a radar, the second sensor.
+    Range,
+    /// Azimuth bias of a radar, about where it is.
+    Azimuth,
 }
 
 /// Where fusion happens.
@@ -49,7 +54,7 @@ enum Level {
 #[command(after_help = "Examples:
   boresight fuse imaging/tracks.csv radar/tracks.csv -o fused.csv
   boresight fuse a.csv b.csv --register offset,rotation,time --rule independent
-  boresight fuse ais.csv radar.csv --register rotation --pivot 0,0          a radar at the origin with a biased azimuth
+  boresight fuse ais.csv plots.csv --register range,azimuth                 a radar's biases, from ships' own reports
   boresight fuse imaging/detections.csv radar.csv --config track.toml      two tables of detections: one tracker takes both
   boresight fuse tracks.csv radar.csv --map-b 0.5,0,100,0,0.5,40            the radar's metres into the imager's pixels
   boresight fuse tracks.csv map.csv --map-b homography:points.csv           from points known in both frames (x,y,X,Y)
@@ -71,7 +76,7 @@ pub struct Args {
     /// Estimate these from common targets before fusing.
     #[arg(long, value_enum, value_delimiter = ',')]
     register: Vec<Estimate>,
-    /// Point of the second sensor's frame that --register rotation turns about: where a radar with a biased azimuth stands.
+    /// Point of the second sensor's frame that --register rotation turns about, and where a radar stands whose table does not say it.
     #[arg(long, value_name = "X,Y", num_args = 1, value_delimiter = ',', allow_negative_numbers = true)]
     pivot: Option<Vec<f64>>,
     /// Map of the first sensor's frame into the common one: 6 numbers (affine), 9 (homography), a file of them, or
@@ -93,14 +98,19 @@ pub struct Args {
     /// Acceleration power density between times, px²/s³.
     #[arg(long, default_value_t = 1.0)]
     density: f64,
-    /// A sensor's track is predicted at most this long, s.
-    #[arg(long, default_value_t = 2.0)]
-    max_gap: f64,
+    /// A sensor's track is predicted at most this long, s; 2 if absent, 30 for ships' reports.
+    #[arg(long)]
+    max_gap: Option<f64>,
 }
+
+/// How long a track is predicted, and how far ships' reports may lie apart, s.
+const MAX_GAP_S: f64 = 2.0;
+const REPORTS_GAP_S: f64 = 30.0;
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    for (key, value) in [("--gate", args.gate), ("--density", args.density), ("--max-gap", args.max_gap)] {
+    let gap = args.max_gap.unwrap_or(MAX_GAP_S);
+    for (key, value) in [("--gate", args.gate), ("--density", args.density), ("--max-gap", gap)] {
         if !(value.is_finite() && value >= 0.0) {
             let e = boresight::Error::new(boresight::ErrorKind::Config, "expected a number of 0 or more");
             return Err(e.at(format!("{key} {value}")).into());
@@ -112,9 +122,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     refuse_inputs(&args)?;
     let config = args.config.as_deref().map(Config::from_file).transpose()?;
-    let (a, b) = sensors(&args, config.as_ref())?;
+    let (a, mut b) = sensors(&args, gap, config.as_ref())?;
     let wanted = |e| args.register.contains(&e);
-    let registration = (!args.register.is_empty()).then(|| RegistrationConfig {
+    let max_gap_s = args.max_gap.unwrap_or(if a.is_reports { REPORTS_GAP_S } else { MAX_GAP_S });
+    if wanted(Estimate::Range) || wanted(Estimate::Azimuth) {
+        let what = [wanted(Estimate::Range), wanted(Estimate::Azimuth)];
+        radar::register(&a, &mut b, what, args.pivot.as_deref(), max_gap_s, config.as_ref())?;
+    }
+    let further = [Estimate::Offset, Estimate::Rotation, Estimate::Time].into_iter().any(wanted);
+    let registration = further.then(|| RegistrationConfig {
         offset: wanted(Estimate::Offset),
         rotation: wanted(Estimate::Rotation),
         time: wanted(Estimate::Time),
@@ -125,14 +141,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         RuleName::Ci => Rule::CovarianceIntersection,
         RuleName::Ici => Rule::InverseCovarianceIntersection,
     };
-    let fuse_config = FuseConfig {
-        rule,
-        gate: args.gate,
-        density: args.density,
-        max_gap_s: args.max_gap,
-        registration,
-        ..FuseConfig::default()
-    };
+    let fuse_config =
+        FuseConfig { rule, gate: args.gate, density: args.density, max_gap_s, registration, ..FuseConfig::default() };
     let fused = fuse_tables(&a.tracks, &b.tracks, &fuse_config)?;
     if registration.is_some() {
         say_registration(&fused.registration);
@@ -155,7 +165,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !own {
         say!("note: the times are not all frames of the first sensor: frames are numbered anew, compare by time_s");
     }
-    write(&args.output, &frames, &numbers)?;
+    let unit = [&a, &b].into_iter().find_map(|s| s.radar.as_ref()).map(|r| r.unit).unwrap_or_default();
+    write(&args.output, &frames, &numbers, unit)?;
     say!(
         "{} + {} tracks, {} paired; {} at {} times: {}",
         a.tracks.len(),
@@ -177,7 +188,7 @@ fn refuse_inputs(args: &Args) -> boresight::Result<()> {
 }
 
 /// Reads both sensors into the common frame.
-fn sensors(args: &Args, config: Option<&Config>) -> anyhow::Result<(Sensor, Sensor)> {
+fn sensors(args: &Args, max_gap_s: f64, config: Option<&Config>) -> anyhow::Result<(Sensor, Sensor)> {
     let spec = |text: &Option<String>| text.as_deref().map(MapSpec::read).transpose();
     let known = match spec(&args.map_a)? {
         None => PlaneMap::IDENTITY,
@@ -194,7 +205,7 @@ fn sensors(args: &Args, config: Option<&Config>) -> anyhow::Result<(Sensor, Sens
         Some(MapSpec::FromTracks(kind)) => {
             let raw: Vec<Timeline> = input::read(&args.b, config, &PlaneMap::IDENTITY)?.tracks;
             let pairs = args.common.as_deref().map_or(Ok(Vec::new()), input::common_tracks)?;
-            let map = input::map_from_tracks(kind, &a.tracks, &raw, &pairs, args.max_gap)?;
+            let map = input::map_from_tracks(kind, &a.tracks, &raw, &pairs, max_gap_s)?;
             input::read(&args.b, config, &map)?
         }
     };
@@ -212,7 +223,7 @@ fn together(
     // The maps are in the detections already.
     let plain = |scans, registration| SensorScans { scans, map: PlaneMap::IDENTITY, registration };
     let (scans, _) = merge_scans(&[plain(x, Registration::IDENTITY), plain(y, *registration)]);
-    let config = input::tracker_of(&scans, a.rate_hz, config);
+    let config = input::tracker_of(&scans, a.rate_hz, a.radar.as_ref().map(|r| (r.turn_s, r.unit)), config);
     // Of several scans of one time the last one's tracks have taken all of them.
     let mut frames: Vec<(f64, Vec<TrackState>)> = Vec::new();
     for (time_s, tracks) in input::run_tracker(&config, &scans)? {
@@ -224,8 +235,8 @@ fn together(
     Ok(frames)
 }
 
-fn write(path: &Path, frames: &[(f64, Vec<TrackState>)], numbers: &[u64]) -> boresight::Result<()> {
-    let mut out = TracksCsv::create(path)?;
+fn write(path: &Path, frames: &[(f64, Vec<TrackState>)], numbers: &[u64], unit: LengthUnit) -> boresight::Result<()> {
+    let mut out = TracksCsv::create(path)?.with_unit(unit);
     for (k, (time_s, tracks)) in numbers.iter().zip(frames) {
         let scan = Scan::at(FrameIndex(*k), Timestamp::from_secs_f64(*time_s));
         out.put(&View { frame: None, scan: &scan, tracks })?;

@@ -1,6 +1,6 @@
 //! `boresight live`: a camera in, tracks out while it happens.
 
-use super::run_options::Stop;
+use super::stop::Stop;
 use crate::console::{print, say};
 use boresight::auto::DetectorKind;
 use boresight::{Config, Error, ErrorKind};

@@ -20,4 +20,5 @@ pub mod sensor;
 pub mod simulate;
 pub mod smooth;
 pub mod stitch;
+mod stop;
 pub mod track;

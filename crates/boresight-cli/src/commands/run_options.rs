@@ -1,17 +1,13 @@
-//! What `track` and `detect` share: the input, the configuration or its automatic choice, signals, the outcome.
+//! What `track` and `detect` share: the input, the configuration or its automatic choice, the outcome.
 
 use crate::console::say;
-use anyhow::Context;
 use boresight::FrameSource as _;
 use boresight::auto;
 use boresight::io::{Pictures, SequenceInfo};
 use boresight::pipeline::{Input, Outcome};
 use boresight::{Config, Error, ErrorKind, vision};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Where frames come from and how they are treated.
 #[derive(Debug, clap::Args)]
@@ -44,7 +40,7 @@ pub struct InputArgs {
     /// Frames of even light, by which unequal response is divided out. Short for `--set input.sensor.flat=..`.
     #[arg(long, value_name = "INPUT")]
     pub flat: Option<String>,
-    /// Memory that reading one picture may take, MB; half of the machine's if absent.
+    /// Memory that reading one picture (of a file, a video, a stream), or the histories of one scan, may take, MB; half of the machine's if absent.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
     pub max_memory: Option<u64>,
     /// Threads to read, detect and write on; all the machine has if absent. The results are the same for any number.
@@ -88,6 +84,8 @@ pub struct Plan {
     pub lost: Vec<String>,
     /// What is known of the source.
     pub info: Option<boresight::SourceInfo>,
+    /// Where the radar was, of a radar's plots.
+    pub radar: Option<boresight::io::RadarPicture>,
     n_scans: Option<u64>,
 }
 
@@ -154,7 +152,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
         let input = Input::Frames(source, detector);
-        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None });
+        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None });
     }
     let request = auto::Request {
         detector: args.detector,
@@ -169,7 +167,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), n_scans: None })
+    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None })
 }
 
 /// A sentence that names the detector's keys that are set in vain.
@@ -229,13 +227,21 @@ fn plan_table(
             .at(&args.input)
             .into());
     }
-    let mut reasons = vec![format!(
-        "{} detections in {} frames at {} frames/s, read as {}.",
-        table.n_rows - table.n_skipped,
-        table.scans.len(),
-        table.rate_hz,
-        table.format
-    )];
+    let n_read = table.n_rows - table.n_skipped;
+    let mut reasons = vec![match &table.radar {
+        Some(radar) => format!(
+            "{n_read} plots of range and azimuth in {} scans, one in {:.3} s; positions in {} east and north.",
+            table.scans.len(),
+            radar.turn_s,
+            radar.unit.sign()
+        ),
+        None => format!(
+            "{n_read} detections in {} frames at {} frames/s, read as {}.",
+            table.scans.len(),
+            table.rate_hz,
+            table.format
+        ),
+    }];
     reasons.extend(table.warnings.iter().filter(|w| !table.lost.contains(w)).cloned());
     let mut config = base;
     match given {
@@ -244,13 +250,22 @@ fn plan_table(
             // The first pass runs with the filter that is asked for.
             config = changed(config, args, tracker)?;
             let allowed = tracker.false_tracks_per_hour;
-            auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons);
-            auto::report_whole(&mut config, &mut reasons);
+            match &table.radar {
+                Some(radar) => auto::for_radar(&table.scans, radar.turn_s, radar.unit, &mut config, &mut reasons),
+                None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
+            }
+            auto::report_whole(table.rate_hz, &mut config, &mut reasons);
         }
     }
     config = changed(config, args, tracker)?;
     let n_scans = Some(table.scans.len() as u64);
     let (input, info) = match frames {
+        Some(frames) if table.radar.is_some() => {
+            return Err(Error::new(ErrorKind::Config, "a radar's plots have no pictures to be drawn on")
+                .at(format!("--frames {frames}"))
+                .hint("leave --frames out: the report draws a map")
+                .into());
+        }
         Some(frames) => {
             let pictures = Pictures::open(frames, &config.input.open_options(), &table, &sequence)?;
             let info = pictures.info().clone();
@@ -264,7 +279,7 @@ fn plan_table(
             (Input::Scans(table.scans), None)
         }
     };
-    Ok(Plan { input, config, reasons, lost: table.lost, info, n_scans })
+    Ok(Plan { input, config, reasons, lost: table.lost, info, radar: table.radar, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.
@@ -276,48 +291,6 @@ pub fn default_folder(input: &str, ending: &str) -> PathBuf {
         .unwrap_or("boresight");
     let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     PathBuf::from(format!("{name}.{ending}"))
-}
-
-/// What Ctrl-C and a polite kill do: before a run nothing is written yet, so they end the command at once; a run ends behind its
-/// frame and keeps its results; a second signal ends it at once.
-pub struct Stop {
-    raised: Arc<AtomicBool>,
-    running: Arc<AtomicBool>,
-}
-
-impl Stop {
-    /// Takes the signals.
-    /// # Errors
-    /// A system that lets no signal be taken.
-    pub fn on_signal() -> anyhow::Result<Self> {
-        let stop = Self { raised: Arc::default(), running: Arc::default() };
-        let (raised, running) = (Arc::clone(&stop.raised), Arc::clone(&stop.running));
-        ctrlc::set_handler(move || {
-            if raised.swap(true, Ordering::SeqCst) || !running.load(Ordering::SeqCst) {
-                std::process::exit(130);
-            }
-        })
-        .context("no handler for Ctrl-C could be set")?;
-        Ok(stop)
-    }
-
-    /// The run begins: from now on there are results to keep.
-    pub fn run_begins(&self) {
-        self.running.store(true, Ordering::SeqCst);
-    }
-
-    /// Whether the run goes on.
-    pub fn go_on(&self) -> ControlFlow<()> {
-        if self.raised.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-}
-
-/// Ends the program at once when standard input ends: whoever started it and held the other end is gone, in whatever way.
-pub fn end_with_stdin() {
-    std::thread::spawn(|| {
-        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        std::process::exit(130);
-    });
 }
 
 /// A sentence on how many positions are fitted, where a fit was asked for.

@@ -71,6 +71,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let mut source = build(&scene, seed)?;
     if args.output == Path::new("-") {
+        crate::stdout_at_start::check()?;
         let mut writer = FrameWriter::stream(Box::new(std::io::BufWriter::new(std::io::stdout())), source.info())?;
         while let Some(frame) = source.next_frame()? {
             writer.put(&frame)?;

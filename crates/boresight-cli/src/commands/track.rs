@@ -3,16 +3,18 @@
 use super::also;
 use super::command_line;
 use super::run_folder::RunFolder;
-use super::run_options::{self, InputArgs, Plan, Stop, TrackerArgs};
+use super::run_options::{self, InputArgs, Plan, TrackerArgs};
 use super::run_summary::RunSummary;
+use super::stop::Stop;
 use crate::console::say;
 use crate::progress;
 use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, Thumbnail};
+use boresight::io::LengthUnit;
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
 use boresight::verdict::Observed;
-use boresight::{Sink, track};
+use boresight::{Error, ErrorKind, Sink, track};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -88,7 +90,7 @@ impl Args {
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.end_with_stdin {
-        run_options::end_with_stdin();
+        super::stop::end_with_stdin();
     }
     let input = args.input.input.as_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
@@ -103,11 +105,22 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
     }
+    if let Some(radar) = &plan.radar {
+        folder.leave_out(&["mot.txt"]);
+        if let (LengthUnit::Metre, Some(name)) = (radar.unit, args.also.first()) {
+            let e = Error::new(ErrorKind::Config, "these formats hold pixels, and the tracks of a radar are in metres");
+            return Err(e.at(format!("--also ({name})")).hint("leave it out: tracks.csv names its units").into());
+        }
+    }
+    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
     let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
+    if let Some(radar) = &plan.radar {
+        report = report.map(|r| r.with_map(radar.clone()));
+    }
     let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input)?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input, unit)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -211,16 +224,18 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, plan: &Plan, input: &str) -> boresight::Result<Vec<Box<dyn Sink>>> {
+fn sinks(folder: &RunFolder, plan: &Plan, input: &str, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let with_fits = plan.config.detector.centroid.fit.is_some();
     let mut sinks: Vec<Box<dyn Sink>> = vec![
-        Box::new(TracksCsv::create(folder.path("tracks.csv"))?),
-        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits)),
-        Box::new(MotWriter::create(folder.path("mot.txt"))?),
+        Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit)),
+        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits).with_unit(unit)),
     ];
+    if folder.makes("mot.txt") {
+        sinks.push(Box::new(MotWriter::create(folder.path("mot.txt"))?));
+    }
     if folder.makes("tracks.jsonl") {
-        sinks.push(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?));
+        sinks.push(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?.with_unit(unit)));
     }
     if folder.makes("camera.csv") {
         sinks.push(Box::new(CameraCsv::create(folder.path("camera.csv"))?));

@@ -162,3 +162,33 @@ fn the_help_lists_every_code() {
         assert!(text.lines().any(|l| l.trim_start().starts_with(code)), "{code}: {text}");
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_closed_standard_output_is_an_error_of_the_output_and_one_that_is_thrown_away_is_not() {
+    let run = |redirect: &str| {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("d.csv"), "frame,x,y\n0,1,2\n1,2,2\n").unwrap();
+        let command = format!("{} detect d.csv -o - {redirect}", env!("CARGO_BIN_EXE_boresight"));
+        std::process::Command::new("sh").args(["-c", &command]).current_dir(dir.path()).output().unwrap()
+    };
+    let closed = run(">&-");
+    assert_eq!(closed.status.code(), Some(5), "{}", stderr(&closed));
+    assert!(stderr(&closed).contains("standard output: is closed"), "{}", stderr(&closed));
+    for kept in [">/dev/null", "1<>/dev/null", "| cat"] {
+        assert_eq!(run(kept).status.code(), Some(0), "{kept}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_name_that_is_not_utf8_is_said_as_it_is() {
+    use std::os::unix::ffi::OsStrExt;
+    let name = std::ffi::OsStr::from_bytes(b"clip\xff.mp4");
+    for command in ["track", "detect"] {
+        let out = std::process::Command::new(env!("CARGO_BIN_EXE_boresight")).arg(command).arg(name).output().unwrap();
+        assert_eq!(out.status.code(), Some(2));
+        let said = stderr(&out);
+        assert!(said.contains("clip\\xff.mp4") && said.contains("ln -s"), "{said}");
+    }
+}

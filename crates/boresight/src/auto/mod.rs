@@ -25,6 +25,7 @@ mod open;
 mod particles;
 #[cfg(feature = "report")]
 mod preview;
+mod radar;
 mod request;
 mod scene;
 mod score_statistics;
@@ -42,5 +43,6 @@ pub use detections::for_detections;
 pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose, report_whole};
 #[cfg(feature = "report")]
 pub use preview::preview;
+pub use radar::for_radar;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;

@@ -29,6 +29,8 @@ const FEW_STILL: f64 = 3.0;
 /// How long results of a recording are held back, s: longer than a target takes that is seen faintly or stands at first, and short enough that its frames fit into
 /// memory where they are small.
 const RETROSPECTIVE_S: f64 = 10.0;
+/// And for how many scans at least: as many as a radar's target of P_D 0.5 needs to be confirmed in clutter.
+const RETROSPECTIVE_SCANS: f64 = 30.0;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
@@ -65,7 +67,8 @@ pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<
     };
     let mut choice = choose_from(&mut frames, again, base, request)?;
     if second_look::can_be_opened_twice(input) {
-        report_whole(&mut choice.config, &mut choice.reasons);
+        let rate_hz = frames.info().rate_hz.unwrap_or(base.input.rate_hz);
+        report_whole(rate_hz, &mut choice.config, &mut choice.reasons);
     }
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
@@ -91,11 +94,13 @@ pub fn read_and_choose(
     Ok((frames, choice))
 }
 
-/// Has the tracks of a recording reported from their first detection on, since nobody waits for them, and says so; [`open_and_choose`] does it for files.
-pub fn report_whole(config: &mut Config, reasons: &mut Vec<String>) {
-    config.tracker.retrospective_s = RETROSPECTIVE_S;
+/// Has the tracks of a recording of so many scans a second reported from their first detection on, since nobody waits for them, and says so; [`open_and_choose`]
+/// does it for files.
+pub fn report_whole(rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
+    let hold_s = RETROSPECTIVE_S.max((RETROSPECTIVE_SCANS / rate_hz.max(1e-9)).ceil());
+    config.tracker.retrospective_s = hold_s;
     reasons.push(format!(
-        "A confirmed track is reported from its first detection on, for {RETROSPECTIVE_S} s at most (from its confirmation on: --set tracker.retrospective-s=0)."
+        "A confirmed track is reported from its first detection on, for {hold_s} s at most (from its confirmation on: --set tracker.retrospective-s=0)."
     ));
 }
 

@@ -33,7 +33,9 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
             break;
         }
     }
-    let Some(fastest) = Evidence::of(&sightings, area_px2).fastest_px_per_s() else { return };
+    // Scans of one time (two sensors') would make any step infinitely fast.
+    let fastest = Evidence::of(&sightings, area_px2).fastest_px_per_s().filter(|f| f.is_finite());
+    let Some(fastest) = fastest else { return };
     let speed = round(RESERVE * fastest);
     if speed > config.tracker.max_speed_px_per_s {
         reasons.push(format!(

@@ -5,6 +5,7 @@
 //! `pairing` of tracks, fusion at every time of either sensor, and a check whether the sensors agree.
 //! Measurements: `measurement` feeds one target's filter with several sensors' reports (stacked in the square-root information
 //! filter, one after the other in the others, late ones where they belong); `merge` makes one sequence of scans for a tracker.
+//! `polar_registration` finds a radar's biases of range and azimuth.
 //! `plane` brings frames of reference together (affine map, homography; given or estimated).
 
 pub(crate) mod covariance_intersection;
@@ -12,6 +13,7 @@ pub(crate) mod measurement;
 pub(crate) mod merge;
 pub(crate) mod pairing;
 pub(crate) mod plane;
+pub(crate) mod polar_registration;
 pub(crate) mod registration;
 pub(crate) mod tables;
 pub(crate) mod timeline;
@@ -23,6 +25,7 @@ pub use track_to_track::{fuse_correlated, fuse_independent};
 
 pub use merge::{SensorScans, merge_scans};
 pub use plane::{MapKind, PlaneMap};
+pub use polar_registration::{PolarConfig, PolarRegistration, register_polar};
 pub use registration::{Registration, RegistrationConfig};
 pub use tables::{FuseConfig, Fused, Rule, fuse_tables};
 pub use timeline::{Timeline, timelines};

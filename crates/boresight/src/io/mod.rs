@@ -3,8 +3,6 @@
 mod atomic;
 mod atomic_folder;
 #[cfg(feature = "images")]
-mod budget;
-#[cfg(feature = "images")]
 mod folder;
 #[cfg(feature = "images")]
 mod guard;
@@ -35,10 +33,9 @@ pub mod tracks;
 pub mod video;
 pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 
+pub use crate::memory_budget::set_memory_budget;
 pub use atomic::{AtomicFile, Output, write_whole};
 pub use atomic_folder::{AtomicFolder, remove_folder};
-#[cfg(feature = "images")]
-pub use budget::set_memory_budget;
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
 pub use natural::natural_order;
@@ -54,6 +51,7 @@ pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
-    CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, MotWriter, SequenceInfo, StateTable, TableOptions,
-    TracksCsv, read_detections, read_tracks,
+    AzimuthFrom, CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, LengthUnit, MotWriter, RadarOptions,
+    RadarPicture, SequenceInfo, ShipReports, StateTable, TableOptions, TracksCsv, read_detections, read_ship_reports,
+    read_tracks,
 };

@@ -300,8 +300,7 @@ mod tests {
             let input = Input::Scans((0..n).map(scan).collect());
             let outcome = run(input, Some(tracking), sinks, &mut |_| ControlFlow::Continue(()));
             assert_eq!((outcome.summary.frames, outcome.summary.confirmed_tracks), (n, 1));
-            let rows = rows.lock().unwrap().clone();
-            rows
+            rows.lock().unwrap().clone()
         };
         let (at_once, whole) = (rows(0.0, 12), rows(10.0, 12));
         let places = |rows: &[(u64, u64, TrackStatus)]| rows.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>();

@@ -3,6 +3,7 @@
 use super::collect::{Collected, Sample, TrackLog};
 use super::text::{push_array, short};
 use crate::TrackStatus;
+use crate::io::LengthUnit;
 use std::fmt::Write;
 
 /// Points of all curves of one kind together.
@@ -10,12 +11,12 @@ const POINTS_IN_ALL: usize = 40_000;
 
 /// The counts over time and the curves of `detailed`. Only numbers and our own words go in, so nothing can end the script element. Writing to
 /// a String cannot fail, so results of `write!` are dropped.
-pub(super) fn json(seen: &Collected, detailed: &[&TrackLog]) -> String {
+pub(super) fn json(seen: &Collected, detailed: &[&TrackLog], unit: LengthUnit) -> String {
     let mut out = String::with_capacity(1 << 20);
     let out = &mut out;
     let b = &seen.buckets;
     let mean = |sum: u64, n: u64| sum as f64 / n.max(1) as f64;
-    let _ = write!(out, "{{\"counts\":{{\"per\":{},\"t\":", seen.per_bucket);
+    let _ = write!(out, "{{\"unit\":\"{}\",\"counts\":{{\"per\":{},\"t\":", unit.sign(), seen.per_bucket);
     push_array(out, b.iter().map(|b| b.time_s), 9);
     out.push_str(",\"f\":");
     push_array(out, b.iter().map(|b| b.frame as f64), 12);

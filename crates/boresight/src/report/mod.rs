@@ -11,6 +11,7 @@ mod contact_sheet;
 mod curves;
 mod ground;
 mod key_frames;
+mod map;
 mod notes;
 mod page;
 mod picture;

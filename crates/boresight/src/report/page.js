@@ -44,8 +44,10 @@
   }
 
   class Chart {
-    constructor(host, group, title, reading) {
-      this.group = group; this.reading = reading; this.spec = null;
+    constructor(host, group, titled, read) {
+      // Titles and readings speak of pixels; a map counts metres.
+      const inUnit = text => data.unit === "px" ? text : text.replaceAll("px", data.unit), title = inUnit(titled);
+      this.group = group; this.reading = i => inUnit(read(i)); this.spec = null;
       const figure = document.createElement("figure"), caption = document.createElement("figcaption");
       caption.append(title);
       this.out = document.createElement("span"); this.out.className = "reading"; caption.append(this.out);

@@ -1,6 +1,7 @@
 //! Puts the page together: summary, trajectories over a frame, tracks with their consistency, curves, counts, stages.
 
 use super::collect::{Collected, TrackLog};
+use super::map::{self, Map};
 use super::notes::Notes;
 use super::text::{printable, short};
 use super::{curves, trajectories};
@@ -13,7 +14,7 @@ const N_DETAILED: usize = 50;
 const N_WARNINGS: usize = 50;
 
 /// Writes the page.
-pub(super) fn page(notes: &Notes, seen: &Collected) -> String {
+pub(super) fn page(notes: &Notes, seen: &Collected, map: Option<&Map>) -> String {
     let name = notes.input.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
     let title = [notes.title.as_str(), name, "Tracks"].into_iter().find(|t| !t.is_empty()).unwrap_or_default();
     let title = printable(title);
@@ -43,14 +44,17 @@ pub(super) fn page(notes: &Notes, seen: &Collected) -> String {
                         (summary(notes, seen))
                         (settings(notes))
                     }
-                    (trajectories::section(seen, &order, &detailed))
+                    @match map {
+                        Some(map) => (map::section(map, &order, &detailed)),
+                        None => (trajectories::section(seen, &order, &detailed)),
+                    }
                     (table(seen, &detailed))
                     (charts(&detailed))
                     (counts(seen))
                     (stages(notes, seen))
                     noscript { p { "The curves need JavaScript; the summary, the trajectories and the tables do not." } }
                 }
-                script type="application/json" id="data" { (PreEscaped(curves::json(seen, &detailed))) }
+                script type="application/json" id="data" { (PreEscaped(curves::json(seen, &detailed, map.map(Map::unit).unwrap_or_default()))) }
                 script { (PreEscaped(include_str!("page.js"))) }
             }
         }

@@ -1,9 +1,10 @@
 //! The report of a run: its sink collects while the run goes on, then the page is written.
 
 use super::collect::Collected;
+use super::map::Map;
 use super::notes::Notes;
 use super::page;
-use crate::io::AtomicFile;
+use crate::io::{AtomicFile, RadarPicture};
 use crate::{Error, ErrorKind, Result, Sink, View};
 use std::io::Write;
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ use std::path::PathBuf;
 pub struct HtmlReport {
     file: AtomicFile,
     seen: Collected,
+    map: Option<Map>,
 }
 
 opaque_debug!(HtmlReport);
@@ -37,19 +39,25 @@ impl HtmlReport {
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be written.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
-        Ok(Self { file: AtomicFile::create(path)?, seen: Collected::default() })
+        Ok(Self { file: AtomicFile::create(path)?, seen: Collected::default(), map: None })
+    }
+
+    /// Draws a map, north up, in the place of trajectories over a picture.
+    pub fn with_map(mut self, radar: RadarPicture) -> Self {
+        self.map = Some(Map::new(radar));
+        self
     }
 
     /// The sink through which the report sees a run.
     pub fn sink(&mut self) -> ReportSink<'_> {
-        ReportSink { seen: &mut self.seen }
+        ReportSink { seen: &mut self.seen, map: self.map.as_mut() }
     }
 
     /// Writes the page; only now the file appears.
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be written.
     pub fn write(mut self, notes: &Notes) -> Result<()> {
-        let html = page::page(notes, &self.seen);
+        let html = page::page(notes, &self.seen, self.map.as_ref());
         self.file.write_all(html.as_bytes()).map_err(|e| {
             Error::new(ErrorKind::Output, "cannot be written").at(self.file.part_path().display()).because(e)
         })?;
@@ -60,6 +68,7 @@ impl HtmlReport {
 /// Collects what a report needs; it writes nothing itself.
 pub struct ReportSink<'a> {
     seen: &'a mut Collected,
+    map: Option<&'a mut Map>,
 }
 
 impl std::fmt::Debug for ReportSink<'_> {
@@ -71,6 +80,9 @@ impl std::fmt::Debug for ReportSink<'_> {
 impl Sink for ReportSink<'_> {
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         self.seen.put(view);
+        if let Some(map) = &mut self.map {
+            map.put(view);
+        }
         Ok(())
     }
 

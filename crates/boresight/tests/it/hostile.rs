@@ -7,7 +7,9 @@
 use super::memory::peak_of;
 use boresight::io::tracks::ctc_write::write_folder;
 use boresight::io::tracks::{Format, ReadOptions, read, write};
-use boresight::io::{OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_tracks};
+use boresight::io::{
+    OpenOptions, RawFormat, RawType, TableOptions, open, read_detections, read_ship_reports, read_tracks,
+};
 use boresight::metrics::{MatchOptions, mot_scores};
 use boresight::sim::{SceneConfig, Seed, named};
 use boresight::{Config, Error};
@@ -239,6 +241,50 @@ fn damaged_tables_of_detections_are_survived() {
             }
         }
     }
+}
+
+/// A radar's plots of an antenna that turns in 2.5 s, own ship, and ships' reports.
+fn radar_tables() -> [(&'static str, String); 3] {
+    let plots = (0..60u32).map(|k| {
+        let (turn, part) = (k / 3, 0.2 + 0.3 * f64::from(k % 3));
+        let t = 2.5 * (f64::from(turn) + part);
+        format!("{t},{},{},0.0004,900\n", std::f64::consts::TAU * part, 900 + 10 * k)
+    });
+    let own = (0..30u32).map(|k| format!("{},{},-{k}.5,{}\n", 2 * k, 3 * k, 350 + k));
+    let ships = (0..40u32).map(|k| format!("23500{},{},{},50,90,-1.1,50.7\n", k % 4, 3 * k, 10 * k));
+    [
+        ("plots.csv", "t,azimuth_rad,range_m,var_az,var_r\n".to_string() + &plots.collect::<String>()),
+        ("ownship.csv", "t,x,y,heading_deg\n".to_string() + &own.collect::<String>()),
+        ("ais.csv", "mmsi,t,x,y,heading_deg,lon,lat\n".to_string() + &ships.collect::<String>()),
+    ]
+}
+
+#[test]
+fn damaged_tables_of_a_radar_its_ship_and_other_ships_are_survived() {
+    let [plots, own, ships] = radar_tables();
+    for (name, sound) in [&plots, &own] {
+        for skip_bad_rows in [false, true] {
+            let mut options = TableOptions { skip_bad_rows, ..TableOptions::default() };
+            options.radar.azimuth_from = boresight::io::AzimuthFrom::Bow;
+            let mut refused = false;
+            torture(name, sound.as_bytes(), |p| {
+                let other = if *name == plots.0 { &own } else { &plots };
+                std::fs::write(p.with_file_name(other.0), &other.1).unwrap();
+                let read = read_detections(p.with_file_name(plots.0), &options);
+                refused |= read.as_ref().map_or(true, |t| t.n_skipped > 0 || !t.lost.is_empty());
+                if let Ok(table) = &read {
+                    let n: usize = table.scans.iter().map(|s| s.detections.len()).sum();
+                    assert_eq!(n as u64, table.n_rows - table.n_skipped);
+                    assert!(table.scans.windows(2).all(|w| w[0].time < w[1].time));
+                    let finite =
+                        |d: &boresight::Detection| d.position.iter().chain(d.cov.iter()).all(|v| v.is_finite());
+                    assert!(table.scans.iter().flat_map(|s| &s.detections).all(finite));
+                }
+                if refused { Err(Error::new(boresight::ErrorKind::Damaged, "refused")) } else { Ok(()) }
+            });
+        }
+    }
+    torture(ships.0, ships.1.as_bytes(), |p| read_ship_reports(p, false).map(|_| ()));
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod memory;
 mod metrics;
 mod rooms;
 mod track;
+mod unsafe_places;
 #[cfg(feature = "video")]
 mod video;
 mod vision_conformance;

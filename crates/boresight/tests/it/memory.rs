@@ -89,6 +89,23 @@ fn circling(k: u64) -> Scan {
 }
 
 #[test]
+fn histories_take_the_memory_of_those_that_are_kept() {
+    // 800 targets in one pixel: each may grow 12 x 65 histories a scan, of which 12 are kept.
+    let config = boresight::Config::default().with("tracker.mht={}").unwrap();
+    let mut tracker = boresight::track::build(&config.tracker).unwrap();
+    let peak = peak_of(|| {
+        for k in 0..3u64 {
+            let at = |i: u32| nalgebra::Vector2::new(10.0 + 0.001 * f64::from(i), 10.0 + 0.0007 * f64::from(i % 91));
+            let all = (0..800).map(|i| boresight::Detection::at(at(i), nalgebra::Matrix2::identity())).collect();
+            let scan = Scan::at(boresight::FrameIndex(k), boresight::Timestamp::from_ns(k as i64 * 40_000_000));
+            tracker.step(&scan.with_detections(all)).unwrap();
+        }
+    });
+    // Some 600 bytes each: 800 targets x 12 and the new ones are 6 MB; with room for all that grows 400 MB.
+    assert!(peak < 60 << 20, "{peak} bytes");
+}
+
+#[test]
 fn a_warm_tracker_takes_no_memory_in_a_step() {
     let mut configs: Vec<TrackerConfig> = trackers().into_iter().filter(|c| c.mht.is_none()).collect();
     let base = TrackerConfig { max_speed_px_per_s: 300.0, ..TrackerConfig::default() };

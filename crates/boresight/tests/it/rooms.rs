@@ -24,6 +24,7 @@ const LEAVES: &[&str] = &[
     "validate",
     "cpu",
     "palette",
+    "memory_budget",
 ];
 
 /// room -> rooms it may use besides the leaves and itself.

@@ -11,6 +11,7 @@ mod kitti_scores;
 mod lcg;
 mod mot_scores;
 mod needs;
+mod radar;
 mod spots;
 mod tables;
 mod video;
@@ -22,6 +23,7 @@ fn main() -> std::process::ExitCode {
         fuse::tests(),
         kitti_scores::tests(),
         mot_scores::tests(),
+        radar::tests(),
         spots::tests(),
         tables::tests(),
         video::tests(),

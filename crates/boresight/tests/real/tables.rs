@@ -1,8 +1,8 @@
 //! Tables of other programs, as they really come: counts and numbers taken from the files with other tools.
 
 use crate::needs::{data, real_tests};
-use boresight::io::{Colour, OpenOptions, Pictures, SequenceInfo, TableOptions, open, read_detections, read_tracks};
 use boresight::FrameSource;
+use boresight::io::{Colour, OpenOptions, Pictures, SequenceInfo, TableOptions, open, read_detections, read_tracks};
 
 real_tests! {
     trackpy_btrack_and_mot_tables_are_read_whole

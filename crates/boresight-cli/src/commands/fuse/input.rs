@@ -3,9 +3,10 @@
 use crate::console::say;
 use boresight::fuse::{MapKind, Timeline, timelines};
 use boresight::fuse::{PlaneMap, common_points};
-use boresight::io::{TableOptions, read_detections, read_tracks};
-use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, track};
-use nalgebra::Vector2;
+use boresight::io::{LengthUnit, RadarPicture, TableOptions, read_detections, read_ship_reports, read_tracks};
+use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, TrackStatus, track};
+use boresight_filters::Gaussian;
+use nalgebra::{Matrix4, Vector2, Vector4};
 use std::path::Path;
 
 /// One sensor's table.
@@ -16,6 +17,12 @@ pub struct Sensor {
     pub scans: Option<Vec<Scan>>,
     /// Rate of its scans, 1/s.
     pub rate_hz: f64,
+    /// Whether these are ships' own reports, which come seldom.
+    pub is_reports: bool,
+    /// Where the radar was, of a radar's plots.
+    pub radar: Option<RadarPicture>,
+    /// Of a radar's plots those that each of its tracks took, in the order of the tracks: their errors are independent.
+    pub plots: Vec<Timeline>,
     /// Number and time (s) of its first frame.
     pub first: (u64, f64),
 }
@@ -39,7 +46,15 @@ impl Sensor {
 
 /// Reads a table of tracks, or one of detections and tracks them with `config` (chosen from the table if none is given).
 pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Result<Sensor> {
-    let options = TableOptions::default();
+    if let Some(ships) = ships(path, map)? {
+        return Ok(ships);
+    }
+    // What a configuration says of the table holds for one of a radar; other tables are read as they are.
+    let mut options = TableOptions::default();
+    if let Some(config) = config {
+        options.radar = config.input.table.radar.clone();
+    }
+    let options = options;
     let warn = |all: &[String]| all.iter().for_each(|w| say!("warning: {}: {w}", path.display()));
     let tracks = read_tracks(path, &options);
     if let Ok(table) = &tracks
@@ -49,7 +64,15 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
         let lines = timelines(table.frames.iter().map(|f| (f.time.as_secs_f64(), f.tracks.as_slice())));
         let tracks = lines.iter().map(|t| map.timeline(t)).filter(|t| !t.points.is_empty()).collect();
         let first = table.frames.first().map_or((0, 0.0), |f| (f.index.0, f.time.as_secs_f64()));
-        return Ok(Sensor { tracks, scans: None, rate_hz: table.rate_hz, first });
+        return Ok(Sensor {
+            tracks,
+            scans: None,
+            rate_hz: table.rate_hz,
+            is_reports: false,
+            radar: None,
+            plots: Vec::new(),
+            first,
+        });
     }
     let table = match (tracks, read_detections(path, &options)) {
         // A bad row in a table of tracks does not make detections of them.
@@ -69,9 +92,14 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
             s.with_detections(detections)
         })
         .collect();
-    let config = tracker_of(&scans, table.rate_hz, config);
+    let turn = table.radar.as_ref().map(|r| (r.turn_s, r.unit));
+    let config = tracker_of(&scans, table.rate_hz, turn, config);
     let states = run_tracker(&config, &scans)?;
     let tracks = timelines(states.iter().map(|(t, s)| (*t, s.as_slice())));
+    let plots = match turn {
+        Some(_) => taken(&tracks, &states, &scans, config.tracker.detection_covariance_scale),
+        None => Vec::new(),
+    };
     say!(
         "{}: {} detections in {} scans, {} tracks",
         path.display(),
@@ -80,14 +108,91 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
         tracks.len()
     );
     let first = scans.first().map_or((0, 0.0), |s| (s.index.0, s.time.as_secs_f64()));
-    Ok(Sensor { tracks, scans: Some(scans), rate_hz: table.rate_hz, first })
+    Ok(Sensor {
+        tracks,
+        scans: Some(scans),
+        rate_hz: table.rate_hz,
+        is_reports: false,
+        radar: table.radar,
+        plots,
+        first,
+    })
 }
 
-/// The given configuration, or one chosen for the detections.
-pub fn tracker_of(scans: &[Scan], rate_hz: f64, given: Option<&Config>) -> Config {
+/// Standard deviation of a ship's report: the length of a ship, and a second of its way, m.
+const REPORT_STD_M: f64 = 30.0;
+
+/// Reports of a ship that hardly moved come every few minutes: it was there in between, at every so many seconds.
+const BERTH_S: f64 = 20.0;
+
+/// Reports with those added between two that lie no further apart than they are right.
+fn with_berths(reports: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut out = Vec::with_capacity(reports.len());
+    for (i, b) in reports.iter().enumerate() {
+        if let Some(a) = i.checked_sub(1).map(|i| reports[i])
+            && (b[1] - a[1]).hypot(b[2] - a[2]) < REPORT_STD_M
+            && b[0] - a[0] < 600.0
+        {
+            let n = ((b[0] - a[0]) / BERTH_S).ceil().max(1.0);
+            out.extend((1..n as u32).map(|k| [0, 1, 2].map(|j| a[j] + (b[j] - a[j]) * f64::from(k) / n)));
+        }
+        out.push(*b);
+    }
+    out
+}
+
+/// A table of ships' reports as a sensor; `None` where it is another table.
+fn ships(path: &Path, map: &PlaneMap) -> anyhow::Result<Option<Sensor>> {
+    let Some(ships) = read_ship_reports(path, false)? else { return Ok(None) };
+    let mut tracks: Vec<Timeline> = Vec::new();
+    for ship in &ships {
+        let r = &with_berths(&ship.reports);
+        let velocity = |i: usize| {
+            let (a, b) = (r[i.saturating_sub(1)], r[(i + 1).min(r.len() - 1)]);
+            if b[0] > a[0] { [(b[1] - a[1]) / (b[0] - a[0]), (b[2] - a[2]) / (b[0] - a[0])] } else { [0.0; 2] }
+        };
+        let points = (0..r.len()).map(|i| {
+            let v = velocity(i);
+            let mean = Vector4::new(r[i][1], v[0], r[i][2], v[1]);
+            let cov = Matrix4::from_diagonal(&Vector4::new(REPORT_STD_M.powi(2), 1.0, REPORT_STD_M.powi(2), 1.0));
+            (r[i][0], Gaussian { mean, cov })
+        });
+        tracks.push(map.timeline(&Timeline { id: ship.id, points: points.collect(), size: [0.0; 2] }));
+    }
+    tracks.retain(|t| !t.points.is_empty());
+    let first = tracks.iter().map(|t| t.points[0].0).fold(f64::INFINITY, f64::min);
+    say!("{}: reports of {} ships, taken as right to {REPORT_STD_M} m", path.display(), tracks.len());
+    let first = (0, if first.is_finite() { first } else { 0.0 });
+    Ok(Some(Sensor { tracks, scans: None, rate_hz: 1.0, is_reports: true, radar: None, plots: Vec::new(), first }))
+}
+
+/// The plots that each track took while it was confirmed, with the covariances that the tracker gave them.
+fn taken(tracks: &[Timeline], states: &[(f64, Vec<TrackState>)], scans: &[Scan], scale: f64) -> Vec<Timeline> {
+    let of = |track: &Timeline| {
+        let mut plots = Timeline { id: track.id, points: Vec::new(), size: [0.0; 2] };
+        for ((time_s, now), scan) in states.iter().zip(scans) {
+            let Some(s) = now.iter().find(|s| s.id == track.id && s.status != TrackStatus::Tentative) else { continue };
+            let Some(d) = s.detection.and_then(|j| scan.detections.get(j as usize)) else { continue };
+            let mut belief = s.kinematics;
+            (belief.mean[0], belief.mean[2]) = (d.position.x, d.position.y);
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                belief.cov[(2 * i, 2 * j)] = scale * d.cov[(i, j)];
+            }
+            plots.points.push((*time_s, belief));
+        }
+        plots
+    };
+    tracks.iter().map(of).collect()
+}
+
+/// The given configuration, or one chosen for the detections; `turn` is the time of a turn and the unit of length, of a radar's plots.
+pub fn tracker_of(scans: &[Scan], rate_hz: f64, turn: Option<(f64, LengthUnit)>, given: Option<&Config>) -> Config {
     given.cloned().unwrap_or_else(|| {
         let (mut config, mut reasons) = (Config::default(), Vec::new());
-        boresight::auto::for_detections(scans, rate_hz, None, &mut config, &mut reasons);
+        match turn {
+            Some((turn_s, unit)) => boresight::auto::for_radar(scans, turn_s, unit, &mut config, &mut reasons),
+            None => boresight::auto::for_detections(scans, rate_hz, None, &mut config, &mut reasons),
+        }
         reasons.iter().for_each(|r| say!("  {r}"));
         config
     })

@@ -1,7 +1,8 @@
-//! Radars of a scene to disk: `NAME.csv` (a table of detections) and `NAME-plots.csv` (range, azimuth, arrival, origin).
+//! Radars of a scene to disk: `NAME.csv` (a table of detections), `NAME-plots.csv` (range, azimuth, arrival, origin) and, of those that measure range and azimuth, what a
+//! ship's radar writes: `NAME-polar.csv` with `NAME-ownship.csv`. There the truth's frame is read as metres, x east and y north, and azimuths count clockwise from north.
 
 use boresight::io::{DetectionsCsv, write_whole};
-use boresight::sim::{Radar, RadarConfig, Seed};
+use boresight::sim::{Measures, PolarErrors, Radar, RadarConfig, Seed};
 use boresight::{Error, ErrorKind, Sink, TrackState, View};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,9 +30,16 @@ pub fn read_radars(path: &Path) -> boresight::Result<Vec<RadarConfig>> {
     Ok(file.radars)
 }
 
-/// Names of a radar's files: its detections, its plots.
-pub fn names(radar: &str) -> [String; 2] {
-    [format!("{radar}.csv"), format!("{radar}-plots.csv")]
+/// Names of a radar's files: its detections, its plots, range and azimuth as a ship's radar writes them, and where it stands.
+pub fn names(radar: &str) -> [String; 4] {
+    ["", "-plots", "-polar", "-ownship"].map(|end| format!("{radar}{end}.csv"))
+}
+
+/// Range and azimuth as a ship's radar writes them.
+struct Polar {
+    errors: PolarErrors,
+    position: [f64; 2],
+    text: String,
 }
 
 struct Station {
@@ -39,6 +47,7 @@ struct Station {
     radar: Radar,
     table: DetectionsCsv,
     plots: String,
+    polar: Option<Polar>,
 }
 
 /// The radars at work, each with its files.
@@ -55,6 +64,14 @@ impl Radars {
                 name: c.name.clone(),
                 radar: Radar::new(c, seed, i as u64)?,
                 table: DetectionsCsv::create(dir.join(&names(&c.name)[0]))?,
+                polar: match &c.measures {
+                    Measures::RangeAzimuth(errors) => Some(Polar {
+                        errors: errors.clone(),
+                        position: c.position_px,
+                        text: String::from("time_s,range_m,azimuth_deg,range_std_m,azimuth_std_deg\n"),
+                    }),
+                    Measures::Position(_) => None,
+                },
                 plots: String::from("frame,time_s,arrival_s,range_px,azimuth_rad,x_px,y_px,target\n"),
             })
         });
@@ -70,6 +87,10 @@ impl Radars {
                 for (d, p) in scan.scan.detections.iter().zip(&scan.plots) {
                     let target = p.target.map_or(String::new(), |id| id.0.to_string());
                     let ([r, a], z) = (p.polar, d.position);
+                    if let Some(polar) = &mut s.polar {
+                        let (e, azimuth) = (&polar.errors, (90.0 - a.to_degrees()).rem_euclid(360.0));
+                        let _ = writeln!(polar.text, "{t},{r},{azimuth},{},{}", e.range_std_px, e.azimuth_std_deg);
+                    }
                     let _ = writeln!(s.plots, "{},{t},{arrival},{r},{a},{},{},{target}", scan.scan.index.0, z.x, z.y);
                 }
             }
@@ -82,10 +103,15 @@ impl Radars {
         let mut names = Vec::new();
         for s in self.stations {
             Box::new(s.table).finish()?;
-            let [table, plots] = self::names(&s.name);
-            let path = self.dir.join(&plots);
-            write_whole(path, s.plots.as_bytes())?;
+            let [table, plots, polar, ownship] = self::names(&s.name);
+            write_whole(self.dir.join(&plots), s.plots.as_bytes())?;
             names.extend([table, plots]);
+            if let Some(Polar { text, position: [x, y], .. }) = s.polar {
+                write_whole(self.dir.join(&polar), text.as_bytes())?;
+                let own = format!("time_s,x_m,y_m,heading_deg\n0,{x},{y},0\n");
+                write_whole(self.dir.join(&ownship), own.as_bytes())?;
+                names.extend([polar, ownship]);
+            }
         }
         Ok(names)
     }

@@ -9,6 +9,7 @@
 use crate::io::guard::{damaged, guarded};
 use crate::io::options::{Colour, OpenOptions};
 use crate::io::pixels::{check_size, gray_of_rgb8};
+use crate::memory_budget::afford;
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
@@ -51,6 +52,8 @@ impl<R: Read + Send> GifFrames<R> {
         let decoder = guarded(|| decode.read_info(reader).map_err(not_whole))?;
         let (width, height) =
             check_size(decoder.width().into(), decoder.height().into(), options.max_pixels).map_err(|e| e.at(label))?;
+        // The canvas, one to go back to, the frame that is read, the one that is given.
+        afford(width, height, 10).map_err(|e| e.at(label))?;
         let info = SourceInfo {
             label: label.to_string(),
             reader: "GIF".to_string(),

@@ -6,11 +6,11 @@
 //! for these 200 lines, and cannot spare the reader of PNM. Source: Microsoft, *Bitmap
 //! Storage* (BITMAPFILEHEADER, BITMAPCOREHEADER, BITMAPINFOHEADER, BITMAPV5HEADER, *Bitmap Compression*).
 
-use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Values of the header's `compression` field.

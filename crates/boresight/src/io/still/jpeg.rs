@@ -2,11 +2,11 @@
 //!
 //! The decoder runs in its strict mode: a picture that breaks off is an error instead of a half-grey frame.
 
-use crate::io::budget::afford;
 use crate::io::guard::{backed, damaged};
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Pixels, Result};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;

@@ -1,11 +1,11 @@
 //! PNG, 1 to 16 bits, grey, palette and colour, interlaced too. 16-bit samples stay exact; 1, 2 and 4 bit grey is
 //! scaled to 0..=255 as the standard says; palettes are expanded to RGB; alpha is dropped. Checksums are checked.
 
-use crate::io::budget::afford;
 use crate::io::guard::{backed, damaged};
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Pixels, Result};
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use std::io::Cursor;

@@ -5,11 +5,11 @@
 //! maxval 4095 becomes 16) and reads no float PFM.
 //! Source: netpbm's format pages pbm(5), pgm(5), ppm(5), pfm(5). A PBM's black (1) becomes 0, white (0) becomes 255.
 
-use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Error, ErrorKind, Pixels, Result};
 
 /// Reads white-space separated words, with `#` comments.

@@ -9,6 +9,7 @@
 
 use crate::io::options::{Colour, OpenOptions};
 use crate::io::pixels::check_size;
+use crate::memory_budget::afford;
 use crate::{
     ASSUMED_RATE_HZ, Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo,
     Timestamp,
@@ -142,6 +143,8 @@ fn parse_header(text: &str, max_pixels: u64) -> Result<(Layout, Option<(i64, i64
         }
     }
     (layout.width, layout.height) = check_size(w, h, max_pixels)?;
+    // Three planes of two bytes, and the frame made of them.
+    afford(layout.width, layout.height, 12)?;
     Ok((layout, period))
 }
 

@@ -98,7 +98,7 @@ impl Field {
 
 /// Field, its key in [`Columns`] (empty: only by its own name), and the names it goes by in the order of preference.
 ///
-/// Units: px, px², s; velocities and their covariances are taken only from columns that name px and s, for in other programs'
+/// Units: px, px², s (or m, in a radar's tables); velocities and their covariances are taken only from columns that name px (or m) and s, for in other programs'
 /// tables they count per frame. Other units are told by the user or the program's own lines (TrackMate).
 const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (
@@ -175,19 +175,23 @@ const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (
         Field::Left,
         "left",
-        &["leftpx", "left", "bbleft", "bboxleft", "boxleft", "xmin", "x1", "bboxxmin", "bboxx", "bbox1"],
+        &["leftpx", "left", "bbleft", "bboxleft", "boxleft", "xmin", "x1", "bboxxmin", "bboxx", "bbox1", "leftm"],
     ),
-    (Field::Top, "top", &["toppx", "top", "bbtop", "bboxtop", "boxtop", "ymin", "y1", "bboxymin", "bboxy", "bbox0"]),
+    (
+        Field::Top,
+        "top",
+        &["toppx", "top", "bbtop", "bboxtop", "boxtop", "ymin", "y1", "bboxymin", "bboxy", "bbox0", "topm"],
+    ),
     (Field::Right, "right", &["right", "bbright", "bboxright", "xmax", "x2", "bboxxmax", "bbox3"]),
     (Field::Bottom, "bottom", &["bottom", "bbbottom", "bboxbottom", "ymax", "y2", "bboxymax", "bbox2"]),
-    (Field::Width, "width", &["widthpx", "width", "w", "bbwidth", "bboxwidth", "boxwidth", "bboxw"]),
-    (Field::Height, "height", &["heightpx", "height", "h", "bbheight", "bboxheight", "boxheight", "bboxh"]),
-    (Field::VarX, "var-x", &["varxpx2", "varx", "covxx"]),
-    (Field::CovXy, "cov-xy", &["covxypx2", "covxy"]),
-    (Field::VarY, "var-y", &["varypx2", "vary", "covyy"]),
+    (Field::Width, "width", &["widthpx", "width", "w", "bbwidth", "bboxwidth", "boxwidth", "bboxw", "widthm"]),
+    (Field::Height, "height", &["heightpx", "height", "h", "bbheight", "bboxheight", "boxheight", "bboxh", "heightm"]),
+    (Field::VarX, "var-x", &["varxpx2", "varx", "covxx", "varxm2"]),
+    (Field::CovXy, "cov-xy", &["covxypx2", "covxy", "covxym2"]),
+    (Field::VarY, "var-y", &["varypx2", "vary", "covyy", "varym2"]),
     (Field::StdX, "std-x", &["stdxpx", "stdx", "sigmax", "xstd", "xerr", "xerror", "ep", "epx"]),
     (Field::StdY, "std-y", &["stdypx", "stdy", "sigmay", "ystd", "yerr", "yerror", "ep", "epy"]),
-    (Field::Area, "area", &["areapx", "area", "areapixels", "areashapearea", "npixels"]),
+    (Field::Area, "area", &["areapx", "area", "areapixels", "areashapearea", "npixels", "aream"]),
     (Field::Peak, "peak", &["peak", "signal", "maxintensity", "intensitymax", "max"]),
     (Field::Sum, "sum", &["sum", "mass", "totalintensity", "integratedintensity", "totalintensitych1", "rawintden"]),
     (Field::Score, "score", &["score", "conf", "confidence", "prob", "probability", "quality"]),
@@ -197,15 +201,15 @@ const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (Field::Occlusion, "", &["occlusion"]),
     (Field::Status, "", &["status"]),
     (Field::Detection, "", &["detection"]),
-    (Field::Vx, "", &["vxpxpers"]),
-    (Field::Vy, "", &["vypxpers"]),
-    (Field::CovXVx, "", &["covxvxpx2pers"]),
-    (Field::CovXVy, "", &["covxvypx2pers"]),
-    (Field::VarVx, "", &["varvxpx2pers2"]),
-    (Field::CovVxY, "", &["covvxypx2pers"]),
-    (Field::CovVxVy, "", &["covvxvypx2pers2"]),
-    (Field::CovYVy, "", &["covyvypx2pers"]),
-    (Field::VarVy, "", &["varvypx2pers2"]),
+    (Field::Vx, "", &["vxpxpers", "vxmpers"]),
+    (Field::Vy, "", &["vypxpers", "vympers"]),
+    (Field::CovXVx, "", &["covxvxpx2pers", "covxvxm2pers"]),
+    (Field::CovXVy, "", &["covxvypx2pers", "covxvym2pers"]),
+    (Field::VarVx, "", &["varvxpx2pers2", "varvxm2pers2"]),
+    (Field::CovVxY, "", &["covvxypx2pers", "covvxym2pers"]),
+    (Field::CovVxVy, "", &["covvxvypx2pers2", "covvxvym2pers2"]),
+    (Field::CovYVy, "", &["covyvypx2pers", "covyvym2pers"]),
+    (Field::VarVy, "", &["varvypx2pers2", "varvym2pers2"]),
 ];
 
 /// Column names given by the user; what is not given is found by common names.

@@ -6,6 +6,7 @@
 //! variances a degree of freedom, and the chance of as much. Numbers are the shortest that read back to the same bits.
 
 use super::number::{push_f32, push_f64, push_seconds};
+use super::unit::LengthUnit;
 use crate::io::atomic::Output;
 use crate::{PositionFit, Result, Sink, View};
 use std::fmt::Write;
@@ -40,6 +41,12 @@ impl DetectionsCsv {
     /// [`crate::ErrorKind::Output`] if it cannot be written.
     pub fn to(output: Output) -> Result<Self> {
         Ok(Self { output, lines: format!("{DETECTIONS_HEADER}\n"), with_fits: false })
+    }
+
+    /// With columns that name this unit of length.
+    pub fn with_unit(mut self, unit: LengthUnit) -> Self {
+        self.lines = unit.columns(&self.lines);
+        self
     }
 
     /// With columns that say how each position was fitted, or without.

@@ -6,6 +6,7 @@
 
 use super::number::{push_f32, push_f64, push_seconds};
 use super::tracks_csv::status_word;
+use super::unit::LengthUnit;
 use crate::io::atomic::Output;
 use crate::{Detection, Result, Sink, TrackState, View};
 use std::fmt::Write;
@@ -14,6 +15,7 @@ use std::path::PathBuf;
 /// Writes JSON lines.
 pub struct JsonLines {
     output: Output,
+    unit: LengthUnit,
     line: String,
 }
 
@@ -29,7 +31,13 @@ impl JsonLines {
 
     /// Writes to any output.
     pub fn to(output: Output) -> Self {
-        Self { output, line: String::new() }
+        Self { output, unit: LengthUnit::Pixel, line: String::new() }
+    }
+
+    /// With names that say this unit of length.
+    pub fn with_unit(mut self, unit: LengthUnit) -> Self {
+        self.unit = unit;
+        self
     }
 }
 
@@ -127,6 +135,11 @@ impl Sink for JsonLines {
             track(out, t);
         }
         out.push_str("]}\n");
+        // Only names hold letters here.
+        if self.unit != LengthUnit::Pixel {
+            self.line = self.unit.columns(&self.line);
+        }
+        let out = &self.line;
         self.output.put(out.as_bytes())
     }
 

@@ -1,6 +1,7 @@
 //! How tables from elsewhere are read: columns, rate, assumed errors, origin of pixels and frames, bad rows.
 
 use super::columns::Columns;
+use super::radar::options::RadarOptions;
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,8 @@ pub struct TableOptions {
     pub first_frame: Option<u64>,
     /// Whether rows that cannot be read are counted and left out instead of ending the run.
     pub skip_bad_rows: bool,
+    /// How a radar's table of range and azimuth is read.
+    pub radar: RadarOptions,
 }
 
 impl Default for TableOptions {
@@ -45,6 +48,7 @@ impl Default for TableOptions {
             first_pixel: 0.0,
             first_frame: None,
             skip_bad_rows: false,
+            radar: RadarOptions::default(),
         }
     }
 }
@@ -58,6 +62,7 @@ impl TableOptions {
             Err(Error::new(ErrorKind::Config, format!("expected {what}")).at(format!("{at}.{name} = {value}")))
         };
         self.columns.validate(&format!("{at}.columns"))?;
+        self.radar.validate(&format!("{at}.radar"))?;
         if let Some(rate) = self.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
             return config("rate-hz", rate, "a positive number of frames/s");
         }

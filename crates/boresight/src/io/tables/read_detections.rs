@@ -1,38 +1,17 @@
-//! Detections from elsewhere: our `detections.csv`, MOTChallenge text, or any table with named columns.
+//! Detections from elsewhere: our `detections.csv`, MOTChallenge text, any table with named columns, or a radar's range and azimuth.
 //!
 //! Rows may come in any order; rows of one frame keep theirs. Frames without rows between the first and the last one become
 //! empty scans with times in between. Times come from the table unless a rate is given.
 
 use super::columns::Field;
 use super::detection_row::RowReader;
+use super::detection_table::DetectionTable;
 use super::options::TableOptions;
+use super::radar::read::{radar_columns, read_radar};
 use super::scan_times::{Grouped, scans_of, set_times};
 use super::table::Table;
-use crate::{Error, ErrorKind, Result, Scan};
+use crate::{Error, ErrorKind, Result};
 use std::path::Path;
-
-/// Detections read from a table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DetectionTable {
-    /// One scan for each frame from the first to the last, empty ones included.
-    pub scans: Vec<Scan>,
-    /// Rate, frames/s: given, or found from the times.
-    pub rate_hz: f64,
-    /// The number that the table gives to its first frame, which is frame 0 here: 1 in MOTChallenge text.
-    pub first_frame: u64,
-    /// What kind of table it was, for the summary: `boresight detections`, `MOTChallenge`, `CSV (frame, x, y)`.
-    pub format: String,
-    /// Names of the classes, by [`crate::ClassId`], if the table has names instead of numbers.
-    pub class_names: Vec<String>,
-    /// Number of rows read.
-    pub n_rows: u64,
-    /// Number of rows left out.
-    pub n_skipped: u64,
-    /// Whole sentences about what was assumed or left out.
-    pub warnings: Vec<String>,
-    /// Those of the warnings that say what is lost.
-    pub lost: Vec<String>,
-}
 
 /// Reads detections from a table.
 /// # Errors
@@ -41,6 +20,9 @@ pub fn read_detections(path: impl AsRef<Path>, options: &TableOptions) -> Result
     options.validate("table")?;
     let path = path.as_ref();
     let mut table = Table::open(path, &options.columns)?;
+    if let Some(columns) = radar_columns(&table)? {
+        return read_radar(&mut table, &columns, path, options);
+    }
     detections_of(&mut table, options, super::seqinfo::SequenceInfo::beside(path).rate_hz)
 }
 
@@ -71,6 +53,7 @@ pub(crate) fn identified_of(
         n_skipped: 0,
         warnings: Vec::new(),
         lost: Vec::new(),
+        radar: None,
     };
     let mut seen = Vec::new();
     let mut n_loose = 0;
@@ -130,7 +113,7 @@ pub(crate) fn identified_of(
 mod tests {
     use super::*;
     use crate::io::{DetectionsCsv, Output};
-    use crate::{Detection, Extent, FrameIndex, Sink, Timestamp, View};
+    use crate::{Detection, Extent, FrameIndex, Scan, Sink, Timestamp, View};
     use nalgebra::{Matrix2, Vector2};
     use proptest::prelude::*;
 

@@ -93,6 +93,14 @@ impl<'t> Row<'t> {
         }
     }
 
+    /// As [`Row::number_at`] for a number that must be there.
+    /// # Errors
+    /// Anything else than a finite number.
+    pub fn need_at(&self, at: usize, expected: &str) -> Result<f64> {
+        let found = || String::from_utf8_lossy(self.cell(at).unwrap_or_default());
+        self.number_at(at, expected)?.ok_or_else(|| self.wrong_at(at, &found(), expected))
+    }
+
     /// A finite number that must be there.
     /// # Errors
     /// Anything else.
@@ -263,7 +271,8 @@ impl<'t> Row<'t> {
         self.wrong_at(self.form.layout.column(field).unwrap_or(0), found, expected)
     }
 
-    fn wrong_at(&self, at: usize, found: &str, expected: &str) -> Error {
+    /// An error about the cell of column `at`.
+    pub fn wrong_at(&self, at: usize, found: &str, expected: &str) -> Error {
         let found = if found.is_empty() { "nothing".to_string() } else { format!("\"{}\"", short(found)) };
         self.at_column(at, format!("expected {expected}, found {found}"))
     }

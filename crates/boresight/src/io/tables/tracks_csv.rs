@@ -3,9 +3,10 @@
 //! Columns: frame (from 0), time_s, track_id, status (tentative, confirmed, coasting), the state `[x, vx, y, vy]` (px,
 //! px/s), the ten distinct entries of its covariance (upper triangle, row by row), the box's size (px), and the row of
 //! the detection that was taken among this frame's detections (empty: none). Numbers are the shortest that read back
-//! to the same bits.
+//! to the same bits. In metres the columns say so: `x_m`, `vx_m_per_s`.
 
 use super::number::{push_f64, push_seconds};
+use super::unit::LengthUnit;
 use crate::io::atomic::Output;
 use crate::{Result, Sink, TrackStatus, View};
 use std::fmt::Write;
@@ -44,6 +45,8 @@ pub fn status_word(status: TrackStatus) -> &'static str {
 /// Writes `tracks.csv`.
 pub struct TracksCsv {
     output: Output,
+    /// Until it is written.
+    header: Option<String>,
     lines: String,
 }
 
@@ -60,9 +63,18 @@ impl TracksCsv {
     /// Writes to any output.
     /// # Errors
     /// [`crate::ErrorKind::Output`] if it cannot be written.
-    pub fn to(mut output: Output) -> Result<Self> {
-        output.put(format!("{TRACKS_HEADER}\n").as_bytes())?;
-        Ok(Self { output, lines: String::new() })
+    pub fn to(output: Output) -> Result<Self> {
+        Ok(Self { output, header: Some(format!("{TRACKS_HEADER}\n")), lines: String::new() })
+    }
+
+    /// With columns that name this unit of length.
+    pub fn with_unit(mut self, unit: LengthUnit) -> Self {
+        self.header = Some(format!("{}\n", unit.columns(TRACKS_HEADER)));
+        self
+    }
+
+    fn put_header(&mut self) -> Result<()> {
+        self.header.take().map_or(Ok(()), |header| self.output.put(header.as_bytes()))
     }
 }
 
@@ -72,6 +84,7 @@ impl Sink for TracksCsv {
     }
 
     fn put(&mut self, view: &View<'_>) -> Result<()> {
+        self.put_header()?;
         let out = &mut self.lines;
         out.clear();
         for track in view.tracks {
@@ -102,7 +115,9 @@ impl Sink for TracksCsv {
         self.output.put(out.as_bytes())
     }
 
-    fn finish(self: Box<Self>) -> Result<()> {
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        // A run without frames has its header still to write.
+        self.put_header()?;
         self.output.finish()
     }
 }

@@ -12,6 +12,8 @@ mod write;
 mod yuv;
 
 #[cfg(feature = "video")]
+#[cfg(fuzzing)]
+pub use ffmpeg::read_nut;
 pub use open::{open_ffmpeg, open_mp4};
 #[cfg(feature = "encode")]
 pub use write::{MAX_SIZE, Mp4Options, Mp4Writer};

@@ -39,6 +39,8 @@ pub(super) struct Growth<'a> {
 pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates: &mut Gates) -> Result<()> {
     let (config, mht) = (growth.context.config, growth.mht);
     let survival = config.confirmation.survival(dt_s);
+    // All that one tree grows lies here first: what is kept of it takes no more memory than it needs.
+    let mut grown: Vec<Hypothesis> = Vec::new();
     for tree in trees.iter_mut() {
         let parents = std::mem::take(&mut tree.leaves);
         for mut leaf in parents {
@@ -47,13 +49,14 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
             config.confirmation.predict_existence(&mut t.history, survival);
             let now = growth.context.now();
             leaf.predicted = predicted_of(&t.filter, t.history.last_seen_ns, t.last_place, now, config);
-            children(growth, &leaf, gates, &mut tree.leaves);
+            children(growth, &leaf, gates, &mut grown);
         }
-        tree.leaves.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.path.cmp(&b.path)));
-        tree.leaves.dedup_by(|b, a| a.path == b.path);
-        let best = tree.leaves.first().map_or(0.0, |l| l.score);
-        tree.leaves.retain(|l| l.score >= best - mht.max_score_gap);
-        tree.leaves.truncate(mht.max_leaves as usize);
+        grown.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.path.cmp(&b.path)));
+        grown.dedup_by(|b, a| a.path == b.path);
+        let best = grown.first().map_or(0.0, |l| l.score);
+        grown.retain(|l| l.score >= best - mht.max_score_gap);
+        grown.truncate(mht.max_leaves as usize);
+        tree.leaves.append(&mut grown);
         tree.chosen = None;
     }
     trees.retain(|t| !t.leaves.is_empty());

@@ -22,10 +22,11 @@ use super::super::step::report::report;
 use super::super::tracking::Tracking;
 use super::config::MhtConfig;
 use super::grow::{Growth, coast, grow, initiate};
-use super::hypothesis::Tree;
+use super::hypothesis::{Hypothesis, Tree};
 use super::prune::prune;
 use super::select::Select;
 use crate::associate::Gates;
+use crate::memory_budget::afford_all;
 use crate::{Result, Scan, Timestamp, TrackState};
 
 /// The multiple-hypothesis tracker.
@@ -83,6 +84,16 @@ impl Mht {
         }
     }
 
+    /// Refuses a scan whose histories might not fit into memory, before any of them grows.
+    fn afford(&self, n_detections: usize) -> Result<()> {
+        let (most, gated) = (self.mht.max_leaves as usize, n_detections.min(self.config.max_gated as usize));
+        // Kept of each target, grown of the one at work, begun by each detection.
+        let kept: usize = self.trees.iter().map(|t| most.min(t.leaves.len().saturating_mul(1 + gated))).sum();
+        let of_one = self.trees.iter().map(|t| t.leaves.len().saturating_mul(1 + gated)).max().unwrap_or(0);
+        let n = kept.saturating_add(of_one).saturating_add(n_detections);
+        afford_all(n, size_of::<Hypothesis>() as u64, "histories of targets")
+    }
+
     /// Notes which detections confirmed tracks of the answer took.
     fn note_taken(&mut self, n_detections: usize) {
         self.taken_by_confirmed.clear();
@@ -126,6 +137,7 @@ impl Tracking for Mht {
             self.report();
             return Ok(&self.states);
         }
+        self.afford(scan.detections.len())?;
         self.table.sort(scan);
         let growth = Growth {
             context: Context { scan, table: &self.table, config: &self.config, gate: self.gate },

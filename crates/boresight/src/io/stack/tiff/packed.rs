@@ -5,11 +5,11 @@
 
 use super::chunk::chunk_bytes;
 use super::failure::failed;
-use crate::io::budget::afford;
 use crate::io::guard::damaged;
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
 use tiff::decoder::Decoder;

@@ -7,11 +7,11 @@
 
 use super::failure::failed;
 use super::{hyperstack, lzw, packed};
-use crate::io::budget::afford;
 use crate::io::guard::{damaged, guarded};
 use crate::io::options::Colour;
 use crate::io::pixels::check_size;
 use crate::io::samples::Samples;
+use crate::memory_budget::afford;
 use crate::{Error, ErrorKind, Pixels, Result};
 use std::io::{Read, Seek};
 use tiff::ColorType;

@@ -37,7 +37,9 @@ pub(crate) fn trackmate_unit(cell: &str) -> Option<String> {
 
 /// From a left or top of a table to the box's edge, px.
 pub(crate) fn edge_shift_px(header: &[String], layout: &Layout) -> f64 {
-    let edges =
-        layout.column(Field::Left).and_then(|at| header.get(at)).is_some_and(|h| h.eq_ignore_ascii_case("left_px"));
+    let edges = layout
+        .column(Field::Left)
+        .and_then(|at| header.get(at))
+        .is_some_and(|h| h.eq_ignore_ascii_case("left_px") || h == "left_m");
     if edges { 0.0 } else { -0.5 }
 }

@@ -5,4 +5,7 @@ mod nut;
 mod pictures;
 mod source;
 
+/// For the fuzz target: all pictures of a NUT stream.
+#[cfg(fuzzing)]
+pub use nut::read_all as read_nut;
 pub(in crate::io::video) use source::{INSTALL, open};

@@ -321,9 +321,26 @@ impl<R: Read> Nut<R> {
     }
 }
 
+/// Reads every picture of a stream and throws it away; how many there were.
+#[cfg(any(test, fuzzing))]
+pub fn read_all(bytes: &[u8]) -> io::Result<u64> {
+    const MOST_BYTES: u64 = 1 << 20;
+    let mut nut = Nut::open(bytes)?;
+    let mut n = 0;
+    while let Some(head) = nut.next_head()? {
+        let read = io::copy(&mut nut.reader.by_ref().take(head.size.min(MOST_BYTES)), &mut io::sink())?;
+        if read < head.size {
+            return Err(bad("a picture breaks off, or is larger than this reader takes"));
+        }
+        n += 1;
+    }
+    Ok(n)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
 
     #[test]
     fn numbers_follow_the_specifications_form() {
@@ -378,5 +395,28 @@ mod tests {
         bytes.extend(MAIN.to_be_bytes());
         bytes.extend([255; 64]);
         assert!(Nut::open(&bytes[..]).is_err());
+    }
+
+    #[test]
+    fn damaged_streams_are_survived() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/video/gray.nut");
+        let sound = std::fs::read(path).unwrap();
+        assert_eq!(read_all(&sound).unwrap(), 3, "three pictures of 16 x 8 px");
+        let mut rng = rand_chacha::ChaCha8Rng::from_seed([5; 32]);
+        let mut refused = 0;
+        for _ in 0..4000 {
+            let mut bytes = sound.clone();
+            for _ in 0..rng.random_range(1..5) {
+                let at = rng.random_range(0..bytes.len().min(300));
+                match rng.random_range(0..4) {
+                    0 => bytes[at] = rng.random(),
+                    1 => bytes[at] ^= 1 << rng.random_range(0..8),
+                    2 => bytes.truncate(at.max(1)),
+                    _ => bytes[at] = 0xff,
+                }
+            }
+            refused += u32::from(read_all(&bytes).is_err());
+        }
+        assert!(refused > 400, "{refused}");
     }
 }

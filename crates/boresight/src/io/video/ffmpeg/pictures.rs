@@ -7,6 +7,7 @@ use super::nut::{Format, Head, Nut};
 use crate::io::options::Colour;
 use crate::io::pixels::gray_of_rgb8;
 use crate::io::video::yuv::to_u16;
+use crate::memory_budget::afford;
 use crate::{Frame, FrameIndex, Image, PixelKind, Pixels, Timestamp};
 use std::io::{BufReader, Read};
 use std::process::ChildStdout;
@@ -95,6 +96,8 @@ fn shape(format: &Format, colour: Colour, max_pixels: u64) -> Result<(usize, usi
     if w == 0 || h == 0 || w.checked_mul(h).is_none_or(|n| n > max_pixels) {
         return Err(format!("its header claims {w} x {h} pixels, at most {max_pixels} are accepted"));
     }
+    // The picture as it comes and as it is given, twice on their way.
+    afford(w as usize, h as usize, 12).map_err(|e| e.to_string())?;
     let layout = match format.tag.as_slice() {
         b"Y800" | b"I420" | b"Y42B" | b"444P" | b"440P" | b"Y41B" | b"YUV9" => Layout::Luma8,
         [b'Y', b'1' | b'3', _, bits] if *bits > 8 => Layout::Luma16,

@@ -6,6 +6,7 @@
 //! inside a slice that still parses are not seen: the decoder (0.6) keeps the part of the picture decoded before them.
 
 use super::picture::{Picture, PictureDecoder, Refusal, guarded, parts};
+use crate::memory_budget::afford;
 use rust_h264::decoder::{ChromaFormat, Decoder, Frame};
 use rust_h264::error::DecodeError;
 use rust_h264::nal::{NalUnit, NalUnitType, SpsInfo, parse_avcc, parse_avcc_config, parse_sps_info};
@@ -195,6 +196,9 @@ fn check_size(info: &SpsInfo, max_pixels: u64) -> Result<(), Refusal> {
     if mbs > MAX_PICTURE_MBS || shown > max_pixels || w * h > max_pixels.saturating_add(32 * (w + h)) {
         return Err(Refusal::Damaged(format!("its header claims {w} x {h} pixels, more than is accepted")));
     }
+    // The reference pictures, four more on their way, a byte and a half a pixel each.
+    afford(info.coded_width as usize, info.coded_height as usize, 2 * (4 + u64::from(info.reference_frames.min(16))))
+        .map_err(|e| Refusal::Damaged(e.to_string().replace('\n', "; ")))?;
     if mbs * u64::from(info.reference_frames) > MAX_REFERENCE_MBS.max(mbs * 4) || info.reference_frames > 16 {
         let n = info.reference_frames;
         return Err(Refusal::Damaged(format!("its header claims {n} reference pictures of {w} x {h} pixels")));

@@ -1,4 +1,4 @@
-//! The memory that reading one picture may take: checked before it is taken, whatever a header claims.
+//! The memory that reading one picture, or the histories of one scan, may take: checked before it is taken, whatever a header claims.
 //!
 //! One budget for the process, as its memory is: half of the machine's (of the control group's, where it has less), or what
 //! [`set_memory_budget`] says. It only refuses; no result depends on it.
@@ -13,7 +13,7 @@ static GIVEN: AtomicU64 = AtomicU64::new(0);
 /// Memory of a machine that does not tell, bytes.
 const USUAL: u64 = 8 << 30;
 
-/// Sets the memory that reading one picture may take, bytes, above 0.
+/// Sets the memory that reading one picture, or the histories of one scan (`tracker.mht`), may take, bytes, above 0.
 pub fn set_memory_budget(bytes: u64) {
     GIVEN.store(bytes.max(1), Ordering::Relaxed);
 }
@@ -52,6 +52,18 @@ pub(crate) fn afford(width: usize, height: usize, per_px: u64) -> Result<()> {
     Err(Error::new(ErrorKind::Unsupported, what).hint("if the file is sound, allow more: --max-memory, in MB"))
 }
 
+/// Refuses `n` things of `each` bytes beyond the budget; `what` names them.
+pub(crate) fn afford_all(n: usize, each: u64, what: &str) -> Result<()> {
+    let (need, allowed) = ((n as u64).saturating_mul(each), budget());
+    if need <= allowed {
+        return Ok(());
+    }
+    let mb = |bytes: u64| bytes.div_ceil(1 << 20);
+    let text = format!("{n} {what} take {} MB of memory, more than the {} MB allowed", mb(need), mb(allowed));
+    Err(Error::new(ErrorKind::Numeric, text)
+        .hint("lower tracker.mht.max-leaves or n-scan, or allow more: --max-memory, in MB"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +73,13 @@ mod tests {
         assert!(afford(4000, 4000, 8).is_ok());
         let error = afford(1 << 30, 1 << 30, 8).unwrap_err().to_string();
         assert!(error.contains("take 8796093022208 MB") && error.contains("--max-memory"), "{error}");
+    }
+
+    #[test]
+    fn histories_beyond_the_budget_are_refused() {
+        assert!(afford_all(1000, 4096, "histories").is_ok());
+        let error = afford_all(usize::MAX, 4096, "histories").unwrap_err().to_string();
+        assert!(error.contains("histories take") && error.contains("--max-memory"), "{error}");
     }
 
     #[test]

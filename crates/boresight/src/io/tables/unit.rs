@@ -1,0 +1,40 @@
+//! The unit of length of a table: pixels of a picture, or metres of a map.
+
+/// What positions and sizes are counted in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LengthUnit {
+    /// Pixels; x to the right, y down.
+    #[default]
+    Pixel,
+    /// Metres; x to the east, y to the north.
+    Metre,
+}
+
+impl LengthUnit {
+    /// Its sign: `px`, `m`.
+    pub fn sign(self) -> &'static str {
+        match self {
+            Self::Pixel => "px",
+            Self::Metre => "m",
+        }
+    }
+
+    /// Names of columns as they are written for pixels, in this unit: `vx_px_per_s` becomes `vx_m_per_s`.
+    pub(crate) fn columns(self, names: &str) -> String {
+        match self {
+            Self::Pixel => names.to_string(),
+            Self::Metre => names.replace("_px", "_m"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_in_metres_name_metres() {
+        assert_eq!(LengthUnit::Metre.columns("x_px,vx_px_per_s,var_x_px2"), "x_m,vx_m_per_s,var_x_m2");
+        assert_eq!(LengthUnit::Pixel.columns("x_px"), "x_px");
+    }
+}
