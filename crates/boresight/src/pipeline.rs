@@ -147,12 +147,14 @@ fn drive(
             }
             tracked.extend(std::iter::from_fn(|| run.held.pop(true)));
             run.summary.frames = 0;
-            for held in tracked {
+            // What is left out is known at their end, which is one behind the last scan.
+            for held in tracked.into_iter().map(Some).chain([None]) {
                 let started = Instant::now();
                 let frame = pictures.next_frame();
                 run.summary.times.read += started.elapsed();
                 run.summary.warnings.clear();
                 run.summary.warnings.extend_from_slice(pictures.warnings());
+                let Some(held) = held else { break };
                 let frame = frame?.filter(|f| f.index == held.scan.index);
                 run.summary.frames += 1;
                 if run.put(frame.as_ref(), &held).is_break() || asked(run.summary).is_break() {
