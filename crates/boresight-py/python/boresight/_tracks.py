@@ -115,7 +115,8 @@ class Tracks:
 
         `csv` (the command's tracks.csv, byte by byte), `mot` (.txt), `jsonl`, `parquet` (needs pyarrow), `geff` (a folder), `napari`
         (.npy), `mot-zip` (.zip), `mcap`, `vmti` (.ts), and by name `cvat`, `trackmate-xml`, `kitti`, `trackpy`, `trackmate`, `btrack`,
-        `ultrack`. `csv`, `jsonl` and `parquet` hold tentative rows too; `trackpy` holds measured rows only. What a format cannot hold is said as a warning.
+        `ultrack`. `csv`, `jsonl` and `parquet` hold tentative rows too; `trackpy` holds measured rows only. What a format cannot hold is
+        said as a warning.
         """
         chosen = format or _FORMAT_OF_ENDING.get(Path(path).suffix.lower())
         if chosen == "report":
