@@ -59,7 +59,6 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Runs something and says how many bytes it had in use at most.
-#[cfg(all(feature = "images", feature = "video"))] // for `hostile`
 pub fn peak_of(run: impl FnOnce()) -> isize {
     let before = NOW.get();
     PEAK.set(before);
