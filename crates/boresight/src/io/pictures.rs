@@ -95,14 +95,20 @@ impl Pictures {
     }
 
     /// The place of the last file whose name has a number.
+    #[cfg(feature = "images")]
     fn last_place(&self, input: &str) -> Option<u64> {
         let files = images_of(input)?;
-        numbered(&files).filter(|n| n.len() as u64 == self.source.info().n_frames.unwrap_or(0)).and_then(|_| {
-            #[cfg(feature = "images")]
-            return super::numbered::holes(&files).and_then(|n| n.places.last().copied());
-            #[cfg(not(feature = "images"))]
-            None
-        })
+        let n_files = numbered(&files)?.len() as u64;
+        if n_files != self.source.info().n_frames.unwrap_or(0) {
+            return None;
+        }
+        super::numbered::holes(&files).and_then(|n| n.places.last().copied())
+    }
+
+    /// Without images there are no numbered files.
+    #[cfg(not(feature = "images"))]
+    fn last_place(&self, _: &str) -> Option<u64> {
+        None
     }
 
     /// Whether the detections lie in the pictures.

@@ -11,9 +11,9 @@ mod write;
 #[cfg(feature = "video")]
 mod yuv;
 
-#[cfg(feature = "video")]
-#[cfg(fuzzing)]
+#[cfg(all(feature = "video", fuzzing))]
 pub use ffmpeg::read_nut;
+#[cfg(feature = "video")]
 pub use open::{open_ffmpeg, open_mp4};
 #[cfg(feature = "encode")]
 pub use write::{MAX_SIZE, Mp4Options, Mp4Writer};
