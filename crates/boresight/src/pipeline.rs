@@ -148,21 +148,24 @@ fn drive(
             tracked.extend(std::iter::from_fn(|| run.held.pop(true)));
             run.summary.frames = 0;
             // What is left out is known at their end, which is one behind the last scan.
-            for held in tracked.into_iter().map(Some).chain([None]) {
+            let mut tracked = tracked.into_iter();
+            let outcome = loop {
                 let started = Instant::now();
                 let frame = pictures.next_frame();
                 run.summary.times.read += started.elapsed();
-                run.summary.warnings.clear();
-                run.summary.warnings.extend_from_slice(pictures.warnings());
-                let Some(held) = held else { break };
-                let frame = frame?.filter(|f| f.index == held.scan.index);
+                let (frame, held) = match (frame, tracked.next()) {
+                    (Err(e), _) => break Err(e),
+                    (Ok(_), None) => break Ok(()),
+                    (Ok(frame), Some(held)) => (frame.filter(|f| f.index == held.scan.index), held),
+                };
                 run.summary.frames += 1;
                 if run.put(frame.as_ref(), &held).is_break() || asked(run.summary).is_break() {
-                    break;
+                    break Ok(());
                 }
                 frame.into_iter().for_each(|f| pictures.recycle(f));
-            }
-            Ok(())
+            };
+            run.summary.warnings = pictures.warnings().to_vec();
+            outcome
         }
         Input::Frames(source, mut detector) => {
             let info = source.info();
@@ -258,7 +261,9 @@ impl Run<'_, '_> {
             self.held.recycle(tracks);
             match (frame, &mut scans) {
                 (Some(frame), Some(scans)) => scans.recycle(frame, scan),
-                _ => self.spare.push(scan),
+                // Its frame went back at once, with a scan of these.
+                (None, Some(_)) => self.spare.push(scan),
+                (_, None) => {}
             }
             if written.is_break() {
                 return ControlFlow::Break(());

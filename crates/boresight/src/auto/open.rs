@@ -14,7 +14,7 @@ use super::scene::{self, Camera};
 use super::second_look;
 use super::spots::{INITIATION_SCORE, WEAK_INITIATION_SCORE};
 use super::{first_scans, noise, speed};
-use crate::io::{MOST_BYTES, Replay, frames_ahead};
+use crate::io::{LengthUnit, MOST_BYTES, Replay, frames_ahead};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
@@ -144,7 +144,7 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     }
     drop(at_once);
     let area_px2 = (info.width * info.height).max(1) as f64;
-    speed::learn(pass.scans(), area_px2, &mut choice.config, &mut choice.reasons);
+    speed::learn(pass.scans(), area_px2, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
     let nothing = |found: Option<Found>| found.is_some_and(|f| f.n_targets == 0);
@@ -183,7 +183,7 @@ fn statistics(
     false_tracks_per_hour: Option<f64>,
     choice: &mut Choice,
 ) -> Result<Option<Found>> {
-    noise::learn(scans, area_px2, &mut choice.config, &mut choice.reasons)?;
+    noise::learn(scans, area_px2, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons)?;
     if !is_of_points(&choice.config.detector.threshold) {
         if false_tracks_per_hour.is_some() {
             choice.reasons.push(RATE_WITHOUT_EFFECT.to_string());

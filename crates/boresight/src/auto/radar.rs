@@ -5,6 +5,7 @@
 //! reported: a radar sees what is there. Confirmation counts plots in turns, as many as the plots that stand alone ask for.
 //! Symbols: σ m, the larger standard deviation of a plot, T s, the time of a turn. Limits: constant velocity; what is learnt is the first [`first_scans`](super::first_scans)'.
 
+use super::detections::area_px2;
 use super::digits::round;
 use super::first_scans::first;
 use super::{noise, speed};
@@ -42,7 +43,7 @@ const LEAST_TRACKS: usize = 3;
 /// Writes the tracker's configuration for a radar's plots; `turn_s` is the time of a turn of the antenna, `unit` what positions are in.
 pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
     let turn_s = if turn_s.is_finite() && turn_s > 0.0 { turn_s } else { 1.0 };
-    let sigma = spread(scans);
+    let (sigma, px) = (spread(scans), unit.sign());
     let t = &mut config.tracker;
     t.report = Report::All;
     t.extra_noise_px = 0.0;
@@ -60,42 +61,34 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
     t.coast_scans = coast as u32;
     t.merged_measurements = MergedMeasurementsConfig::off();
     let mut told = vec![format!(
-        "Plots of a radar, a turn in {turn_s:.3} s, to {sigma:.0} px at the median: a target may move by {} px/s. {:.1} plots a turn are false; one of them would continue a track of nothing with {:.1} %: \
+        "Plots of a radar, a turn in {turn_s:.3} s, to {sigma:.0} {px} at the median: a target may move by {} {px}/s. {:.1} plots a turn are false; one of them would continue a track of nothing with {:.1} %: \
          {hits} plots in {CONFIRM_TURNS} turns confirm a track, which is unseen for at most {} s.",
         t.max_speed_px_per_s,
         clutter.n_false,
         100.0 * clutter.p_chance,
         t.coast_s
     )];
-    let area = area_m2(scans);
+    let area = area_px2(scans);
     // A radar that measures well sees fast targets move far between its turns.
-    speed::learn(scans, area, config, &mut told);
+    speed::learn(scans, area, unit, config, &mut told);
     let n_assumed = told.len();
-    let _ = noise::learn(scans, area, config, &mut told);
+    let _ = noise::learn(scans, area, unit, config, &mut told);
     if let Some(speeds) = speeds(scans, config) {
         let t = &mut config.tracker;
         t.max_speed_px_per_s = round((SPEED_RESERVE * speeds.fastest).max(1.0));
         t.initiation = starting_with(speeds.rms.max(0.1 * t.max_speed_px_per_s));
         told.push(format!(
-            "The fastest of {} tracks moves at {:.1} px/s, their speeds are {:.1} px/s in the mean square: a target may move by {} px/s.",
+            "The fastest of {} tracks moves at {:.1} {px}/s, their speeds are {:.1} {px}/s in the mean square: a target may move by {} {px}/s.",
             speeds.n_tracks, speeds.fastest, speeds.rms, t.max_speed_px_per_s
         ));
         let mut again = Vec::new();
-        let _ = noise::learn(scans, area, config, &mut again);
+        let _ = noise::learn(scans, area, unit, config, &mut again);
         if !again.is_empty() {
             told.remove(n_assumed);
             told.extend(again);
         }
     }
-    reasons.extend(told.iter().map(|text| in_unit(text, unit)));
-}
-
-/// A sentence that speaks of pixels, in the unit of the positions.
-fn in_unit(text: &str, unit: LengthUnit) -> String {
-    // Plots have no boxes.
-    let text =
-        text.replace(" and 0.0000 of a box height beyond them", " beyond them").replace(" and 0.0000 heights²/s³", "");
-    text.replace("px", unit.sign())
+    reasons.extend(told);
 }
 
 fn starting_with(velocity_std: f64) -> InitiationConfig {
@@ -169,23 +162,13 @@ fn clutter(scans: &[Scan]) -> Clutter {
         return Clutter { n_false: 0.0, p_chance: 0.0 };
     }
     let a_turn = all / (seen.len() - 2) as f64;
-    let (n_alone, share) = (a_turn * alone / looked, gates / looked / area_m2(scans));
+    let (n_alone, share) = (a_turn * alone / looked, gates / looked / area_px2(scans));
     let (mut n, mut p) = (n_alone, 0.0);
     for _ in 0..20 {
         p = 1.0 - (-n * share).exp();
         n = (n_alone / (1.0 - p).powi(2).max(0.01)).min(a_turn);
     }
     Clutter { n_false: n, p_chance: p }
-}
-
-/// The area over which the plots lie, m².
-fn area_m2(scans: &[Scan]) -> f64 {
-    let side = |axis: usize| {
-        let at = scans.iter().flat_map(|s| &s.detections).map(|d| d.position[axis]).filter(|v| v.is_finite());
-        let (least, most) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(v), m.max(v)));
-        (most - least).max(1.0)
-    };
-    side(0) * side(1)
 }
 
 struct Speeds {

@@ -9,6 +9,7 @@ use super::evidence::Evidence;
 use super::first_scans::first;
 use super::sightings::Sightings;
 use crate::camera::SteadyGround;
+use crate::io::LengthUnit;
 use crate::{Config, Scan};
 
 /// Scans looked at, and their detections at most: a guard of time.
@@ -17,8 +18,8 @@ const MOST_DETECTIONS: usize = 20_000;
 /// The largest speed over that which hardly a step exceeds: a target speeds up, another one is faster.
 const RESERVE: f64 = 1.5;
 
-/// Raises the largest speed to what the detections show.
-pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut Vec<String>) {
+/// Raises the largest speed to what the detections show; `unit` is what their positions are in.
+pub fn learn(scans: &[Scan], area_px2: f64, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
     let (mut sightings, mut n_seen) = (Vec::new(), 0);
     for scan in first(scans).iter().take(MOST_SCANS) {
@@ -36,10 +37,10 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     // Scans of one time (two sensors') would make any step infinitely fast.
     let fastest = Evidence::of(&sightings, area_px2).fastest_px_per_s().filter(|f| f.is_finite());
     let Some(fastest) = fastest else { return };
-    let speed = round(RESERVE * fastest);
+    let (speed, px) = (round(RESERVE * fastest), unit.sign());
     if speed > config.tracker.max_speed_px_per_s {
         reasons.push(format!(
-            "Chains of detections move by up to {fastest:.0} px/s: the largest speed is {speed} px/s, not {}.",
+            "Chains of detections move by up to {fastest:.0} {px}/s: the largest speed is {speed} {px}/s, not {}.",
             config.tracker.max_speed_px_per_s
         ));
         config.tracker.max_speed_px_per_s = speed;
@@ -67,7 +68,7 @@ mod tests {
             .collect();
         let (mut config, mut reasons) = (Config::default(), Vec::new());
         config.tracker.max_speed_px_per_s = 160.0;
-        learn(&scans, 320.0 * 240.0, &mut config, &mut reasons);
+        learn(&scans, 320.0 * 240.0, LengthUnit::Pixel, &mut config, &mut reasons);
         (config.tracker.max_speed_px_per_s, reasons.len())
     }
 

@@ -5,7 +5,7 @@
 //! `pairing` of tracks, fusion at every time of either sensor, and a check whether the sensors agree.
 //! Measurements: `measurement` feeds one target's filter with several sensors' reports (stacked in the square-root information
 //! filter, one after the other in the others, late ones where they belong); `merge` makes one sequence of scans for a tracker.
-//! `polar_registration` finds a radar's biases of range and azimuth.
+//! `polar_registration` finds a radar's biases of range and azimuth, from ships' own reports and plots (`reports`) or tracks.
 //! `plane` brings frames of reference together (affine map, homography; given or estimated).
 
 pub(crate) mod covariance_intersection;
@@ -15,6 +15,7 @@ pub(crate) mod pairing;
 pub(crate) mod plane;
 pub(crate) mod polar_registration;
 pub(crate) mod registration;
+pub(crate) mod reports;
 pub(crate) mod tables;
 pub(crate) mod timeline;
 pub(crate) mod track_to_track;
@@ -27,5 +28,6 @@ pub use merge::{SensorScans, merge_scans};
 pub use plane::{MapKind, PlaneMap};
 pub use polar_registration::{PolarConfig, PolarRegistration, register_polar};
 pub use registration::{Registration, RegistrationConfig};
+pub use reports::{REPORT_STD_M, plots_taken, timeline_of_reports};
 pub use tables::{FuseConfig, Fused, Rule, fuse_tables};
 pub use timeline::{Timeline, timelines};

@@ -68,16 +68,16 @@ pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
 }
 
 /// The images that a folder or a pattern stands for, in their order; `None` for any other input.
+#[cfg(feature = "images")]
 pub(super) fn images_of(input: &str) -> Option<Vec<PathBuf>> {
     let path = Path::new(input);
     if path.is_dir() {
         return list_folder(path, has_image_name).ok();
     }
-    #[cfg(feature = "images")]
-    if !path.exists() {
-        return super::pattern::expand(input).ok().flatten();
+    if path.exists() {
+        return None;
     }
-    None
+    super::pattern::expand(input).ok().flatten()
 }
 
 /// Whether an input is a file of text: a table of detections or tracks, not frames.

@@ -6,12 +6,15 @@
 //! read out, and a frame whose picture is missing is black.
 //! Limits: how many frames a video that is read through ffmpeg has is known only at its end.
 
-use super::open::{images_of, open};
+#[cfg(feature = "images")]
+use super::open::images_of;
+use super::open::open;
 use super::options::{Colour, OpenOptions};
 use super::tables::{DetectionTable, SequenceInfo};
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
+#[cfg(feature = "images")]
 use std::path::Path;
 
 /// The frames of a table.
@@ -98,7 +101,7 @@ impl Pictures {
     #[cfg(feature = "images")]
     fn last_place(&self, input: &str) -> Option<u64> {
         let files = images_of(input)?;
-        let n_files = numbered(&files)?.len() as u64;
+        let n_files = super::numbered::numbers(&files)?.len() as u64;
         if n_files != self.source.info().n_frames.unwrap_or(0) {
             return None;
         }
@@ -177,24 +180,23 @@ impl Pictures {
     }
 }
 
-/// The numbers in the names of files.
-fn numbered(files: &[std::path::PathBuf]) -> Option<Vec<u64>> {
-    #[cfg(feature = "images")]
-    return super::numbered::numbers(files);
-    #[cfg(not(feature = "images"))]
-    files.first().map(|_| Vec::new())
-}
-
 /// The frames of a table that pictures belong to by the numbers in their names, where both count from 1.
+#[cfg(feature = "images")]
 fn numbers(input: &str, info: &SourceInfo, first_frame: u64) -> Option<Vec<u64>> {
     if first_frame == 0 || Path::new(input).is_file() {
         return None;
     }
     let files = images_of(input)?;
-    let numbers = numbered(&files)?;
+    let numbers = super::numbered::numbers(&files)?;
     // A TIFF of several pages gives more frames than it has names.
     let fits = info.n_frames == Some(numbers.len() as u64) && numbers.first().is_some_and(|n| *n >= first_frame);
     fits.then(|| numbers.into_iter().map(|n| n - first_frame).collect())
+}
+
+/// Without images there are no numbered files.
+#[cfg(not(feature = "images"))]
+fn numbers(_: &str, _: &SourceInfo, _: u64) -> Option<Vec<u64>> {
+    None
 }
 
 impl FrameSource for Pictures {

@@ -4,7 +4,7 @@
 //! smaller than [`LEAST_SHARE`] of the picture's width, so that it can be seen.
 
 use super::picture::{Picture, block, means, png_url};
-use super::text::{printable, short};
+use super::text::{head, printable, short};
 use crate::{Extent, Frame, Pixels, SourceInfo};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use nalgebra::Vector2;
@@ -121,13 +121,7 @@ impl ContactSheet {
         let page = html! {
             (DOCTYPE)
             html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="generator" content=(concat!("boresight ", env!("CARGO_PKG_VERSION")));
-                    title { (printable(name)) " - boresight preview" }
-                    style { (PreEscaped(include_str!("page.css"))) (PreEscaped(include_str!("contact_sheet.css"))) (PreEscaped(self.picture_css())) }
-                }
+                (head(&format!("{} - boresight preview", printable(name)), &(include_str!("contact_sheet.css").to_string() + &self.picture_css())))
                 body {
                     main {
                         h1 { (printable(name)) }

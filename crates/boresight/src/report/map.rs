@@ -3,7 +3,7 @@
 //! What is drawn in metres east and north stands in a group that is turned over (SVG counts y downwards); words stand outside of it.
 //! Limits: at most [`MOST_PLOTS`] plots, every k-th of more; rings lie around where own ship is at the end.
 
-use super::collect::TrackLog;
+use super::collect::{Thinned, TrackLog};
 use super::curves::css_colour;
 use super::text::short;
 use crate::View;
@@ -24,8 +24,7 @@ const STEPS: f64 = 5.0;
 #[derive(Debug)]
 pub(super) struct Map {
     radar: RadarPicture,
-    plots: Vec<[f32; 2]>,
-    every: u64,
+    plots: Thinned<[f32; 2], MOST_PLOTS>,
     n: u64,
     last_time_s: f64,
 }
@@ -36,7 +35,7 @@ struct Field([f64; 4]);
 
 impl Map {
     pub fn new(radar: RadarPicture) -> Self {
-        Self { radar, plots: Vec::new(), every: 1, n: 0, last_time_s: f64::NEG_INFINITY }
+        Self { radar, plots: Thinned::default(), n: 0, last_time_s: f64::NEG_INFINITY }
     }
 
     /// Unit of length of the run.
@@ -48,18 +47,8 @@ impl Map {
     pub fn put(&mut self, view: &View<'_>) {
         self.last_time_s = view.scan.time.as_secs_f64();
         for d in &view.scan.detections {
-            if self.n.is_multiple_of(self.every) {
-                self.plots.push([d.position.x as f32, d.position.y as f32]);
-            }
+            self.plots.put([d.position.x as f32, d.position.y as f32]);
             self.n += 1;
-            if self.plots.len() > MOST_PLOTS {
-                let mut k = 0;
-                self.plots.retain(|_| {
-                    k += 1;
-                    k % 2 == 1
-                });
-                self.every *= 2;
-            }
         }
     }
 
@@ -68,7 +57,9 @@ impl Map {
         let own = self.own_path().map(|p| [p[0] as f32, p[1] as f32]);
         let paths = tracks.iter().flat_map(|t| &t.path.values).map(|p| [p[0], p[1]]);
         let mut b = [f32::MAX, f32::MAX, f32::MIN, f32::MIN];
-        for p in self.plots.iter().copied().chain(paths).chain(own).filter(|p| p[0].is_finite() && p[1].is_finite()) {
+        for p in
+            self.plots.values.iter().copied().chain(paths).chain(own).filter(|p| p[0].is_finite() && p[1].is_finite())
+        {
             b = [b[0].min(p[0]), b[1].min(p[1]), b[2].max(p[0]), b[3].max(p[1])];
         }
         if b[0] > b[2] {
@@ -134,7 +125,7 @@ pub(super) fn section(map: &Map, order: &[&TrackLog], detailed: &[&TrackLog]) ->
     let rings: Vec<f64> = multiples(ring, map.radar.longest_range * 1.02 + ring, ring);
     let own_path = line_of(map.own_path());
     let mut plots = String::new();
-    for [x, y] in &map.plots {
+    for [x, y] in &map.plots.values {
         let _ = write!(plots, "M{x:.0} {y:.0}h0");
     }
     let text = |size: f64| format!("font:{:.2}px system-ui,sans-serif;fill:#b8c7d1", size * px);
@@ -182,7 +173,7 @@ pub(super) fn section(map: &Map, order: &[&TrackLog], detailed: &[&TrackLog]) ->
             }
             p class="soft" {
                 "North is up; axes count " (if unit == LengthUnit::Metre { "metres" } else { "pixels" }) " east and north of where own ship's positions count from. Light dots: "
-                (n_plots) " plots" @if map.every > 1 { " (every " (map.every) "th)" } "; dashed rings: range from own ship at the end; white: own ship. A dot marks where a track began, its number where it ended, if there is room. "
+                (n_plots) " plots" @if map.plots.stride() > 1 { " (every " (map.plots.stride()) "th)" } "; dashed rings: range from own ship at the end; white: own ship. A dot marks where a track began, its number where it ended, if there is room. "
                 "Click a track to see its curves below."
             }
         }
@@ -278,7 +269,7 @@ mod tests {
     #[test]
     fn many_plots_are_thinned_and_none_give_no_map() {
         let map = seen(50_000);
-        assert!(map.plots.len() <= MOST_PLOTS && map.plots.len() > MOST_PLOTS / 3 && map.n == 50_000);
+        assert!(map.plots.values.len() <= MOST_PLOTS && map.plots.values.len() > MOST_PLOTS / 3 && map.n == 50_000);
         assert!(section(&map, &[], &[]).into_string().contains("50000 plots (every 4th)"));
     }
 }

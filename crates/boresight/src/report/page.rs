@@ -3,7 +3,7 @@
 use super::collect::{Collected, TrackLog};
 use super::map::{self, Map};
 use super::notes::Notes;
-use super::text::{printable, short};
+use super::text::{head, printable, short};
 use super::{curves, trajectories};
 use crate::TrackStatus;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -27,13 +27,7 @@ pub(super) fn page(notes: &Notes, seen: &Collected, map: Option<&Map>) -> String
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="generator" content=(concat!("boresight ", env!("CARGO_PKG_VERSION")));
-                title { (title) " - boresight" }
-                style { (PreEscaped(include_str!("page.css"))) }
-            }
+            (head(&format!("{title} - boresight"), ""))
             body {
                 main {
                     h1 { (title) }

@@ -1,6 +1,20 @@
 //! Text for HTML, JSON inside HTML, and base 64.
 
+use maud::{Markup, PreEscaped, html};
 use std::fmt::Write;
+
+/// The head of a page: its title, the style of all pages, and further style of its own.
+pub(super) fn head(title: &str, style: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="generator" content=(concat!("boresight ", env!("CARGO_PKG_VERSION")));
+            title { (title) }
+            style { (PreEscaped(include_str!("page.css"))) (PreEscaped(style)) }
+        }
+    }
+}
 
 /// The text without control characters, which have no place in HTML; line ends and tabs stay.
 pub(super) fn printable(text: &str) -> String {

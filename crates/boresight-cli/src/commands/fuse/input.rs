@@ -1,12 +1,13 @@
 //! What `fuse` reads: tracks as they are, detections through the tracker, and each table's frame of reference.
 
 use crate::console::say;
-use boresight::fuse::{MapKind, Timeline, timelines};
+use boresight::fuse::{MapKind, REPORT_STD_M, Timeline, plots_taken, timeline_of_reports, timelines};
 use boresight::fuse::{PlaneMap, common_points};
-use boresight::io::{LengthUnit, RadarPicture, TableOptions, read_detections, read_ship_reports, read_tracks};
-use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, TrackStatus, track};
-use boresight_filters::Gaussian;
-use nalgebra::{Matrix4, Vector2, Vector4};
+use boresight::io::{
+    LengthUnit, RadarPicture, ShipReports, TableOptions, read_detections, read_ship_reports, read_tracks,
+};
+use boresight::{Config, Error, ErrorKind, Result, Scan, TrackId, TrackState, track};
+use nalgebra::Vector2;
 use std::path::Path;
 
 /// One sensor's table.
@@ -97,7 +98,7 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
     let states = run_tracker(&config, &scans)?;
     let tracks = timelines(states.iter().map(|(t, s)| (*t, s.as_slice())));
     let plots = match turn {
-        Some(_) => taken(&tracks, &states, &scans, config.tracker.detection_covariance_scale),
+        Some(_) => plots_taken(&tracks, &states, &scans, config.tracker.detection_covariance_scale),
         None => Vec::new(),
     };
     say!(
@@ -119,70 +120,16 @@ pub fn read(path: &Path, config: Option<&Config>, map: &PlaneMap) -> anyhow::Res
     })
 }
 
-/// Standard deviation of a ship's report: the length of a ship, and a second of its way, m.
-const REPORT_STD_M: f64 = 30.0;
-
-/// Reports of a ship that hardly moved come every few minutes: it was there in between, at every so many seconds.
-const BERTH_S: f64 = 20.0;
-
-/// Reports with those added between two that lie no further apart than they are right.
-fn with_berths(reports: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut out = Vec::with_capacity(reports.len());
-    for (i, b) in reports.iter().enumerate() {
-        if let Some(a) = i.checked_sub(1).map(|i| reports[i])
-            && (b[1] - a[1]).hypot(b[2] - a[2]) < REPORT_STD_M
-            && b[0] - a[0] < 600.0
-        {
-            let n = ((b[0] - a[0]) / BERTH_S).ceil().max(1.0);
-            out.extend((1..n as u32).map(|k| [0, 1, 2].map(|j| a[j] + (b[j] - a[j]) * f64::from(k) / n)));
-        }
-        out.push(*b);
-    }
-    out
-}
-
 /// A table of ships' reports as a sensor; `None` where it is another table.
 fn ships(path: &Path, map: &PlaneMap) -> anyhow::Result<Option<Sensor>> {
     let Some(ships) = read_ship_reports(path, false)? else { return Ok(None) };
-    let mut tracks: Vec<Timeline> = Vec::new();
-    for ship in &ships {
-        let r = &with_berths(&ship.reports);
-        let velocity = |i: usize| {
-            let (a, b) = (r[i.saturating_sub(1)], r[(i + 1).min(r.len() - 1)]);
-            if b[0] > a[0] { [(b[1] - a[1]) / (b[0] - a[0]), (b[2] - a[2]) / (b[0] - a[0])] } else { [0.0; 2] }
-        };
-        let points = (0..r.len()).map(|i| {
-            let v = velocity(i);
-            let mean = Vector4::new(r[i][1], v[0], r[i][2], v[1]);
-            let cov = Matrix4::from_diagonal(&Vector4::new(REPORT_STD_M.powi(2), 1.0, REPORT_STD_M.powi(2), 1.0));
-            (r[i][0], Gaussian { mean, cov })
-        });
-        tracks.push(map.timeline(&Timeline { id: ship.id, points: points.collect(), size: [0.0; 2] }));
-    }
+    let of = |ship: &ShipReports| map.timeline(&timeline_of_reports(ship.id, &ship.reports));
+    let mut tracks: Vec<Timeline> = ships.iter().map(of).collect();
     tracks.retain(|t| !t.points.is_empty());
     let first = tracks.iter().map(|t| t.points[0].0).fold(f64::INFINITY, f64::min);
     say!("{}: reports of {} ships, taken as right to {REPORT_STD_M} m", path.display(), tracks.len());
     let first = (0, if first.is_finite() { first } else { 0.0 });
     Ok(Some(Sensor { tracks, scans: None, rate_hz: 1.0, is_reports: true, radar: None, plots: Vec::new(), first }))
-}
-
-/// The plots that each track took while it was confirmed, with the covariances that the tracker gave them.
-fn taken(tracks: &[Timeline], states: &[(f64, Vec<TrackState>)], scans: &[Scan], scale: f64) -> Vec<Timeline> {
-    let of = |track: &Timeline| {
-        let mut plots = Timeline { id: track.id, points: Vec::new(), size: [0.0; 2] };
-        for ((time_s, now), scan) in states.iter().zip(scans) {
-            let Some(s) = now.iter().find(|s| s.id == track.id && s.status != TrackStatus::Tentative) else { continue };
-            let Some(d) = s.detection.and_then(|j| scan.detections.get(j as usize)) else { continue };
-            let mut belief = s.kinematics;
-            (belief.mean[0], belief.mean[2]) = (d.position.x, d.position.y);
-            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                belief.cov[(2 * i, 2 * j)] = scale * d.cov[(i, j)];
-            }
-            plots.points.push((*time_s, belief));
-        }
-        plots
-    };
-    tracks.iter().map(of).collect()
 }
 
 /// The given configuration, or one chosen for the detections; `turn` is the time of a turn and the unit of length, of a radar's plots.

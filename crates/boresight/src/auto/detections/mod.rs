@@ -11,6 +11,7 @@ use super::choose::REIDENTIFY_S;
 use super::detection_statistics::{self, RATE_WITHOUT_EFFECT};
 use super::digits::round;
 use super::noise;
+use crate::io::LengthUnit;
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
     OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
@@ -40,7 +41,7 @@ pub fn for_detections(
     config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
-    let _ = noise::learn(scans, area_px2, config, reasons);
+    let _ = noise::learn(scans, area_px2, LengthUnit::Pixel, config, reasons);
     if of_boxes {
         if false_tracks_per_hour.is_some() {
             reasons.push(RATE_WITHOUT_EFFECT.to_string());
@@ -50,8 +51,8 @@ pub fn for_detections(
     }
 }
 
-/// The area over which the detections are spread, px².
-fn area_px2(scans: &[Scan]) -> f64 {
+/// The area over which the detections are spread, px² (m² of a radar's).
+pub(super) fn area_px2(scans: &[Scan]) -> f64 {
     let side = |axis: usize| {
         let at = scans.iter().flat_map(|s| &s.detections).map(|d| d.position[axis]).filter(|v| v.is_finite());
         let (least, most) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(v), m.max(v)));

@@ -9,6 +9,7 @@ mod fit;
 use super::digits::round;
 use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
+use crate::io::LengthUnit;
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use std::collections::BTreeMap;
@@ -33,10 +34,17 @@ struct Followed {
     confirmed: bool,
 }
 
-/// Runs the tracker over `scans` as configured and replaces the assumed noise by what its tracks show; `area_px2` is the field's.
+/// Runs the tracker over `scans` as configured and replaces the assumed noise by what its tracks show; `area_px2` is the field's,
+/// `unit` what positions are in.
 /// # Errors
 /// Scans that the tracker refuses.
-pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut Vec<String>) -> Result<()> {
+pub fn learn(
+    scans: &[Scan],
+    area_px2: f64,
+    unit: LengthUnit,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) -> Result<()> {
     if !config.tracker.filter.is_constant_velocity() {
         reasons.push("The filter is not of constant velocity: noise and motion stay as assumed.".to_string());
         return Ok(());
@@ -94,16 +102,18 @@ pub fn learn(scans: &[Scan], area_px2: f64, config: &mut Config, reasons: &mut V
     t.extra_noise_per_height = or_none(found.extra_per_height);
     t.acceleration_density_px2_per_s3 = round(found.density);
     t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2);
+    // Points have no boxes.
+    let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
+    let px = unit.sign();
     reasons.push(format!(
-        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} px and {:.4} of a box height beyond them, acceleration density \
-         {:.3} px²/s³ and {:.4} heights²/s³.",
+        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} {px}{} beyond them, acceleration density {:.3} {px}²/s³{}.",
         series.len(),
         scans.len(),
         t.detection_covariance_scale,
         t.extra_noise_px,
-        t.extra_noise_per_height,
+        part(t.extra_noise_per_height, " of a box height"),
         t.acceleration_density_px2_per_s3,
-        t.acceleration_density_per_height2_per_s3,
+        part(t.acceleration_density_per_height2_per_s3, " heights²/s³"),
     ));
     Ok(())
 }

@@ -104,7 +104,7 @@ fn candidates(input: &str, base: &Config, request: &Request) -> Result<(SourceIn
     Ok((info.clone(), candidates, camera))
 }
 
-/// The results of a function for each of some things, in their order, made on several threads; the last are begun first.
+/// The results of a function for each of some things, in their order, made on several threads.
 fn side_by_side<T: Sync, R: Send>(n_threads: usize, things: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {

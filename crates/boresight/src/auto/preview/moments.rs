@@ -27,7 +27,7 @@ pub(super) struct Moments {
 impl Moments {
     /// Chooses the runs in an input of `n` frames of `frame_px` pixels and `frame_bytes` bytes that can be entered at `entries`.
     pub fn choose(n: u64, frame_px: u64, frame_bytes: u64, entries: &[u64]) -> Self {
-        let most_read = (MOST_PX / frame_px.max(1)).max(64);
+        let most_read = Self::most_read(frame_px);
         let n_each = (MOST_BYTES / (RUNS as u64 * frame_bytes.max(1))).clamp(LEAST_FRAMES as u64, OFFSETS.len() as u64);
         let offsets = &OFFSETS[..n_each as usize];
         let spread = |n: u64| -> Vec<u64> {

@@ -17,6 +17,8 @@ pub struct JsonLines {
     output: Output,
     unit: LengthUnit,
     line: String,
+    /// The line with the names of another unit.
+    renamed: String,
 }
 
 opaque_debug!(JsonLines);
@@ -31,7 +33,7 @@ impl JsonLines {
 
     /// Writes to any output.
     pub fn to(output: Output) -> Self {
-        Self { output, unit: LengthUnit::Pixel, line: String::new() }
+        Self { output, unit: LengthUnit::Pixel, line: String::new(), renamed: String::new() }
     }
 
     /// With names that say this unit of length.
@@ -135,12 +137,13 @@ impl Sink for JsonLines {
             track(out, t);
         }
         out.push_str("]}\n");
-        // Only names hold letters here.
-        if self.unit != LengthUnit::Pixel {
-            self.line = self.unit.columns(&self.line);
+        if self.unit == LengthUnit::Pixel {
+            return self.output.put(out.as_bytes());
         }
-        let out = &self.line;
-        self.output.put(out.as_bytes())
+        // Only names hold letters here.
+        self.renamed.clear();
+        self.unit.push_columns(&mut self.renamed, &self.line);
+        self.output.put(self.renamed.as_bytes())
     }
 
     fn finish(self: Box<Self>) -> Result<()> {

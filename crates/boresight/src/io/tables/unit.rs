@@ -21,9 +21,19 @@ impl LengthUnit {
 
     /// Names of columns as they are written for pixels, in this unit: `vx_px_per_s` becomes `vx_m_per_s`.
     pub(crate) fn columns(self, names: &str) -> String {
-        match self {
-            Self::Pixel => names.to_string(),
-            Self::Metre => names.replace("_px", "_m"),
+        let mut out = String::new();
+        self.push_columns(&mut out, names);
+        out
+    }
+
+    /// Appends them.
+    pub(crate) fn push_columns(self, out: &mut String, names: &str) {
+        for (i, part) in names.split("_px").enumerate() {
+            if i > 0 {
+                out.push('_');
+                out.push_str(self.sign());
+            }
+            out.push_str(part);
         }
     }
 }

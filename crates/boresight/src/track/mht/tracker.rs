@@ -155,4 +155,8 @@ impl Tracking for Mht {
         self.report();
         Ok(&self.states)
     }
+
+    fn retrospective_s(&self) -> f64 {
+        self.config.retrospective_s
+    }
 }

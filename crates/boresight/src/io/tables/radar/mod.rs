@@ -6,3 +6,4 @@ pub(crate) mod options;
 pub(crate) mod own_ship;
 pub(crate) mod picture;
 pub(crate) mod read;
+mod turns;

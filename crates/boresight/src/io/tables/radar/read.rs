@@ -5,11 +5,11 @@
 //! empty scans. A scan's time is the middle of its turn.
 //! A plot has no size: its box is empty. Limits: within a turn a target keeps the lag between its plot and the middle of the turn, at most half a turn of its way.
 
-use super::antenna;
 use super::columns::{RadarColumns, Scaled, Spread};
 use super::options::{AzimuthFrom, RadarOptions};
 use super::own_ship::OwnShip;
 use super::picture::{RadarPicture, along};
+use super::turns::{Plot, number};
 use crate::io::tables::columns::Field;
 use crate::io::tables::detection_table::DetectionTable;
 use crate::io::tables::number::timestamp_of_seconds;
@@ -24,19 +24,8 @@ use std::path::{Path, PathBuf};
 
 /// The table of own ship that is looked for beside the plots.
 const BESIDE: &str = "ownship.csv";
-/// Most scans between the first and the last plot: empty ones take memory as well.
-const MOST_SCANS: u64 = 10_000_000;
 /// Deviations of an azimuth are not larger, rad: beyond it the conversion does not hold.
 const MOST_AZIMUTH_STD_RAD: f64 = 0.5;
-
-/// One plot, as the table has it.
-struct Plot {
-    time_s: f64,
-    turn: Option<u64>,
-    range: f64,
-    azimuth_rad: f64,
-    std: [f64; 2],
-}
 
 /// Whether a table is one of range and azimuth, without places.
 /// # Errors
@@ -233,7 +222,7 @@ fn detection(plot: &Plot, options: &RadarOptions, own: &OwnShip) -> Result<Detec
 
 /// Gathers detections, in order of time as the plots are, into scans; also the time of a turn, s.
 fn scans(plots: &[Plot], detections: Vec<Detection>, options: &TableOptions) -> Result<(Vec<Scan>, f64)> {
-    let of = number(plots, options)?;
+    let of = number(plots, options.radar.turn_s)?;
     let n = of.times_s.len();
     let mut scans: Vec<Scan> = Vec::with_capacity(n);
     for (k, time_s) in of.times_s.iter().enumerate() {
@@ -252,77 +241,6 @@ fn scans(plots: &[Plot], detections: Vec<Detection>, options: &TableOptions) -> 
         scans[*k as usize].detections.push(d);
     }
     Ok((scans, of.turn_s))
-}
-
-/// The scans of plots: their times, which plot is in which, the number of the first.
-struct Numbered {
-    first: u64,
-    turn_of: Vec<u64>,
-    times_s: Vec<f64>,
-    turn_s: f64,
-}
-
-fn number(plots: &[Plot], options: &TableOptions) -> Result<Numbered> {
-    let given = options.radar.turn_s;
-    if plots.iter().all(|p| p.turn.is_some()) && !plots.is_empty() {
-        let numbers: Vec<u64> = plots.iter().filter_map(|p| p.turn).collect();
-        return by_number(plots, &numbers, given);
-    }
-    let mut times: Vec<f64> = plots.iter().map(|p| p.time_s).collect();
-    times.dedup();
-    // Plots that share their times are scans already; those of an antenna that turns hardly ever do.
-    if plots.len() > 1 && 10 * times.len() <= 6 * plots.len() {
-        let turn_s = given.unwrap_or_else(|| median_step(&times));
-        let mut numbers = Vec::with_capacity(plots.len());
-        let (mut k, mut last) = (0u64, times[0]);
-        for p in plots {
-            if p.time_s > last {
-                k += ((p.time_s - last) / turn_s).round().max(1.0) as u64;
-                last = p.time_s;
-            }
-            numbers.push(k);
-        }
-        return by_number(plots, &numbers, Some(turn_s));
-    }
-    let seen: Vec<(f64, f64)> = plots.iter().map(|p| (p.time_s, p.azimuth_rad)).collect();
-    let t = antenna::turns(&seen, given)?;
-    Ok(Numbered { first: 0, turn_of: t.turn_of, times_s: t.times_s, turn_s: t.turn_s })
-}
-
-fn median_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len().saturating_sub(1) / 2).copied().unwrap_or(1.0)
-}
-
-/// Scans by their numbers; the time of one is the middle of its plots', of one without plots evenly between its neighbours'.
-fn by_number(plots: &[Plot], numbers: &[u64], turn_s: Option<f64>) -> Result<Numbered> {
-    let (first, last) = (numbers.iter().copied().min().unwrap_or(0), numbers.iter().copied().max().unwrap_or(0));
-    if last - first >= MOST_SCANS || last - first > 1_000_000 + 100 * plots.len() as u64 {
-        return Err(Error::new(
-            ErrorKind::Damaged,
-            format!("{} scans between the first plot and the last", last - first + 1),
-        )
-        .hint("is it really the number of the scan, are the times really seconds?"));
-    }
-    let n = (last - first + 1) as usize;
-    let mut span = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
-    for (p, k) in plots.iter().zip(numbers) {
-        let s = &mut span[(k - first) as usize];
-        *s = [s[0].min(p.time_s), s[1].max(p.time_s)];
-    }
-    let seen: Vec<(usize, f64)> =
-        span.iter().enumerate().filter(|(_, s)| s[0] <= s[1]).map(|(k, s)| (k, (s[0] + s[1]) / 2.0)).collect();
-    let mut times_s = vec![0.0; n];
-    if let [(k, t)] = seen[..] {
-        times_s[k] = t;
-    }
-    for w in seen.windows(2) {
-        let ((a, from), (b, to)) = (w[0], w[1]);
-        (a..=b).for_each(|k| times_s[k] = from + (to - from) * (k - a) as f64 / (b - a) as f64);
-    }
-    let turn_s = turn_s.unwrap_or_else(|| median_step(&times_s));
-    Ok(Numbered { first, turn_of: numbers.iter().map(|k| k - first).collect(), times_s, turn_s })
 }
 
 #[cfg(test)]

@@ -86,8 +86,10 @@ impl Worker {
         let mut pictures = Vec::new();
         let mut due = Vec::new();
         let mut wait_for_sync = false;
-        let (mut step, mut look_at) = (0, 0);
-        while step < self.movie.steps.len() {
+        let (mut following, mut look_at) = (0, 0);
+        while following < self.movie.steps.len() {
+            let step = following;
+            following += 1;
             if step >= look_at && reorder.is_by_rank() && self.wanted.get().is_some() {
                 match self.next_wanted(step) {
                     Err(wanted) => look_at = wanted + 1,
@@ -101,14 +103,11 @@ impl Worker {
                         // What begins here depends on nothing that was passed over.
                         self.units.reset();
                         wait_for_sync = false;
-                        step = next;
+                        following = next;
                         continue;
                     }
                 }
             }
-            let at = step;
-            step += 1;
-            let step = at;
             let Some(sample) = self.movie.steps.get(step).and_then(|s| self.movie.samples.get(s.sample as usize))
             else {
                 continue;
