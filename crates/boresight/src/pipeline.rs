@@ -89,7 +89,10 @@ pub fn run_on(
     let mut summary = Summary::default();
     let mut counts = Counts::default();
     let mut outputs = Outputs { sinks, unwritten: Vec::new() };
-    let held = Retrospect::new(tracking.as_ref().map_or(0.0, |t| t.retrospective_s()));
+    let held = Retrospect::new(
+        tracking.as_ref().map_or(0.0, |t| t.retrospective_s()),
+        tracking.as_ref().and_then(|t| t.backward()),
+    );
     let run = Run {
         tracking: &mut tracking,
         outputs: &mut outputs,
