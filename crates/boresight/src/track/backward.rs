@@ -3,7 +3,7 @@
 //! Source: our own; the filter is run in reversed time as in two-filter smoothing (D. C. Fraser, J. E. Potter, IEEE Trans. AC 14, 1969), the decision is that of
 //! track-before-detect by cumulated evidence (A. Wald, *Sequential Analysis*, 1947).
 //! Method: a constant-velocity filter goes backward through the track's own detections, so that it knows where the target came from, and on through the scans before. In each it
-//! takes the likeliest detection of its gate that no reported track has. The log-likelihood ratio of "the target was there" against "nobody was" is added up: ln(P_D l / λ) of
+//! takes the likeliest detection of its gate that no reported track has, or where there is none, one that a sudden manoeuvre explains better than a miss. The log-likelihood ratio of "the target was there" against "nobody was" is added up: ln(P_D l / λ) of
 //! a detection, ln(1 − P_D P_G) of a miss, with the probabilities that the tracker has, and a clutter density that is no lower than what is seen around the place.
 //! The track begins where that sum is largest, if it is as sure there as what confirms a track; a walk ends when it has become as unlikely as what deletes one.
 //! Symbols: l likelihood of a detection (1/px²); λ false detections per px² and scan; times run backward, so velocities have the other sign inside.
@@ -18,11 +18,14 @@ use crate::camera::SteadyGround;
 use crate::record::TrackInnovation;
 use crate::{Detection, Extent, Scan, TrackId, TrackState, TrackStatus};
 use boresight_filters::model::ConstantVelocity;
-use boresight_filters::{GaussianFilter, Kf, Measurement, Start};
+use boresight_filters::{Gaussian, GaussianFilter, Kf, Measurement, Start};
 use nalgebra::Vector2;
 
 /// Own detections that the filter goes through at most: enough for a velocity.
 const MOST_OWN: usize = 20;
+/// Probability that the velocity changes at once within a scan interval, by anything up to the largest speed: of a bird that turns, or of a camera whose motion is not known. One
+/// in a hundred intervals; half or twice as many change the evidence of such a step by 0.7, a detection's is some 5.
+const MANOEUVRE: f64 = 0.01;
 /// Half the side of the square in which false detections are counted, px: a cell of a clutter map and its neighbours.
 const AROUND_PX: f64 = 48.0;
 
@@ -54,6 +57,7 @@ pub struct Backward {
 /// A target on its way back.
 struct Walk<'c> {
     back: &'c Backward,
+    model: ConstantVelocity,
     filter: Kf<ConstantVelocity, 4>,
     time: crate::Timestamp,
     side_px: [f64; 2],
@@ -117,6 +121,7 @@ impl Backward {
         let side_px = [d.extent.width_px, d.extent.height_px];
         let mut walk = Walk {
             back: self,
+            model,
             filter,
             time: first.scan.time,
             side_px,
@@ -179,6 +184,7 @@ impl Walk<'_> {
 
     /// One scan further back: the log-likelihood ratio and the state there; `None` where the walk cannot go on.
     fn step(&mut self, id: TrackId, past: &Past<'_>) -> Option<(f64, TrackState)> {
+        let (before, dt_s) = (self.filter.belief(), self.time.seconds_since(past.scan.time));
         self.predict(past.scan.time)?;
         let config = &self.back.config;
         let belief = self.filter.belief();
@@ -188,29 +194,56 @@ impl Walk<'_> {
         {
             return None;
         }
-        let (likely, n_around) = self.look(past, place);
+        let (mut likely, mut n_around) = self.look(past, place, &belief);
+        let (p_detection, mut p_motion) = (config.p_detection(self.misses), 1.0);
+        let missed = (1.0 - p_detection * config.gate_probability).max(f64::MIN_POSITIVE).ln();
+        let area_px2 = (2.0 * AROUND_PX).powi(2);
+        let clutter = |n_around: f64| {
+            let seen = (self.around[0] + n_around) / ((self.around[1] + 1.0) * area_px2);
+            config.clutter_density_per_px2.max(seen)
+        };
+        if likely.is_none()
+            && let Some(turned) = self.turned(before, dt_s)
+        {
+            let (other, n) = self.look(past, place, &turned.belief());
+            let gain = |l: &Likely| (MANOEUVRE * p_detection / clutter(n)).ln() + l.log_ratio;
+            if other.as_ref().is_some_and(|l| gain(l) > missed) {
+                (likely, n_around, p_motion) = (other, n, MANOEUVRE);
+                self.filter = turned;
+            }
+        }
+        let clutter = clutter(n_around);
         self.around[0] += n_around;
         self.around[1] += 1.0;
-        let area_px2 = (2.0 * AROUND_PX).powi(2);
-        let clutter = config.clutter_density_per_px2.max(self.around[0] / (self.around[1] * area_px2));
-        let p_detection = config.p_detection(self.misses);
         let (evidence, detection, innovation) = match likely {
             Some(l) if self.filter.correct(&l.measurement).is_ok() => {
                 self.misses = 0;
                 self.follow(&past.scan.detections[l.detection as usize]);
-                ((p_detection / clutter).ln() + l.log_ratio, Some(l.detection), Some(l.innovation))
+                ((p_motion * p_detection / clutter).ln() + l.log_ratio, Some(l.detection), Some(l.innovation))
             }
             _ => {
                 self.misses += 1;
-                ((1.0 - p_detection * config.gate_probability).max(f64::MIN_POSITIVE).ln(), None, None)
+                (missed, None, None)
             }
         };
         Some((evidence, self.state(id, past, detection, innovation)))
     }
 
+    /// The filter as it would be here with any velocity from the scan before on.
+    fn turned(&self, mut before: Gaussian<4>, dt_s: f64) -> Option<Kf<ConstantVelocity, 4>> {
+        let variance = self.back.config.max_speed_px_per_s.powi(2) / 3.0;
+        for v in [1, 3] {
+            before.cov.row_mut(v).fill(0.0);
+            before.cov.column_mut(v).fill(0.0);
+            before.cov[(v, v)] = variance;
+        }
+        let mut filter = Kf::start(self.model, before).ok()?;
+        filter.predict(dt_s).ok()?;
+        Some(filter)
+    }
+
     /// The likeliest detection of the gate that nobody has, and how many others nobody has around it.
-    fn look(&self, past: &Past<'_>, place: Vector2<f64>) -> (Option<Likely>, f64) {
-        let belief = self.filter.belief();
+    fn look(&self, past: &Past<'_>, place: Vector2<f64>, belief: &Gaussian<4>) -> (Option<Likely>, f64) {
         let config = &self.back.config;
         let (mut best, mut n_around) = (None::<Likely>, 0.0);
         let spread = (belief.cov[(0, 0)].max(belief.cov[(2, 2)]) * config.gate()).sqrt() * past.ground.zoom();

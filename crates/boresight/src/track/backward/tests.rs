@@ -168,3 +168,19 @@ fn what_another_track_has_is_left_to_it_and_one_detection_gives_no_direction() {
     assert!(scene.back(&config(), 59).is_empty());
     assert!(Backward::of(&TrackerConfig { retrospective_s: 0.0, ..config() }).is_none());
 }
+
+#[test]
+fn a_jerk_of_the_camera_that_nobody_measured_does_not_end_it() {
+    let mut followed = 0;
+    for seed in 0..20 {
+        let mut scene = scene(seed, 0, 0.95, 1, 0.0);
+        // From scan 20 back the image runs by 2.5 px a scan more than the target.
+        for (k, scan) in scene.scans[..20].iter_mut().enumerate() {
+            let off = Vector2::new(2.5, -2.5) * (20 - k) as f64;
+            scan.detections.iter_mut().for_each(|d| d.position += off);
+        }
+        let scene = Scene::of(scene.scans, scene.truth);
+        followed += usize::from(scene.back(&config(), 40).len() >= 36);
+    }
+    assert!(followed >= 18, "{followed} of 20");
+}
