@@ -77,7 +77,7 @@ fn scene(seed: u64, from: usize, p: f64, n_false: usize, pan: f64) -> Scene {
         }
         truth.push(x);
         let shift = Vector2::new(pan * k as f64, 0.0);
-        let mut at = |place: Vector2<f64>| Detection::at(place + shift, Matrix2::identity() * 0.09);
+        let at = |place: Vector2<f64>| Detection::at(place + shift, Matrix2::identity() * 0.09);
         let noise = Vector2::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * 0.3;
         let mut detections = Vec::new();
         if k >= from && (k >= 40 || rng.random::<f64>() < p) {

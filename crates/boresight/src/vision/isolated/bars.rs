@@ -217,7 +217,7 @@ widest! {
 
 widest! {
     /// Replaces each value by the largest within `reach` columns and rows, of values that are the largest within as much or more already, or within none.
-    fn widen(values: &mut Vec<f32>, other: &mut Vec<f32>, columns: usize, reach: usize) {
+    fn widen(values: &mut [f32], other: &mut Vec<f32>, columns: usize, reach: usize) {
         let columns = columns.max(1);
         let rows = values.len() / columns;
         let larger = |a: f32, b: f32| if b > a { b } else { a };
