@@ -4,6 +4,7 @@ mod batch;
 mod config;
 mod detect;
 mod exit_codes;
+mod faults;
 mod help;
 mod interrupt;
 mod loss;

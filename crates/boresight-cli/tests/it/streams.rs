@@ -20,12 +20,18 @@ pub(super) fn inputs() -> tempfile::TempDir {
     };
     at(&["simulate", "ds2", "--frames", "24", "--format", "y4m", "-o", "sim"]);
     at(&["track", "sim/frames.y4m", "--config", "sim/track.toml", "-o", "run", "--no-video", "-q"]);
+    for (kind, table) in [("truth", "sim/gt.txt"), ("result", "run/mot.txt")] {
+        std::fs::create_dir_all(dir.path().join("sets").join(kind)).unwrap();
+        for name in ["a.txt", "b.txt"] {
+            std::fs::copy(dir.path().join(table), dir.path().join("sets").join(kind).join(name)).unwrap();
+        }
+    }
     std::fs::write(dir.path().join("radars.toml"), "[[radars]]\nname = \"far\"\nscan-period-s = 0.5\n").unwrap();
     dir
 }
 
 /// Every command once, with outputs in `out/`: arguments, and the files that are made there.
-pub(super) const COMMANDS: [(&str, &[&str]); 14] = [
+pub(super) const COMMANDS: [(&str, &[&str]); 18] = [
     (
         "track sim/frames.y4m --config sim/track.toml -o out --json --camera --png --summary --thumbnail \
          --also geff,trackmate-xml,cvat,mot-zip,napari",
@@ -55,11 +61,15 @@ pub(super) const COMMANDS: [(&str, &[&str]); 14] = [
         &["e.csv", "e.json", "e.html"],
     ),
     ("evaluate sim/frames.y4m sim/frames.y4m --csv out/i.csv --json out/i.json", &["i.csv", "i.json"]),
+    ("evaluate sets/truth sets/result --html out/s.html --json out/s.json", &["s.html", "s.json"]),
     ("fuse run/tracks.csv run/tracks.csv -o out/fused.csv", &["fused.csv"]),
     ("smooth run/tracks.csv -o out/smooth.csv", &["smooth.csv"]),
     ("stitch run/tracks.csv -o out/stitched.txt --smooth", &["stitched.txt"]),
     ("convert run/tracks.csv out/c.csv --to csv", &["c.csv"]),
     ("convert run/tracks.csv out/g --to geff", &["g/edges/ids/0.0"]),
+    ("preview sim/frames.y4m -q -o out/p.html", &["p.html"]),
+    ("sensor sim/frames.y4m -o out/s.html", &["s.html"]),
+    ("track run/detections.csv --frames sim/frames.y4m -o out", &["tracks.csv", "annotated.mp4", "report.html"]),
     ("convert run/tracks.csv out/ctc --to ctc --size 64x64", &["ctc/res_track.txt", "ctc/mask023.tif"]),
     ("reproduce srif-1 --runs 2 -o out", &["index.html", "reproduce.json"]),
     (
@@ -104,7 +114,7 @@ fn words_that_cannot_be_said_do_not_lose_a_run() {
 }
 
 /// What prints to standard output.
-const PRINTING: [&str; 12] = [
+pub(super) const PRINTING: [&str; 15] = [
     "detect sim/frames.y4m --config sim/track.toml -q -o -",
     "simulate ds2 --frames 24 -o -",
     "simulate ds2 --print",
@@ -114,6 +124,9 @@ const PRINTING: [&str; 12] = [
     "config",
     "config --schema",
     "completions bash",
+    "config --list filters",
+    "config --explain tracker",
+    "sensor sim/frames.y4m -o sensor.html",
     "reproduce --list",
     "reproduce srif-1 --runs 2",
     "--help",

@@ -292,6 +292,13 @@ fn headers_that_claim_a_billion_pixels_are_refused() {
     }
 }
 
+#[test]
+fn what_the_fuzzer_found_is_refused_without_a_panic() {
+    // A palette whose bytes are no multiple of three, at which the decoder panics.
+    let error = read(&folder().join("damaged/palette_of_four_bytes.png")).unwrap_err().to_string();
+    assert!(error.contains("a palette of 4 bytes"), "{error}");
+}
+
 /// Writes a stack of 8-bit pages with a description on the first; page p is filled with p.
 fn write_stack(path: &Path, n: u8, description: &str) {
     let mut out = tiff::encoder::TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
