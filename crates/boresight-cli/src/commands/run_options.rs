@@ -6,6 +6,7 @@ use boresight::auto;
 use boresight::io::{Pictures, SequenceInfo};
 use boresight::pipeline::{Input, Outcome};
 use boresight::{Config, Error, ErrorKind, vision};
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -15,7 +16,7 @@ pub struct InputArgs {
     /// A video, a folder or glob of images, an image stack, `-` for YUV4MPEG2 on standard input, a stream's address, a camera
     /// (/dev/video0), or a table of detections (.csv, .txt).
     #[arg(value_name = "INPUT")]
-    pub input: String,
+    pub input: OsString,
     /// Configuration file; without it everything is chosen by looking at the first frames.
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -97,7 +98,7 @@ impl Plan {
 }
 
 /// Opens the input and settles the configuration; `frames` are the pictures of a table.
-pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> anyhow::Result<Plan> {
+pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> anyhow::Result<Plan> {
     if let Some(mb) = args.max_memory {
         boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
     }
@@ -140,7 +141,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
     }
     if let Some(frames) = frames {
         return Err(Error::new(ErrorKind::Config, "only a table of detections needs pictures beside it")
-            .at(format!("--frames {frames}"))
+            .at(format!("--frames {}", frames.display()))
             .hint("leave --frames out: the input is frames itself")
             .into());
     }
@@ -204,7 +205,7 @@ fn plan_table(
     tracker: &TrackerArgs,
     given: Option<Config>,
     base: Config,
-    frames: Option<&str>,
+    frames: Option<&OsStr>,
 ) -> anyhow::Result<Plan> {
     let mut base = base;
     let sequence = SequenceInfo::beside(Path::new(&args.input));
@@ -224,7 +225,7 @@ fn plan_table(
     let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
     if table.scans.is_empty() {
         return Err(Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track")
-            .at(&args.input)
+            .at(args.input.display())
             .into());
     }
     let n_read = table.n_rows - table.n_skipped;
@@ -238,7 +239,7 @@ fn plan_table(
         None => format!(
             "{n_read} detections in {} frames at {} frames/s, read as {}.",
             table.scans.len(),
-            table.rate_hz,
+            boresight::shown_rate(table.rate_hz),
             table.format
         ),
     }];
@@ -262,14 +263,14 @@ fn plan_table(
     let (input, info) = match frames {
         Some(frames) if table.radar.is_some() => {
             return Err(Error::new(ErrorKind::Config, "a radar's plots have no pictures to be drawn on")
-                .at(format!("--frames {frames}"))
+                .at(format!("--frames {}", frames.display()))
                 .hint("leave --frames out: the report draws a map")
                 .into());
         }
         Some(frames) => {
             let pictures = Pictures::open(frames, &config.input.open_options(), &table, &sequence)?;
             let info = pictures.info().clone();
-            reasons.push(format!("Drawn on the pictures of {frames}, read as {}.", info.reader));
+            reasons.push(format!("Drawn on the pictures of {}, read as {}.", frames.display(), info.reader));
             (Input::Pictured(Box::new(pictures), table.scans), Some(info))
         }
         None => {
@@ -283,12 +284,9 @@ fn plan_table(
 }
 
 /// INPUT's name beside the working directory, with an ending.
-pub fn default_folder(input: &str, ending: &str) -> PathBuf {
-    let name = Path::new(input)
-        .file_stem()
-        .and_then(|s| s.to_str())
-        .filter(|s| !s.is_empty() && *s != "-")
-        .unwrap_or("boresight");
+pub fn default_folder(input: impl AsRef<Path>, ending: &str) -> PathBuf {
+    let stem = input.as_ref().file_stem().map(OsStr::to_string_lossy);
+    let name = stem.filter(|s| !s.is_empty() && s != "-").unwrap_or("boresight".into());
     let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     PathBuf::from(format!("{name}.{ending}"))
 }
@@ -306,7 +304,7 @@ pub fn fits(s: &boresight::pipeline::Summary) -> Option<String> {
 /// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
 /// # Errors
 /// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.
-pub fn outcome(input: &str, done: Outcome) -> anyhow::Result<ExitCode> {
+pub fn outcome(input: &OsStr, done: Outcome) -> anyhow::Result<ExitCode> {
     let Outcome { summary, broken, unwritten } = done;
     let kept = match summary.frames {
         0 => "nothing is written; what an earlier run wrote stays".to_string(),
@@ -316,7 +314,7 @@ pub fn outcome(input: &str, done: Outcome) -> anyhow::Result<ExitCode> {
     let mut errors: Vec<Error> = unwritten;
     errors.extend(broken.map(|e| e.hint(&kept)));
     if errors.is_empty() && summary.frames == 0 && !summary.interrupted {
-        errors.push(Error::new(ErrorKind::Damaged, "holds no frames").at(input).hint(kept));
+        errors.push(Error::new(ErrorKind::Damaged, "holds no frames").at(input.display()).hint(kept));
     }
     let mut errors = errors.into_iter();
     let Some(first) = errors.next() else {

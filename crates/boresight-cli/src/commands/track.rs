@@ -15,6 +15,7 @@ use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
 use boresight::verdict::Observed;
 use boresight::{Error, ErrorKind, Sink, track};
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -50,7 +51,7 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Pictures of a table of detections, to draw on: a folder, a quoted pattern or a video. MOTChallenge's frame 1 is 000001.jpg.
     #[arg(long, value_name = "INPUT")]
-    frames: Option<String>,
+    frames: Option<OsString>,
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
@@ -92,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.end_with_stdin {
         super::stop::end_with_stdin();
     }
-    let input = args.input.input.as_str();
+    let input = args.input.input.as_os_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
     if let Some(frames) = &args.frames {
@@ -145,7 +146,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
     let can_be_looked_at = args.input.config.is_none() && is_on_disk(input);
     let look = (verdict.is_to_be_looked_at && can_be_looked_at)
-        .then(|| format!("boresight preview {}", command_line::word(input)));
+        .then(|| format!("boresight preview {}", command_line::os_word(input)));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
@@ -162,7 +163,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             done.unwritten.extend(also::write(&folder, &args.also, size_px, quiet));
         }
         if folder.makes("summary.json") {
-            let told = RunSummary::new(input, &done.summary, &verdict, next.as_deref(), &notes.warnings);
+            let told =
+                RunSummary::new(&input.to_string_lossy(), &done.summary, &verdict, next.as_deref(), &notes.warnings);
             done.unwritten.extend(told.write(&folder.path("summary.json")).err());
         }
         match config.finish(&notes.warnings) {
@@ -189,9 +191,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Whether an input is frames on disk.
-fn is_on_disk(input: &str) -> bool {
-    let on_disk = std::path::Path::new(input).exists() && !input.starts_with("/dev/");
-    (on_disk || (input.contains('*') && !input.contains("://"))) && !boresight::io::is_table(input)
+fn is_on_disk(input: &OsStr) -> bool {
+    let says = |what: fn(&str) -> bool| input.to_str().is_some_and(what);
+    let on_disk = std::path::Path::new(input).exists() && !says(|t| t.starts_with("/dev/"));
+    (on_disk || says(|t| t.contains('*') && !t.contains("://"))) && !boresight::io::is_table(input)
 }
 
 /// Whether these options may stand beside those given.
@@ -224,7 +227,7 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, plan: &Plan, input: &str, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
+fn sinks(folder: &RunFolder, plan: &Plan, input: &OsStr, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
     use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
     let with_fits = plan.config.detector.centroid.fit.is_some();
     let mut sinks: Vec<Box<dyn Sink>> = vec![
@@ -256,7 +259,7 @@ fn sinks(folder: &RunFolder, plan: &Plan, input: &str, unit: LengthUnit) -> bore
 }
 
 /// The colours of a file that is detected in as grey, unless it is asked for as grey or mended.
-fn colours(plan: &Plan, input: &str) -> Option<Colours> {
+fn colours(plan: &Plan, input: &OsStr) -> Option<Colours> {
     use boresight::{PixelKind, io::Colour, io::OpenOptions};
     let own = &plan.config.input;
     let is_grey = plan.info.as_ref().is_some_and(|i| i.kind != PixelKind::Rgb8);
@@ -276,7 +279,7 @@ fn notes(args: &Args, plan: &Plan) -> anyhow::Result<Notes> {
         facts.push(("Times".to_string(), times.to_string()));
     }
     Ok(Notes {
-        input: args.input.input.clone(),
+        input: args.input.input.to_string_lossy().into_owned(),
         facts,
         settings: plan.reasons.clone(),
         configuration: Some(plan.config.to_toml()?),

@@ -8,6 +8,7 @@ mod faults;
 mod help;
 mod interrupt;
 mod loss;
+mod names;
 mod outputs;
 mod pictures;
 mod preview;

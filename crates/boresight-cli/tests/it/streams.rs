@@ -21,9 +21,9 @@ pub(super) fn inputs() -> tempfile::TempDir {
     at(&["simulate", "ds2", "--frames", "24", "--format", "y4m", "-o", "sim"]);
     at(&["track", "sim/frames.y4m", "--config", "sim/track.toml", "-o", "run", "--no-video", "-q"]);
     for (kind, table) in [("truth", "sim/gt.txt"), ("result", "run/mot.txt")] {
-        std::fs::create_dir_all(dir.path().join("sets").join(kind)).unwrap();
+        std::fs::create_dir_all(dir.path().join("pairs").join(kind)).unwrap();
         for name in ["a.txt", "b.txt"] {
-            std::fs::copy(dir.path().join(table), dir.path().join("sets").join(kind).join(name)).unwrap();
+            std::fs::copy(dir.path().join(table), dir.path().join("pairs").join(kind).join(name)).unwrap();
         }
     }
     std::fs::write(dir.path().join("radars.toml"), "[[radars]]\nname = \"far\"\nscan-period-s = 0.5\n").unwrap();
@@ -61,7 +61,7 @@ pub(super) const COMMANDS: [(&str, &[&str]); 18] = [
         &["e.csv", "e.json", "e.html"],
     ),
     ("evaluate sim/frames.y4m sim/frames.y4m --csv out/i.csv --json out/i.json", &["i.csv", "i.json"]),
-    ("evaluate sets/truth sets/result --html out/s.html --json out/s.json", &["s.html", "s.json"]),
+    ("evaluate pairs/truth pairs/result --html out/s.html --json out/s.json", &["s.html", "s.json"]),
     ("fuse run/tracks.csv run/tracks.csv -o out/fused.csv", &["fused.csv"]),
     ("smooth run/tracks.csv -o out/smooth.csv", &["smooth.csv"]),
     ("stitch run/tracks.csv -o out/stitched.txt --smooth", &["stitched.txt"]),

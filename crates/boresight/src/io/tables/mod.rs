@@ -27,8 +27,8 @@ mod seqinfo;
 mod ship_reports;
 pub(crate) mod table;
 mod tracks_csv;
-mod unit;
 
+pub use crate::length_unit::LengthUnit;
 pub use camera_csv::CameraCsv;
 pub use columns::Columns;
 pub use detection_table::DetectionTable;
@@ -47,4 +47,3 @@ pub use ship_reports::{ShipReports, read_ship_reports};
 pub(crate) use tracks_csv::COVARIANCE_COLUMNS;
 pub(crate) use tracks_csv::status_word;
 pub use tracks_csv::{TRACKS_HEADER, TracksCsv};
-pub use unit::LengthUnit;

@@ -10,7 +10,7 @@ use super::options::TableOptions;
 use super::radar::read::{radar_columns, read_radar};
 use super::scan_times::{Grouped, scans_of, set_times};
 use super::table::Table;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, shown_rate};
 use std::path::Path;
 
 /// Reads detections from a table.
@@ -98,7 +98,7 @@ pub(crate) fn identified_of(
     let rate = set_times(&mut scans, &times, label, options, rate_beside)?;
     (out.scans, out.rate_hz) = (scans, rate.rate_hz);
     if rate.is_assumed {
-        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", label, rate.rate_hz));
+        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", label, shown_rate(rate.rate_hz)));
     }
     if !layout.has(&[Field::VarX]) && !layout.has(&[Field::StdX]) && !out.scans.is_empty() {
         out.warnings.push(format!(
@@ -156,6 +156,26 @@ mod tests {
         };
         assert!(plain(&of("micron")).warnings.iter().any(|w| w.contains("in micron")));
         assert!(!plain(&of("pixel")).warnings.iter().any(|w| w.contains("positions are")));
+    }
+
+    #[test]
+    fn kitti_labels_and_detections_as_ab3dmot_has_them_are_boxes_from_frame_0() {
+        // The same box: corners (10, 20) and (30, 60), whose first pixel is 10, 20.
+        let labels = "0 0 Car 0 0 1.5 10 20 30 60 1.5 1.6 3.7 1 2 30 0.1\n2 0 Car 0 0 1.5 10 20 30 60 1.5 1.6 3.7 1 2 30 0.1\n\
+2 -1 DontCare -1 -1 -10 5 6 15 26 -1000 -1000 -1000 -10 -1 -1 -1\n";
+        let results = labels.replace(" 0.1\n", " 0.1 7.5\n");
+        let detections =
+            "0,2,10,20,30,60,7.5,1.5,1.6,3.7,1,2,30,0.1,1.5\n2,2,10,20,30,60,7.5,1.5,1.6,3.7,1,2,30,0.1,1.5\n";
+        for (text, score) in [(labels, 1.0), (&results, 7.5), (detections, 7.5)] {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), text).unwrap();
+            let table = read_detections(file.path(), &TableOptions::default()).unwrap();
+            assert_eq!((table.scans.len(), table.scans[1].index.0, table.first_frame), (2, 2, 0), "{text}");
+            let [one] = &table.scans[1].detections[..] else { panic!("{text}") };
+            let e = one.extent;
+            assert_eq!([e.left_px, e.top_px, e.width_px, e.height_px], [9.5, 19.5, 20.0, 40.0], "{text}");
+            assert_eq!(one.score, score, "{text}");
+        }
     }
 
     #[test]
