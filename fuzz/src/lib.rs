@@ -71,7 +71,7 @@ pub fn frames(bytes: &[u8], magic: &[&[u8]], ending: &str, options: &OpenOptions
         return;
     }
     with_file(bytes, ending, |path| {
-        let Ok(mut source) = open(&path.to_string_lossy(), options) else { return };
+        let Ok(mut source) = open(path, options) else { return };
         for _ in 0..1000 {
             match source.next_frame() {
                 Ok(Some(frame)) => assert!((frame.pixels.width() * frame.pixels.height()) as u64 <= MAX_PIXELS),

@@ -1,13 +1,14 @@
 //! The unit of length of a table: pixels of a picture, or metres of a map.
 
 /// What positions and sizes are counted in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub enum LengthUnit {
     /// Pixels; x to the right, y down.
     #[default]
+    #[serde(rename = "px")]
     Pixel,
     /// Metres; x to the east, y to the north.
+    #[serde(rename = "m")]
     Metre,
 }
 

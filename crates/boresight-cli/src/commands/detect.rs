@@ -36,8 +36,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &TrackerArgs::default(), None)?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
-    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
-    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(unit);
+    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(plan.unit);
     if !args.input.quiet {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }

@@ -3,9 +3,10 @@
 use crate::console::say;
 use boresight::FrameSource as _;
 use boresight::auto;
-use boresight::io::{Pictures, SequenceInfo};
+use boresight::io::{LengthUnit, Pictures, SequenceInfo};
 use boresight::pipeline::{Input, Outcome};
 use boresight::{Config, Error, ErrorKind, vision};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -32,6 +33,12 @@ pub struct InputArgs {
     /// Columns of a table of detections whose names are not understood: `x=cx,y=cy,frame=t`; numbers count columns from 1.
     #[arg(long, value_name = "PAIRS")]
     pub columns: Option<String>,
+    /// Least score of a detection: of a table's rows, or of the detector `isolated`.
+    #[arg(long, value_name = "SCORE", allow_negative_numbers = true)]
+    pub min_score: Option<f32>,
+    /// What a table's positions are counted in: px or m. Without it what its columns' names say (x_m), else px.
+    #[arg(long, value_name = "UNIT", value_parser = unit())]
+    pub units: Option<LengthUnit>,
     /// Leave out rows of a table that cannot be read, and count them.
     #[arg(long)]
     pub skip_bad_rows: bool,
@@ -69,6 +76,10 @@ pub struct TrackerArgs {
     pub false_tracks_per_hour: Option<f64>,
 }
 
+fn unit() -> impl TypedValueParser<Value = LengthUnit> {
+    PossibleValuesParser::new(["px", "m"]).map(|name| if name == "m" { LengthUnit::Metre } else { LengthUnit::Pixel })
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0".to_string())
 }
@@ -85,6 +96,8 @@ pub struct Plan {
     pub lost: Vec<String>,
     /// What is known of the source.
     pub info: Option<boresight::SourceInfo>,
+    /// What positions are counted in.
+    pub unit: LengthUnit,
     /// Where the radar was, of a radar's plots.
     pub radar: Option<boresight::io::RadarPicture>,
     n_scans: Option<u64>,
@@ -139,6 +152,11 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     if boresight::io::is_table(&args.input) {
         return plan_table(args, tracker, given, base, frames);
     }
+    if args.units == Some(LengthUnit::Metre) {
+        return Err(Error::new(ErrorKind::Config, "frames are in pixels, only tables can be in metres")
+            .at("--units m")
+            .into());
+    }
     if let Some(frames) = frames {
         return Err(Error::new(ErrorKind::Config, "only a table of detections needs pictures beside it")
             .at(format!("--frames {}", frames.display()))
@@ -153,7 +171,16 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
         let input = Input::Frames(source, detector);
-        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None });
+        return Ok(Plan {
+            input,
+            config,
+            reasons,
+            lost: Vec::new(),
+            info: Some(info),
+            unit: LengthUnit::Pixel,
+            radar: None,
+            n_scans: None,
+        });
     }
     let request = auto::Request {
         detector: args.detector,
@@ -168,7 +195,16 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None })
+    Ok(Plan {
+        input,
+        config,
+        reasons,
+        lost: Vec::new(),
+        info: Some(info),
+        unit: LengthUnit::Pixel,
+        radar: None,
+        n_scans: None,
+    })
 }
 
 /// A sentence that names the detector's keys that are set in vain.
@@ -193,6 +229,19 @@ fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyho
     }
     if tracker.no_stitch {
         config.tracker.reidentification.max_gap_s = 0.0;
+    }
+    if let Some(score) = args.min_score.filter(|_| !boresight::io::is_table(&args.input)) {
+        let name = config.detector.threshold.name();
+        if name != "isolated" {
+            let e = Error::new(ErrorKind::Config, format!("the detector is {name}, which has no least score"));
+            return Err(e
+                .at(format!("--min-score {score}"))
+                .hint(format!(
+                    "`boresight config --explain detector.threshold.{name}` lists its keys; --detector isolated has one"
+                ))
+                .into());
+        }
+        config = config.with(&format!("detector.threshold.isolated.min-score={score:?}"))?;
     }
     for set in &args.sets {
         config = config.with(set)?;
@@ -222,6 +271,8 @@ fn plan_table(
     }
     options.rate_hz = args.rate_hz.or(options.rate_hz);
     options.skip_bad_rows |= args.skip_bad_rows;
+    options.unit = args.units.or(options.unit);
+    options.min_score = args.min_score.or(options.min_score);
     let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
     if table.scans.is_empty() {
         return Err(Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track")
@@ -253,7 +304,9 @@ fn plan_table(
             let allowed = tracker.false_tracks_per_hour;
             match &table.radar {
                 Some(radar) => auto::for_radar(&table.scans, radar.turn_s, radar.unit, &mut config, &mut reasons),
-                None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
+                None => {
+                    auto::for_detections(&table.scans, table.rate_hz, table.unit, allowed, &mut config, &mut reasons)
+                }
             }
             auto::report_whole(table.rate_hz, &mut config, &mut reasons);
         }
@@ -265,6 +318,12 @@ fn plan_table(
             return Err(Error::new(ErrorKind::Config, "a radar's plots have no pictures to be drawn on")
                 .at(format!("--frames {}", frames.display()))
                 .hint("leave --frames out: the report draws a map")
+                .into());
+        }
+        Some(frames) if table.unit == LengthUnit::Metre => {
+            return Err(Error::new(ErrorKind::Config, "positions in metres have no place on pictures")
+                .at(format!("--frames {}", frames.display()))
+                .hint("leave --frames out, or say --units px")
                 .into());
         }
         Some(frames) => {
@@ -280,7 +339,7 @@ fn plan_table(
             (Input::Scans(table.scans), None)
         }
     };
-    Ok(Plan { input, config, reasons, lost: table.lost, info, radar: table.radar, n_scans })
+    Ok(Plan { input, config, reasons, lost: table.lost, info, unit: table.unit, radar: table.radar, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.
@@ -339,6 +398,8 @@ mod tests {
             sets: Vec::new(),
             rate_hz: None,
             columns: None,
+            min_score: None,
+            units: None,
             skip_bad_rows: false,
             dark: None,
             flat: None,

@@ -52,6 +52,9 @@ pub struct Args {
     /// Pictures of a table of detections, to draw on: a folder, a quoted pattern or a video. MOTChallenge's frame 1 is 000001.jpg.
     #[arg(long, value_name = "INPUT")]
     frames: Option<OsString>,
+    /// Write only rows in which something was measured to the tables of tracks, no predicted ones.
+    #[arg(long)]
+    measured: bool,
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
@@ -106,22 +109,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
     }
-    if let Some(radar) = &plan.radar {
+    let unit = plan.unit;
+    if plan.radar.is_some() || unit == LengthUnit::Metre {
         folder.leave_out(&["mot.txt"]);
-        if let (LengthUnit::Metre, Some(name)) = (radar.unit, args.also.first()) {
-            let e = Error::new(ErrorKind::Config, "these formats hold pixels, and the tracks of a radar are in metres");
-            return Err(e.at(format!("--also ({name})")).hint("leave it out: tracks.csv names its units").into());
-        }
     }
-    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
+    if let (LengthUnit::Metre, Some(name)) = (unit, args.also.first()) {
+        let e = Error::new(ErrorKind::Config, "these formats hold pixels, and these tracks are in metres");
+        return Err(e.at(format!("--also ({name})")).hint("leave it out: tracks.csv names its units").into());
+    }
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
-    let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
+    let mut report = (!args.no_report)
+        .then(|| HtmlReport::create(folder.path("report.html")))
+        .transpose()?
+        .map(|r| r.with_unit(unit));
     if let Some(radar) = &plan.radar {
         report = report.map(|r| r.with_map(radar.clone()));
     }
     let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input, unit)?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, &args, unit)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -227,18 +233,20 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, plan: &Plan, input: &OsStr, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
-    use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
+    use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MeasuredOnly, MotWriter, TracksCsv};
     let with_fits = plan.config.detector.centroid.fit.is_some();
+    let input = args.input.input.as_os_str();
+    let of_tracks = |sink: Box<dyn Sink>| if args.measured { Box::new(MeasuredOnly::new(sink)) } else { sink };
     let mut sinks: Vec<Box<dyn Sink>> = vec![
-        Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit)),
+        of_tracks(Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit))),
         Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits).with_unit(unit)),
     ];
     if folder.makes("mot.txt") {
-        sinks.push(Box::new(MotWriter::create(folder.path("mot.txt"))?));
+        sinks.push(of_tracks(Box::new(MotWriter::create(folder.path("mot.txt"))?)));
     }
     if folder.makes("tracks.jsonl") {
-        sinks.push(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?.with_unit(unit)));
+        sinks.push(of_tracks(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?.with_unit(unit))));
     }
     if folder.makes("camera.csv") {
         sinks.push(Box::new(CameraCsv::create(folder.path("camera.csv"))?));

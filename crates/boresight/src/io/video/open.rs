@@ -41,7 +41,7 @@ mod tests {
     fn a_missing_ffmpeg_is_named_with_the_way_to_install_it() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
         let name = OsStr::new("no-such-program-as-ffmpeg");
-        let err = ffmpeg::open(name, &here.to_string_lossy(), &OpenOptions::default()).err().unwrap();
+        let err = ffmpeg::open(name, here.as_os_str(), &OpenOptions::default()).err().unwrap();
         assert_eq!(err.kind(), ErrorKind::MissingTool);
         let text = err.to_string();
         assert!(

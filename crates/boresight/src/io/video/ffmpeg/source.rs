@@ -314,7 +314,8 @@ mod tests {
         let stop = StopFlag::default();
         let options = OpenOptions { stop: Some(stop.clone()), ..OpenOptions::default() };
         let began = Instant::now();
-        let waits = std::thread::spawn(move || open(program.as_os_str(), "udp://127.0.0.1:9", &options).is_err());
+        let waits =
+            std::thread::spawn(move || open(program.as_os_str(), OsStr::new("udp://127.0.0.1:9"), &options).is_err());
         let written = || std::fs::read_to_string(&pid).is_ok_and(|text| text.ends_with('\n'));
         while !written() && began.elapsed() < SILENCE {
             std::thread::sleep(Duration::from_millis(5));
