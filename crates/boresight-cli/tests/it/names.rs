@@ -83,3 +83,53 @@ fn where_text_is_needed_such_a_name_is_refused_with_a_way_round() {
         assert!(text.contains("\\xff") && text.contains("ln -s"), "{line}: {text}");
     }
 }
+
+/// The commands that a run offers, after their words.
+fn offered(said: &str) -> Vec<&str> {
+    said.lines().filter_map(|l| l.strip_prefix("try next: ").or_else(|| l.strip_prefix("or look:  "))).collect()
+}
+
+#[test]
+fn the_commands_that_a_run_offers_run_when_they_are_pasted() {
+    let dir = tempfile::tempdir().unwrap();
+    let named = |name: &[u8]| dir.path().join(OsStr::from_bytes(name));
+    std::fs::copy(clip(), named(b"it's \xff $HOME.mp4")).unwrap();
+    // Pictures of nothing.
+    std::fs::create_dir(named(b"even 'frames'")).unwrap();
+    for k in 0..30 {
+        let mut picture = b"P5\n64 48\n255\n".to_vec();
+        picture.resize(picture.len() + 64 * 48, 100);
+        std::fs::write(named(b"even 'frames'").join(format!("{k:03}.pgm")), picture).unwrap();
+    }
+    let runs: [(&[u8], &[&str]); 3] = [
+        (b"it's \xff $HOME.mp4", &["--set", "tracker.min-initiation-score=1e9", "--no-video"]),
+        (b"even 'frames'", &["--no-video"]),
+        (
+            b"sure of itself.csv",
+            &["--set", "tracker.extra-noise-px=0", "--set", "tracker.detection-covariance-scale=1"],
+        ),
+    ];
+    let path = Path::new(env!("CARGO_BIN_EXE_boresight")).parent().unwrap().display().to_string();
+    for (name, options) in runs {
+        let out = boresight()
+            .current_dir(dir.path())
+            .arg("track")
+            .args(options)
+            .arg(OsStr::from_bytes(name))
+            .output()
+            .unwrap();
+        let said = stderr(&out);
+        let commands = offered(&said);
+        assert!(out.status.success() && !commands.is_empty(), "{said}");
+        for command in commands {
+            let mut shell = std::process::Command::new("bash");
+            let pasted = shell
+                .args(["-c", command])
+                .current_dir(dir.path())
+                .env("PATH", format!("{path}:/usr/bin:/bin"))
+                .output()
+                .unwrap();
+            assert!(pasted.status.success(), "{command}: {}", stderr(&pasted));
+        }
+    }
+}

@@ -198,3 +198,15 @@ fn a_reader_of_the_words_who_leaves_after_the_first_does_not_end_the_run() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert!(dir.path().join("tracks.csv").exists());
 }
+
+#[test]
+fn a_standard_input_that_never_ends_or_is_empty_is_refused() {
+    for (file, says) in [("/dev/full", "expected YUV4MPEG2"), ("/dev/null", "nothing came")] {
+        for line in ["track - -o out", "detect - -o d.csv"] {
+            let dir = tempfile::tempdir().unwrap();
+            let out = command(dir.path(), line).stdin(Stdio::from(File::open(file).unwrap())).output().unwrap();
+            assert!(out.status.code() == Some(3) && stderr(&out).contains(says), "{line} <{file}: {}", stderr(&out));
+            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "{line} <{file}");
+        }
+    }
+}
