@@ -274,6 +274,10 @@ fn plan_table(
     options.unit = args.units.or(options.unit);
     options.min_score = args.min_score.or(options.min_score);
     let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
+    if table.radar.is_some() && (args.min_score.is_some() || args.units.is_some_and(|u| u != table.unit)) {
+        let e = Error::new(ErrorKind::Config, "a radar's plots have no scores, and their columns name their units");
+        return Err(e.at(args.input.display()).hint("leave --min-score and --units out").into());
+    }
     if table.scans.is_empty() {
         return Err(Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track")
             .at(args.input.display())

@@ -182,8 +182,8 @@ mod tests {
             let file = tempfile::NamedTempFile::new().unwrap();
             std::fs::write(file.path(), text).unwrap();
             let table = read_detections(file.path(), &TableOptions::default()).unwrap();
-            assert_eq!((table.scans.len(), table.scans[1].index.0, table.first_frame), (2, 2, 0), "{text}");
-            let [one] = &table.scans[1].detections[..] else { panic!("{text}") };
+            assert_eq!((table.scans.len(), table.first_frame), (3, 0), "{text}");
+            let [one] = &table.scans[2].detections[..] else { panic!("{text}") };
             let e = one.extent;
             assert_eq!([e.left_px, e.top_px, e.width_px, e.height_px], [9.5, 19.5, 20.0, 40.0], "{text}");
             assert_eq!(one.score, score, "{text}");
