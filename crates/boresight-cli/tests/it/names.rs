@@ -104,10 +104,7 @@ fn the_commands_that_a_run_offers_run_when_they_are_pasted() {
     let runs: [(&[u8], &[&str]); 3] = [
         (b"it's \xff $HOME.mp4", &["--set", "tracker.min-initiation-score=1e9", "--no-video"]),
         (b"even 'frames'", &["--no-video"]),
-        (
-            b"sure of itself.csv",
-            &["--set", "tracker.extra-noise-px=0", "--set", "tracker.detection-covariance-scale=1"],
-        ),
+        (b"it's \xff $HOME.mp4", &["--set", "tracker.detection-covariance-scale=40", "--no-video"]),
     ];
     let path = Path::new(env!("CARGO_BIN_EXE_boresight")).parent().unwrap().display().to_string();
     for (name, options) in runs {
