@@ -119,7 +119,7 @@ impl Pictures {
 
     /// Without images there are no numbered files.
     #[cfg(not(feature = "images"))]
-    fn last_place(&self, _: &str) -> Option<u64> {
+    fn last_place(&self, _: &OsStr) -> Option<u64> {
         None
     }
 
@@ -204,7 +204,7 @@ fn numbers(input: &OsStr, info: &SourceInfo, first_frame: u64) -> Option<Vec<u64
 
 /// Without images there are no numbered files.
 #[cfg(not(feature = "images"))]
-fn numbers(_: &str, _: &SourceInfo, _: u64) -> Option<Vec<u64>> {
+fn numbers(_: &OsStr, _: &SourceInfo, _: u64) -> Option<Vec<u64>> {
     None
 }
 
