@@ -1,6 +1,7 @@
 //! `boresight detect`: frames in, detections out.
 
 use super::run_options::{self, InputArgs, TrackerArgs};
+use super::run_outcome;
 use super::stop::Stop;
 use crate::console::say;
 use crate::progress;
@@ -50,10 +51,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     if !args.input.quiet {
         say!("{} frames, {} detections", done.summary.frames, done.summary.detections);
-        if let Some(fits) = run_options::fits(&done.summary) {
+        if let Some(fits) = run_outcome::fits(&done.summary) {
             say!("{fits}");
         }
     }
     plan.lost.iter().chain(&done.summary.warnings).for_each(|w| say!("warning: {w}"));
-    run_options::outcome(&args.input.input, done)
+    run_outcome::outcome(&args.input.input, done)
 }

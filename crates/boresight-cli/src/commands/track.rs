@@ -4,6 +4,7 @@ use super::also;
 use super::command_line;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, TrackerArgs};
+use super::run_outcome;
 use super::run_summary::RunSummary;
 use super::stop::Stop;
 use crate::console::say;
@@ -193,7 +194,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             say!("or look:  {look}");
         }
     }
-    run_options::outcome(input, done)
+    run_outcome::outcome(input, done)
 }
 
 /// Whether an input is frames on disk.
@@ -323,7 +324,7 @@ fn print_summary(s: &Summary, looked: Duration, run: Duration) {
         counted(s.confirmed_tracks, "confirmed track"),
         s.most_at_once
     );
-    if let Some(fits) = run_options::fits(s) {
+    if let Some(fits) = run_outcome::fits(s) {
         say!("{fits}");
     }
     if let Some((nis, n)) = s.mean_nis {
