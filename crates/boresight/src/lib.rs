@@ -79,6 +79,7 @@ mod frame;
 pub mod fuse;
 mod image;
 pub mod io;
+mod length_unit;
 mod memory_budget;
 pub mod metrics;
 #[cfg(any(feature = "draw", feature = "report"))]
@@ -108,7 +109,7 @@ pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use similarity::Similarity;
-pub use time::{ASSUMED_RATE_HZ, FrameIndex, Timestamp};
+pub use time::{ASSUMED_RATE_HZ, FrameIndex, Timestamp, shown_rate};
 pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 

@@ -20,6 +20,7 @@ const LEAVES: &[&str] = &[
     "view",
     "error",
     "time",
+    "length_unit",
     "union_find",
     "validate",
     "cpu",
