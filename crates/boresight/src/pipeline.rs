@@ -9,6 +9,7 @@
 //! (`pipeline/finders.rs`); the results are the same bytes for any number of threads.
 
 mod finders;
+mod held;
 mod made;
 mod outputs;
 mod primed;
@@ -17,9 +18,10 @@ mod retrospect;
 mod scans;
 mod summary;
 
+use self::held::Held;
 use self::outputs::{Counts, Outputs};
 pub(crate) use self::primed::prime;
-use self::retrospect::{Held, Retrospect};
+use self::retrospect::Retrospect;
 use self::scans::Scans;
 pub use self::summary::{StageTimes, Summary};
 use crate::track::Tracking;

@@ -10,41 +10,16 @@
 //! [`MOST_STATES`] states. The frames are counted whether or not a sink wants them, so that no table depends on what else is written.
 //! Limits: a track that is confirmed later than that is reported from the oldest scan held back on.
 
-use crate::associate::UniformGrid;
+use super::held::Held;
 use crate::camera::SteadyGround;
-use crate::track::{Backward, Past};
+use crate::track::Backward;
 use crate::{Frame, Scan, TrackId, TrackState, TrackStatus};
-use std::cell::OnceCell;
 use std::collections::{BTreeSet, VecDeque};
 
 /// Most memory of the frames that are held back, bytes.
 const MOST_FRAME_BYTES: usize = 64 << 20;
 /// Most states of tracks that are held back: some 64 MiB.
 const MOST_STATES: usize = (64 << 20) / size_of::<TrackState>();
-
-/// One scan with its tracks.
-pub(super) struct Held {
-    /// The frame, if it came with one and a sink wants it.
-    pub frame: Option<Frame>,
-    pub scan: Scan,
-    pub tracks: Vec<TrackState>,
-    bytes: usize,
-    /// Where the first scan's background lies in this one.
-    ground: SteadyGround,
-    /// Where its detections are, once somebody asks.
-    grid: OnceCell<UniformGrid>,
-}
-
-impl Held {
-    fn past(&self) -> Past<'_> {
-        let places = || {
-            let mut grid = UniformGrid::new();
-            grid.build(self.scan.detections.iter().map(|d| (d.position.x, d.position.y)));
-            grid
-        };
-        Past { scan: &self.scan, ground: self.ground, grid: self.grid.get_or_init(places), tracks: &self.tracks }
-    }
-}
 
 /// What is held back.
 pub(super) struct Retrospect {
@@ -84,7 +59,7 @@ impl Retrospect {
         self.bytes += bytes;
         self.n_states += tracks.len();
         self.ground = self.ground.after(&scan);
-        self.queue.push_back(Held { frame, scan, tracks, bytes, ground: self.ground, grid: OnceCell::new() });
+        self.queue.push_back(Held::new(frame, scan, tracks, bytes, self.ground));
     }
 
     /// The oldest scan, if it need not wait any longer; `all` asks for it in any case.
@@ -132,7 +107,11 @@ impl Retrospect {
                 let Ok(i) = held.tracks.binary_search_by_key(&track.id, |t| t.id) else { continue };
                 let state = &mut held.tracks[i];
                 match (state.status, state.detection) {
-                    (TrackStatus::Tentative, Some(_)) => state.status = TrackStatus::Confirmed,
+                    (TrackStatus::Tentative, Some(_)) => {
+                        state.status = TrackStatus::Confirmed;
+                        let detection = state.detection;
+                        held.take(detection);
+                    }
                     (TrackStatus::Tentative, None) if !was_reported => state.status = TrackStatus::Coasting,
                     // It was thought gone, and nobody saw it.
                     (TrackStatus::Tentative, None) => {}
@@ -151,7 +130,7 @@ impl Retrospect {
 /// Continues a track of the newest scan into the scans before its first one; how many states that gave.
 fn continue_back(queue: &mut VecDeque<Held>, newest: &Held, track: &TrackState, backward: &Backward) -> usize {
     let own = |held: &Held| held.tracks.binary_search_by_key(&track.id, |t| t.id).ok();
-    let Some(first) = queue.iter().position(|held| own(held).is_some()) else { return 0 };
+    let first = queue.iter().position(|held| own(held).is_some()).unwrap_or(queue.len());
     if first == 0 {
         return 0;
     }
@@ -163,6 +142,7 @@ fn continue_back(queue: &mut VecDeque<Held>, newest: &Held, track: &TrackState, 
     let states = backward.continue_back(track.id, &taken, queue.range(..first).rev().map(Held::past));
     let n = states.len();
     for (held, state) in queue.range_mut(..first).rev().zip(states) {
+        held.take(state.detection);
         let place = held.tracks.partition_point(|t| t.id < state.id);
         held.tracks.insert(place, state);
     }

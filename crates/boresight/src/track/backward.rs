@@ -3,11 +3,13 @@
 //! Source: our own; the filter is run in reversed time as in two-filter smoothing (D. C. Fraser, J. E. Potter, IEEE Trans. AC 14, 1969), the decision is that of
 //! track-before-detect by cumulated evidence (A. Wald, *Sequential Analysis*, 1947).
 //! Method: a constant-velocity filter goes backward through the track's own detections, so that it knows where the target came from, and on through the scans before. In each it
-//! takes the likeliest detection of its gate that no reported track has, or where there is none, one that a sudden manoeuvre explains better than a miss. The log-likelihood ratio of "the target was there" against "nobody was" is added up: ln(P_D l / λ) of
-//! a detection, ln(1 − P_D P_G) of a miss, with the probabilities that the tracker has, and a clutter density that is no lower than what is seen around the place.
+//! takes the likeliest detection of its gate that no reported track has, or where there is none, one that a sudden manoeuvre explains better than a miss. The log-likelihood
+//! ratio of "the target was there" against "nobody was" is added up: ln(P_D l / λ) of a detection, ln(1 − P_D P_G) of a miss, with the probabilities that the tracker has, and
+//! a clutter density that is no lower than what is seen around the place.
 //! The track begins where that sum is largest, if it is as sure there as what confirms a track; a walk ends when it has become as unlikely as what deletes one.
 //! Symbols: l likelihood of a detection (1/px²); λ false detections per px² and scan; times run backward, so velocities have the other sign inside.
-//! Limits: one hypothesis; constant velocity whatever the track's own model; needs the probabilities of [`ExistenceConfig`].
+//! Limits: one hypothesis; constant velocity whatever the track's own model; needs the probabilities of [`ExistenceConfig`]; where more than [`MOST_AROUND`] detections lie around
+//! a place nothing is taken there.
 
 use super::config::TrackerConfig;
 use super::confirm::existence::ExistenceConfig;
@@ -28,6 +30,8 @@ const MOST_OWN: usize = 20;
 const MANOEUVRE: f64 = 0.01;
 /// Half the side of the square in which false detections are counted, px: a cell of a clutter map and its neighbours.
 const AROUND_PX: f64 = 48.0;
+/// Detections around a place, at most: beyond one in 36 px² none of them tells a target, and the search must end.
+const MOST_AROUND: f64 = 256.0;
 
 /// One scan behind a track, with what is known of it.
 pub(crate) struct Past<'a> {
@@ -37,14 +41,8 @@ pub(crate) struct Past<'a> {
     pub ground: SteadyGround,
     /// Its detections' places, px.
     pub grid: &'a UniformGrid,
-    /// Its tracks.
-    pub tracks: &'a [TrackState],
-}
-
-impl Past<'_> {
-    fn is_taken(&self, detection: u32) -> bool {
-        self.tracks.iter().any(|t| t.detection == Some(detection) && t.status != TrackStatus::Tentative)
-    }
+    /// Which of its detections a reported track has.
+    pub taken: &'a [bool],
 }
 
 /// Continues tracks backward.
@@ -111,9 +109,6 @@ impl Backward {
     fn begin(&self, own: &[(Past<'_>, u32)]) -> Option<Walk<'_>> {
         let own = &own[own.len().saturating_sub(MOST_OWN)..];
         let [(first, j), rest @ ..] = own else { return None };
-        if rest.is_empty() {
-            return None;
-        }
         let d = first.scan.detections.get(*j as usize)?;
         let model = self.config.acceleration_noise(d.extent.height_px).constant_velocity(1.0).ok()?;
         let measurement = self.measurement(first, d);
@@ -138,11 +133,20 @@ impl Backward {
         Some(walk)
     }
 
+    /// Variance added to a detection's own, px².
+    fn extra(&self, d: &Detection) -> f64 {
+        self.config.extra_noise_px.powi(2) + (self.config.extra_noise_per_height * d.extent.height_px).powi(2)
+    }
+
+    /// Trace of a detection's noise in the image, px².
+    fn noise_trace(&self, d: &Detection) -> f64 {
+        self.config.detection_covariance_scale * d.cov.trace() + 2.0 * self.extra(d)
+    }
+
     /// A detection on the ground, with the noise that the tracker gives it.
     fn measurement(&self, past: &Past<'_>, d: &Detection) -> Measurement {
         let d = past.ground.detection_on_ground(d);
-        let extra =
-            self.config.extra_noise_px.powi(2) + (self.config.extra_noise_per_height * d.extent.height_px).powi(2);
+        let extra = self.extra(&d);
         let mut cov = d.cov * self.config.detection_covariance_scale;
         cov[(0, 0)] += extra;
         cov[(1, 1)] += extra;
@@ -250,12 +254,19 @@ impl Walk<'_> {
         let half = AROUND_PX.max(spread + AROUND_PX);
         past.grid.near(place.x, place.y, half, half, |point| {
             let Some(d) = past.scan.detections.get(point.index as usize) else { return true };
-            let off = d.position - place;
-            if past.is_taken(point.index) {
+            if past.taken.get(point.index as usize) == Some(&true) {
                 return true;
             }
-            if off.x.abs() <= AROUND_PX && off.y.abs() <= AROUND_PX {
-                n_around += 1.0;
+            let off = d.position - place;
+            n_around += f64::from(u8::from(is_around(off)));
+            if n_around > MOST_AROUND {
+                best = None;
+                return false;
+            }
+            // No variance in any direction exceeds the trace.
+            let trace = belief.cov[(0, 0)] + belief.cov[(2, 2)] + self.back.noise_trace(d);
+            if !past.ground.has_moved() && off.norm_squared() > config.gate() * trace {
+                return true;
             }
             let measurement = self.back.measurement(past, d);
             let nu = measurement.position - Vector2::new(belief.mean[0], belief.mean[2]);
@@ -284,8 +295,7 @@ impl Walk<'_> {
             true
         });
         if let Some(b) = &best {
-            let off = past.scan.detections[b.detection as usize].position - place;
-            n_around -= f64::from(u8::from(off.x.abs() <= AROUND_PX && off.y.abs() <= AROUND_PX));
+            n_around -= f64::from(u8::from(is_around(past.scan.detections[b.detection as usize].position - place)));
         }
         (best, n_around)
     }
@@ -320,6 +330,10 @@ impl Walk<'_> {
         let [state] = state;
         state
     }
+}
+
+fn is_around(off: Vector2<f64>) -> bool {
+    off.x.abs() <= AROUND_PX && off.y.abs() <= AROUND_PX
 }
 
 /// Likelihood ratio of a score.

@@ -25,7 +25,7 @@ struct Scene {
     scans: Vec<Scan>,
     grounds: Vec<SteadyGround>,
     grids: Vec<UniformGrid>,
-    tracks: Vec<Vec<TrackState>>,
+    taken: Vec<Vec<bool>>,
     truth: Vec<Vector4<f64>>,
 }
 
@@ -42,12 +42,12 @@ impl Scene {
             grid.build(s.detections.iter().map(|d| (d.position.x, d.position.y)));
             grid
         };
-        let (grids, tracks) = (scans.iter().map(grid).collect(), vec![Vec::new(); scans.len()]);
-        Self { scans, grounds, grids, tracks, truth }
+        let (grids, taken) = (scans.iter().map(grid).collect(), vec![Vec::new(); scans.len()]);
+        Self { scans, grounds, grids, taken, truth }
     }
 
     fn past(&self, k: usize) -> Past<'_> {
-        Past { scan: &self.scans[k], ground: self.grounds[k], grid: &self.grids[k], tracks: &self.tracks[k] }
+        Past { scan: &self.scans[k], ground: self.grounds[k], grid: &self.grids[k], taken: &self.taken[k] }
     }
 
     /// The states before `first` of a track that has taken the first detection of every scan from there on.
@@ -156,17 +156,24 @@ fn under_a_panning_camera_it_is_the_same_on_the_ground() {
 }
 
 #[test]
-fn what_another_track_has_is_left_to_it_and_one_detection_gives_no_direction() {
+fn what_another_track_has_is_left_to_it() {
     let mut scene = scene(1, 0, 1.0, 0, 0.0);
-    let taken = |status| TrackState { status, id: TrackId(1), ..scene.back(&config(), 40)[0].clone() };
-    let (reported, tentative) = (taken(TrackStatus::Confirmed), taken(TrackStatus::Tentative));
-    let all = scene.back(&config(), 40).len();
-    scene.tracks[..40].iter_mut().for_each(|t| *t = vec![tentative.clone()]);
-    assert_eq!(scene.back(&config(), 40).len(), all);
-    scene.tracks[..40].iter_mut().for_each(|t| *t = vec![reported.clone()]);
+    assert_eq!((scene.back(&config(), 40).len(), scene.back(&config(), 59).len()), (40, 59));
+    scene.taken[..40].iter_mut().for_each(|t| *t = vec![true]);
     assert!(scene.back(&config(), 40).is_empty());
-    assert!(scene.back(&config(), 59).is_empty());
     assert!(Backward::of(&TrackerConfig { retrospective_s: 0.0, ..config() }).is_none());
+}
+
+#[test]
+fn a_crowd_of_detections_tells_nothing_and_ends_the_search() {
+    let mut scene = scene(2, 0, 1.0, 0, 0.0);
+    for (k, scan) in scene.scans[..40].iter_mut().enumerate() {
+        let x = scene.truth[k];
+        let here = Detection::at(Vector2::new(x[0], x[2]), Matrix2::identity() * 0.09);
+        scan.detections = vec![here; 100_000];
+    }
+    let scene = Scene::of(scene.scans, scene.truth);
+    assert!(scene.back(&config(), 40).is_empty());
 }
 
 #[test]
