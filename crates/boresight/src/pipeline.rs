@@ -37,8 +37,8 @@ pub enum Input {
     Frames(Box<dyn FrameSource>, Box<dyn Detector>),
     /// Detections made before, in time order.
     Scans(Vec<Scan>),
-    /// Detections made before, and a frame for each of them, to be drawn on: all are tracked before the first is shown, so that the tracks are those of the
-    /// detections alone however many frames fit into memory.
+    /// Detections made before, and a frame for each of them, to be drawn on. A frame is read when the tracks of its scan are given out, so that the tracks are
+    /// those of the detections alone however many frames fit into memory.
     Pictured(Box<dyn FrameSource>, Vec<Scan>),
 }
 

@@ -102,6 +102,22 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// The plan of a run on frames.
+    fn of_frames(input: Input, config: Config, reasons: Vec<String>, info: boresight::SourceInfo) -> Self {
+        Self {
+            input,
+            config,
+            reasons,
+            lost: Vec::new(),
+            info: Some(info),
+            unit: LengthUnit::Pixel,
+            radar: None,
+            n_scans: None,
+        }
+    }
+}
+
+impl Plan {
     /// Number of frames, if known.
     pub fn total(&self) -> Option<u64> {
         self.n_scans.or_else(|| self.info.as_ref().and_then(|i| i.n_frames))
@@ -169,16 +185,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
         let input = Input::Frames(source, detector);
-        return Ok(Plan {
-            input,
-            config,
-            reasons,
-            lost: Vec::new(),
-            info: Some(info),
-            unit: LengthUnit::Pixel,
-            radar: None,
-            n_scans: None,
-        });
+        return Ok(Plan::of_frames(input, config, reasons, info));
     }
     let request = auto::Request {
         detector: args.detector,
@@ -193,16 +200,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan {
-        input,
-        config,
-        reasons,
-        lost: Vec::new(),
-        info: Some(info),
-        unit: LengthUnit::Pixel,
-        radar: None,
-        n_scans: None,
-    })
+    Ok(Plan::of_frames(input, config, reasons, info))
 }
 
 /// A sentence that names the detector's keys that are set in vain.

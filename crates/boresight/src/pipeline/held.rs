@@ -15,7 +15,7 @@ pub(super) struct Held {
     /// Size of its frame, whether or not it is kept.
     pub bytes: usize,
     /// Where the first scan's background lies in this one.
-    ground: SteadyGround,
+    pub ground: SteadyGround,
     /// Where its detections are, once somebody asks.
     grid: OnceCell<UniformGrid>,
     /// Which of its detections a reported track has, once somebody asks.

@@ -12,7 +12,7 @@
 
 use super::held::Held;
 use crate::camera::SteadyGround;
-use crate::track::Backward;
+use crate::track::{Backward, Own};
 use crate::{Frame, Scan, TrackId, TrackState, TrackStatus};
 use std::collections::{BTreeSet, VecDeque};
 
@@ -134,12 +134,11 @@ fn continue_back(queue: &mut VecDeque<Held>, newest: &Held, track: &TrackState, 
     if first == 0 {
         return 0;
     }
-    let taken: Vec<_> = std::iter::once(newest)
-        .chain(queue.range(first..).rev())
-        .filter_map(|held| Some((held, held.tracks[own(held)?].detection?)))
-        .map(|(held, detection)| (held.past(), detection))
-        .collect();
-    let states = backward.continue_back(track.id, &taken, queue.range(..first).rev().map(Held::past));
+    let taken = queue.range(first..).chain([newest]).filter_map(|held| {
+        let detection = held.tracks[own(held)?].detection?;
+        Some(Own { scan: &held.scan, ground: held.ground, detection })
+    });
+    let states = backward.continue_back(track.id, taken, queue.range(..first).rev().map(Held::past));
     let n = states.len();
     for (held, state) in queue.range_mut(..first).rev().zip(states) {
         held.take(state.detection);

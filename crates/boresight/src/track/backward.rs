@@ -28,7 +28,8 @@ const MOST_OWN: usize = 20;
 /// Probability that the velocity changes at once within a scan interval, by anything up to the largest speed: of a bird that turns, or of a camera whose motion is not known. One
 /// in a hundred intervals; half or twice as many change the evidence of such a step by 0.7, a detection's is some 5.
 const MANOEUVRE: f64 = 0.01;
-/// Half the side of the square in which false detections are counted, px: a cell of a clutter map and its neighbours.
+/// Half the side of the square in which false detections are counted, px, at least: a cell of a clutter map and its neighbours. Where the gate is larger, as of a radar's
+/// plots in metres, it is the gate's.
 const AROUND_PX: f64 = 48.0;
 /// Detections around a place, at most: beyond one in 36 px² none of them tells a target, and the search must end.
 const MOST_AROUND: f64 = 256.0;
@@ -43,6 +44,16 @@ pub(crate) struct Past<'a> {
     pub grid: &'a UniformGrid,
     /// Which of its detections a reported track has.
     pub taken: &'a [bool],
+}
+
+/// A scan in which a track took a detection.
+pub(crate) struct Own<'a> {
+    /// The scan.
+    pub scan: &'a Scan,
+    /// Where the ground lies in it.
+    pub ground: SteadyGround,
+    /// The detection.
+    pub detection: u32,
 }
 
 /// Continues tracks backward.
@@ -61,8 +72,10 @@ struct Walk<'c> {
     side_px: [f64; 2],
     log_score: Option<f64>,
     misses: u32,
-    /// Others' detections around the place, and the scans in which they were counted.
+    /// Others' detections around the place, and the area in which they were counted, px².
     around: [f64; 2],
+    /// Largest trace of the noise of a detection that it took, px².
+    noise_px2: f64,
 }
 
 impl Backward {
@@ -76,12 +89,12 @@ impl Backward {
         }
     }
 
-    /// The states of a track before its first one, the newest first, in image coordinates; `own` are its scans with the detections it took, and `before` those
-    /// before its first one, both from the newest on.
+    /// The states of a track before its first one, the newest first, in image coordinates; `own` are the scans in which it took a detection, from the oldest on, and
+    /// `before` those before its first one, from the newest on.
     pub(crate) fn continue_back<'a>(
         &self,
         id: TrackId,
-        own: &[(Past<'a>, u32)],
+        own: impl Iterator<Item = Own<'a>>,
         before: impl Iterator<Item = Past<'a>>,
     ) -> Vec<TrackState> {
         let mut states = Vec::new();
@@ -106,28 +119,30 @@ impl Backward {
     }
 
     /// Goes through the track's own detections.
-    fn begin(&self, own: &[(Past<'_>, u32)]) -> Option<Walk<'_>> {
-        let own = &own[own.len().saturating_sub(MOST_OWN)..];
-        let [(first, j), rest @ ..] = own else { return None };
-        let d = first.scan.detections.get(*j as usize)?;
+    fn begin<'a>(&self, own: impl Iterator<Item = Own<'a>>) -> Option<Walk<'_>> {
+        let own: Vec<_> = own
+            .take(MOST_OWN)
+            .map(|o| Some((o.ground, o.scan, o.scan.detections.get(o.detection as usize)?)))
+            .collect::<Option<_>>()?;
+        let mut own = own.into_iter().rev();
+        let (ground, scan, d) = own.next()?;
         let model = self.config.acceleration_noise(d.extent.height_px).constant_velocity(1.0).ok()?;
-        let measurement = self.measurement(first, d);
+        let measurement = self.measurement(ground, d);
         let filter = Kf::from_point(model, &measurement, self.config.max_speed_px_per_s / 3f64.sqrt()).ok()?;
-        let side_px = [d.extent.width_px, d.extent.height_px];
         let mut walk = Walk {
             back: self,
             model,
             filter,
-            time: first.scan.time,
-            side_px,
+            time: scan.time,
+            side_px: [d.extent.width_px, d.extent.height_px],
             log_score: self.log_score(d).map(|s| s.ln),
             misses: 0,
-            around: [0.0, 1.0],
+            around: [0.0, (2.0 * AROUND_PX).powi(2)],
+            noise_px2: self.noise_trace(d),
         };
-        for (past, j) in rest {
-            let d = past.scan.detections.get(*j as usize)?;
-            walk.predict(past.scan.time)?;
-            walk.filter.correct(&self.measurement(past, d)).ok()?;
+        for (ground, scan, d) in own {
+            walk.predict(scan.time)?;
+            walk.filter.correct(&self.measurement(ground, d)).ok()?;
             walk.follow(d);
         }
         Some(walk)
@@ -144,8 +159,8 @@ impl Backward {
     }
 
     /// A detection on the ground, with the noise that the tracker gives it.
-    fn measurement(&self, past: &Past<'_>, d: &Detection) -> Measurement {
-        let d = past.ground.detection_on_ground(d);
+    fn measurement(&self, ground: SteadyGround, d: &Detection) -> Measurement {
+        let d = ground.detection_on_ground(d);
         let extra = self.extra(&d);
         let mut cov = d.cov * self.config.detection_covariance_scale;
         cov[(0, 0)] += extra;
@@ -178,6 +193,7 @@ impl Walk<'_> {
 
     fn follow(&mut self, d: &Detection) {
         let gain = self.back.config.appearance_gain;
+        self.noise_px2 = self.noise_px2.max(self.back.noise_trace(d));
         for (mean, side) in self.side_px.iter_mut().zip([d.extent.width_px, d.extent.height_px]) {
             *mean += gain * (side - *mean);
         }
@@ -198,27 +214,24 @@ impl Walk<'_> {
         {
             return None;
         }
-        let (mut likely, mut n_around) = self.look(past, place, &belief);
+        let (mut likely, mut around) = self.look(past, place, &belief);
         let (p_detection, mut p_motion) = (config.p_detection(self.misses), 1.0);
         let missed = (1.0 - p_detection * config.gate_probability).max(f64::MIN_POSITIVE).ln();
-        let area_px2 = (2.0 * AROUND_PX).powi(2);
-        let clutter = |n_around: f64| {
-            let seen = (self.around[0] + n_around) / ((self.around[1] + 1.0) * area_px2);
-            config.clutter_density_per_px2.max(seen)
+        let clutter = |[n, area_px2]: [f64; 2]| {
+            config.clutter_density_per_px2.max((self.around[0] + n) / (self.around[1] + area_px2))
         };
         if likely.is_none()
             && let Some(turned) = self.turned(before, dt_s)
         {
-            let (other, n) = self.look(past, place, &turned.belief());
-            let gain = |l: &Likely| (MANOEUVRE * p_detection / clutter(n)).ln() + l.log_ratio;
+            let (other, wider) = self.look(past, place, &turned.belief());
+            let gain = |l: &Likely| (MANOEUVRE * p_detection / clutter(wider)).ln() + l.log_ratio;
             if other.as_ref().is_some_and(|l| gain(l) > missed) {
-                (likely, n_around, p_motion) = (other, n, MANOEUVRE);
+                (likely, around, p_motion) = (other, wider, MANOEUVRE);
                 self.filter = turned;
             }
         }
-        let clutter = clutter(n_around);
-        self.around[0] += n_around;
-        self.around[1] += 1.0;
+        let clutter = clutter(around);
+        self.around = [self.around[0] + around[0], self.around[1] + around[1]];
         let (evidence, detection, innovation) = match likely {
             Some(l) if self.filter.correct(&l.measurement).is_ok() => {
                 self.misses = 0;
@@ -246,12 +259,13 @@ impl Walk<'_> {
         Some(filter)
     }
 
-    /// The likeliest detection of the gate that nobody has, and how many others nobody has around it.
-    fn look(&self, past: &Past<'_>, place: Vector2<f64>, belief: &Gaussian<4>) -> (Option<Likely>, f64) {
+    /// The likeliest detection of the gate that nobody has; how many others nobody has around it, and in which area, px².
+    fn look(&self, past: &Past<'_>, place: Vector2<f64>, belief: &Gaussian<4>) -> (Option<Likely>, [f64; 2]) {
         let config = &self.back.config;
         let (mut best, mut n_around) = (None::<Likely>, 0.0);
-        let spread = (belief.cov[(0, 0)].max(belief.cov[(2, 2)]) * config.gate()).sqrt() * past.ground.zoom();
-        let half = AROUND_PX.max(spread + AROUND_PX);
+        let variance = belief.cov[(0, 0)].max(belief.cov[(2, 2)]) + self.noise_px2;
+        let half = AROUND_PX.max((variance * config.gate()).sqrt() * past.ground.zoom());
+        let is_around = |off: Vector2<f64>| off.x.abs() <= half && off.y.abs() <= half;
         past.grid.near(place.x, place.y, half, half, |point| {
             let Some(d) = past.scan.detections.get(point.index as usize) else { return true };
             if past.taken.get(point.index as usize) == Some(&true) {
@@ -268,7 +282,7 @@ impl Walk<'_> {
             if !past.ground.has_moved() && off.norm_squared() > config.gate() * trace {
                 return true;
             }
-            let measurement = self.back.measurement(past, d);
+            let measurement = self.back.measurement(past.ground, d);
             let nu = measurement.position - Vector2::new(belief.mean[0], belief.mean[2]);
             let mut cov = measurement.cov;
             for (i, a) in [0, 2].into_iter().enumerate() {
@@ -297,7 +311,7 @@ impl Walk<'_> {
         if let Some(b) = &best {
             n_around -= f64::from(u8::from(is_around(past.scan.detections[b.detection as usize].position - place)));
         }
-        (best, n_around)
+        (best, [n_around, (2.0 * half).powi(2)])
     }
 
     fn state(
@@ -330,10 +344,6 @@ impl Walk<'_> {
         let [state] = state;
         state
     }
-}
-
-fn is_around(off: Vector2<f64>) -> bool {
-    off.x.abs() <= AROUND_PX && off.y.abs() <= AROUND_PX
 }
 
 /// Likelihood ratio of a score.

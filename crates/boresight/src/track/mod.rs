@@ -34,7 +34,7 @@ mod tracking;
 pub use appearance::Appearance;
 pub use association_cost::{AssociationCostConfig, OverlapConfig, OverlapKind};
 pub use backward::Backward;
-pub(crate) use backward::Past;
+pub(crate) use backward::{Own, Past};
 pub use build::build;
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};

@@ -52,9 +52,10 @@ impl Scene {
 
     /// The states before `first` of a track that has taken the first detection of every scan from there on.
     fn back(&self, config: &TrackerConfig, first: usize) -> Vec<TrackState> {
-        let own: Vec<_> = (first..self.scans.len()).rev().map(|k| (self.past(k), 0)).collect();
+        let own =
+            (first..self.scans.len()).map(|k| Own { scan: &self.scans[k], ground: self.grounds[k], detection: 0 });
         let before = (0..first).rev().map(|k| self.past(k));
-        Backward::of(config).unwrap().continue_back(TrackId(7), &own, before)
+        Backward::of(config).unwrap().continue_back(TrackId(7), own, before)
     }
 }
 
@@ -190,4 +191,22 @@ fn a_jerk_of_the_camera_that_nobody_measured_does_not_end_it() {
         followed += usize::from(scene.back(&config(), 40).len() >= 36);
     }
     assert!(followed >= 18, "{followed} of 20");
+}
+
+#[test]
+fn a_gate_larger_than_the_square_of_false_detections_is_searched_whole() {
+    // Metres in place of pixels, a hundred of them: a radar's.
+    let scale = 100.0;
+    let mut scene = scene(4, 0, 1.0, 0, 0.0);
+    for d in scene.scans.iter_mut().flat_map(|s| &mut s.detections) {
+        (d.position, d.cov) = (d.position * scale, d.cov * scale * scale);
+    }
+    let scene = Scene::of(scene.scans, scene.truth);
+    let config = TrackerConfig {
+        acceleration_density_px2_per_s3: 25.0 * scale * scale,
+        max_speed_px_per_s: config().max_speed_px_per_s * scale,
+        clutter_density_per_px2: config().clutter_density_per_px2 / (scale * scale),
+        ..config()
+    };
+    assert_eq!(scene.back(&config, 40).len(), 40);
 }

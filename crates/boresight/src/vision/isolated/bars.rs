@@ -18,6 +18,7 @@ const SURE: f64 = 0.5;
 
 /// The 99 % point of a ring above its ground, in spreads: 2.3 in normal noise, less what some hundred pixels leave open.
 const TAIL_NEAR: f64 = 2.0;
+/// The same of large rings, whose spread is counted by half.
 const TAIL: f64 = 1.5;
 
 /// Rings of cells: within `.1` cells of the middle, but not within `.0`. A cluster of side w has a ring that ends w from its middle.

@@ -12,7 +12,8 @@
 //! Symbols: I value (counts); L level (counts); noise standard deviation of a pixel (counts); step smallest difference of two
 //! pixel values (counts, 0 for floats).
 //! Limits: a target that touches the frame's border, or another as bright as itself within its ring, is not isolated. Of blobs near the least score some are lost whose
-//! ring is quieter than the cells of 8 x 8 px around them (`bars`). Cost: four passes over the pixels for the cells, then each peak's own.
+//! ring is quieter than the cells of 8 x 8 px around them (`bars`). Cost: one pass over the pixels for the cells and
+//! one over those cells that a peak can be in, then what each peak grows.
 
 use super::bars::{Bar, Bars};
 use super::blob::Blob;
@@ -117,7 +118,7 @@ impl IsolatedDetector {
         };
         self.bars.take(&self.cells, &bar);
         peaks::find(image, &self.cells, &self.bars, &bar, sign * lowest, &mut self.peaks);
-        self.growth.frame(image.width(), image.height(), self.levels.len(), self.peaks.len(), bar.max_side);
+        self.growth.frame(image.width(), image.height(), self.levels.len(), bar.max_side);
         self.ring.forget();
         let peaks = std::mem::take(&mut self.peaks);
         for peak in &peaks {

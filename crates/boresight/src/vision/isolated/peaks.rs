@@ -8,9 +8,8 @@ use crate::Image;
 use crate::vision::pixel::Pixel;
 
 /// A local maximum.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Peak {
-    pub value: f64,
     pub x: u32,
     pub y: u32,
     /// Its cell, in the order of the rows.
@@ -43,7 +42,7 @@ pub fn find<T: Pixel>(image: &Image<T>, cells: &Cells, bars: &Bars, bar: &Bar, l
                 let value = bar.sign * row[x].value();
                 if value >= least && value.is_finite() && is_highest([above, row, below], bar.sign, x, value) {
                     let order = descending(value as f32) | (y * image.width() + x) as u64;
-                    peaks.push(Peak { value, x: x as u32, y: y as u32, cell, highest: value >= high, order });
+                    peaks.push(Peak { x: x as u32, y: y as u32, cell, highest: value >= high, order });
                 }
             }
         }
