@@ -51,10 +51,14 @@ impl Chain {
     }
 }
 
+/// Scan and number of a detection of a chain, and the place of the one before it among all that were taken.
+type Taken = (usize, usize, Option<usize>);
+
 /// A chain that may go on: place and velocity with the covariance of one axis (the axes are alike).
-#[derive(Clone)]
 struct Open {
-    hits: Vec<(usize, usize)>,
+    /// Its last detection among all that were taken: most chains end with their second, and need no memory of their own.
+    last: usize,
+    n_hits: usize,
     at: Vector2<f64>,
     velocity: Vector2<f64>,
     /// Variance of the place (px²), covariance (px²/s), variance of the velocity (px²/s²).
@@ -66,23 +70,32 @@ struct Open {
 
 impl Open {
     /// From two sightings where the density is so; none if chance gives many as near as the second.
-    fn begin(scans: &[Sightings], k: [usize; 2], i: [usize; 2], density: f64) -> Option<Self> {
+    fn begin(scans: &[Sightings], k: [usize; 2], i: [usize; 2], density: f64, taken: &mut Vec<Taken>) -> Option<Self> {
         let (a, b) = (scans[k[0]].all[i[0]], scans[k[1]].all[i[1]]);
         let dt = scans[k[1]].time_s - scans[k[0]].time_s;
         let step = b.at - a.at;
         // What a neighbour as near, or one within the errors, costs by chance.
         let reach2 = step.norm_squared() + a.variance + b.variance;
         let gain = -(density * std::f64::consts::PI * reach2).ln();
+        if !(dt > 0.0 && gain > -MOST_FIRST_COST) {
+            return None;
+        }
         let p = [b.variance, b.variance / dt, (a.variance + b.variance) / (dt * dt)];
-        (dt > 0.0 && gain > -MOST_FIRST_COST).then(|| Self {
-            hits: vec![(k[0], i[0]), (k[1], i[1])],
-            at: b.at,
-            velocity: step / dt,
-            p,
-            time_s: scans[k[1]].time_s,
-            gain,
-            missed: false,
-        })
+        taken.extend([(k[0], i[0], None), (k[1], i[1], Some(taken.len()))]);
+        let (last, time_s) = (taken.len() - 1, scans[k[1]].time_s);
+        Some(Self { last, n_hits: 2, at: b.at, velocity: step / dt, p, time_s, gain, missed: false })
+    }
+
+    /// Scan and number of its detections, in the order of time.
+    fn hits(&self, taken: &[Taken]) -> Vec<(usize, usize)> {
+        let mut out = Vec::with_capacity(self.n_hits);
+        let mut at = Some(self.last);
+        while let Some(&(k, i, before)) = at.and_then(|at| taken.get(at)) {
+            out.push((k, i));
+            at = before;
+        }
+        out.reverse();
+        out
     }
 
     fn predict(&mut self, time_s: f64) {
@@ -95,7 +108,7 @@ impl Open {
     }
 
     /// Takes a sighting whose d² and S are known.
-    fn update(&mut self, hit: (usize, usize), s: &Sighting, d2: f64, variance: f64, density: f64) {
+    fn update(&mut self, s: &Sighting, d2: f64, variance: f64, density: f64) {
         let gain = [self.p[0] / variance, self.p[1] / variance];
         let innovation = s.at - self.at;
         self.at += innovation * gain[0];
@@ -103,7 +116,6 @@ impl Open {
         let [a, b, c] = self.p;
         self.p = [a - gain[0] * a, b - gain[0] * b, c - gain[1] * b];
         self.gain += -0.5 * d2 - (std::f64::consts::TAU * variance * density).ln();
-        self.hits.push(hit);
         self.missed = false;
     }
 }
@@ -115,13 +127,13 @@ pub fn chains(scans: &[Sightings], area_px2: f64) -> Vec<Chain> {
     let by_x: Vec<Vec<(f64, usize)>> = scans.iter().map(sorted).collect();
     // As many starts as there are detections; each may be of clutter.
     let start = -(n_all.max(1) as f64 / FALSE_CHAINS).ln();
-    let (mut open, mut done): (Vec<Open>, Vec<Open>) = (Vec::new(), Vec::new());
+    let (mut open, mut next, mut done) = (Vec::<Open>::new(), Vec::new(), Vec::new());
+    let mut taken: Vec<Taken> = Vec::new();
     for k in 1..scans.len() {
-        let mut next = Vec::with_capacity(open.len());
+        let widest = scans[k].all.iter().map(|s| s.variance).fold(0.0, f64::max);
         for mut c in open.drain(..) {
             c.predict(scans[k].time_s);
-            let reach = |v: f64| (GATE * (c.p[0] + v)).sqrt();
-            let far = reach(scans[k].all.iter().map(|s| s.variance).fold(0.0, f64::max));
+            let far = (GATE * (c.p[0] + widest)).sqrt();
             let (x, y) = (c.at.x, c.at.y);
             let from = by_x[k].partition_point(|e| e.0 < x - far);
             let mut best: Option<(f64, f64, usize)> = None;
@@ -137,10 +149,13 @@ pub fn chains(scans: &[Sightings], area_px2: f64) -> Vec<Chain> {
             match best {
                 Some((d2, variance, i)) => {
                     let s = scans[k].all[i];
-                    c.update((k, i), &s, d2, variance, map.at(s.at));
+                    c.update(&s, d2, variance, map.at(s.at));
+                    taken.push((k, i, Some(c.last)));
+                    (c.last, c.n_hits) = (taken.len() - 1, c.n_hits + 1);
                     next.push(c);
                 }
-                None if c.missed || c.hits.len() < LEAST_HITS => done.push(c),
+                None if c.n_hits < LEAST_HITS => {}
+                None if c.missed => done.push(c),
                 None => {
                     c.missed = true;
                     next.push(c);
@@ -152,27 +167,28 @@ pub fn chains(scans: &[Sightings], area_px2: f64) -> Vec<Chain> {
             let far = (MOST_FIRST_COST.exp() / (std::f64::consts::PI * density)).sqrt();
             let from = by_x[k].partition_point(|e| e.0 < first.at.x - far);
             for &(_, j) in by_x[k][from..].iter().take_while(|e| e.0 <= first.at.x + far) {
-                next.extend(Open::begin(scans, [k - 1, k], [i, j], density));
+                next.extend(Open::begin(scans, [k - 1, k], [i, j], density, &mut taken));
             }
         }
-        open = next;
+        std::mem::swap(&mut open, &mut next);
     }
     done.append(&mut open);
-    done.retain(|c| c.hits.len() >= LEAST_HITS && c.gain + start > 0.0);
-    done.sort_by(|a, b| b.gain.total_cmp(&a.gain).then_with(|| a.hits.cmp(&b.hits)));
+    done.retain(|c| c.n_hits >= LEAST_HITS && c.gain + start > 0.0);
+    let mut done: Vec<_> = done.into_iter().map(|c| (c.gain, c.hits(&taken))).collect();
+    done.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
     let mut used: Vec<Vec<bool>> = scans.iter().map(|s| vec![false; s.all.len()]).collect();
     let mut out = Vec::new();
-    for c in done {
-        if c.hits.iter().any(|h| used[h.0][h.1]) {
+    for (gain, hits) in done {
+        if hits.iter().any(|h| used[h.0][h.1]) {
             continue;
         }
-        c.hits.iter().for_each(|h| used[h.0][h.1] = true);
-        let hits: Vec<(usize, Sighting)> = c.hits.iter().map(|h| (h.0, scans[h.0].all[h.1])).collect();
+        hits.iter().for_each(|h| used[h.0][h.1] = true);
+        let hits: Vec<(usize, Sighting)> = hits.iter().map(|h| (h.0, scans[h.0].all[h.1])).collect();
         let [a, b] = [hits[0].1, hits[hits.len() - 1].1];
         let speed =
             |w: &[(usize, Sighting)]| (w[1].1.at - w[0].1.at).norm() / (scans[w[1].0].time_s - scans[w[0].0].time_s);
         out.push(Chain {
-            gain: c.gain + start,
+            gain: gain + start,
             speeds_px_per_s: hits.windows(2).map(speed).collect(),
             moves: (b.at - a.at).norm_squared() > MOVED * (a.variance + b.variance),
             hits,

@@ -47,6 +47,7 @@ const MOST_HELD: u32 = 12;
 #[derive(Clone, Debug, Default)]
 pub struct CameraMotionEstimator {
     now: Image<f32>,
+    sums: Vec<f32>,
     key: KeyFrame,
     /// The last frame: where the key frame is not found it takes its place.
     last: KeyFrame,
@@ -77,7 +78,7 @@ struct Rest {
 impl CameraMotionEstimator {
     /// Takes the next frame and returns the background's motion since the last one; `None` where nothing can be said.
     pub fn step(&mut self, pixels: &Pixels) -> Option<CameraMotion> {
-        reduce(pixels, &mut self.now);
+        reduce(pixels, &mut self.now, &mut self.sums);
         let factor = factor(pixels.width());
         if (self.key.image.width(), self.key.image.height()) != (self.now.width(), self.now.height()) {
             self.start_anew();

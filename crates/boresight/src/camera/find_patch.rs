@@ -15,12 +15,18 @@ use nalgebra::{Matrix2, Vector2};
 /// How far around the predicted place a patch is looked for, reduced px.
 pub(super) const SEARCH: i64 = 10;
 const SIDE: usize = 2 * SEARCH as usize + 1;
+/// Columns of the search, filled up to whole vectors.
+const LANES: usize = SIDE.next_multiple_of(8);
+/// Rows and columns of the pixels in which a patch is looked for.
+const TALL: usize = SIDE + PATCH - 1;
+const WIDE: usize = LANES + PATCH - 1;
 /// Gauss-Newton steps at most; three reach 0.01 px from half a pixel away.
 const STEPS: usize = 6;
 /// A shorter step is the last, reduced px.
 const LAST_STEP: f64 = 0.003;
 
 type Block = [[f32; PATCH]; PATCH];
+type Window = [[f32; WIDE]; TALL];
 
 /// Where the middle of a key frame's patch lies now; `predicted` takes the key frame's points to their places now.
 pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Vector2<f64>> {
@@ -33,20 +39,14 @@ pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Sim
         return None;
     }
     let around = (corner.x.round() as i64, corner.y.round() as i64);
-    let place = |i: usize, j: usize| -> Option<(usize, usize)> {
-        let (x, y) = (around.0 + j as i64 - SEARCH, around.1 + i as i64 - SEARCH);
-        (x >= 0 && y >= 0 && x + PATCH as i64 <= w && y + PATCH as i64 <= h).then_some((x as usize, y as usize))
-    };
-    let cost_at = |i, j, most| place(i, j).map_or(f32::INFINITY, |at| difference(&template, now, at, most));
-    // The predicted place is seldom far off: what is worse than it need not be summed to the end.
-    let mut most = cost_at(SEARCH as usize, SEARCH as usize, f32::INFINITY);
+    let window = window(now, (around.0 - SEARCH, around.1 - SEARCH));
+    let mut costs = [[0.0; LANES]; SIDE];
+    differences(&template, &window, &mut costs);
     let mut best = (f32::INFINITY, 0, 0);
-    for i in 0..SIDE {
-        for j in 0..SIDE {
-            let cost = cost_at(i, j, most);
+    for (i, line) in costs.iter().enumerate() {
+        for (j, &cost) in line[..SIDE].iter().enumerate() {
             if cost < best.0 {
                 best = (cost, i, j);
-                most = most.min(cost);
             }
         }
     }
@@ -58,31 +58,43 @@ pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Sim
         let bend = before - 2.0 * at + after;
         (bend.is_finite() && bend > 0.0).then(|| f64::from(0.5 * (before - after) / bend).clamp(-0.5, 0.5))
     };
-    let whole = |i, j| cost_at(i, j, f32::INFINITY);
-    let dx = vertex(whole(i, j - 1), cost, whole(i, j + 1))?;
-    let dy = vertex(whole(i - 1, j), cost, whole(i + 1, j))?;
+    let dx = vertex(costs[i][j - 1], cost, costs[i][j + 1])?;
+    let dy = vertex(costs[i - 1][j], cost, costs[i + 1][j])?;
     let (x, y) = (around.0 + j as i64 - SEARCH, around.1 + i as i64 - SEARCH);
     let part = refine(&template, now, (x, y)).unwrap_or(Vector2::new(dx, dy));
     Some(Vector2::new(x as f64 + half, y as f64 + half) + part)
 }
 
-/// Sum of absolute differences with the template's first pixel at `(x, y)`; what exceeds `most` may be infinite.
-#[inline]
-fn difference(template: &Block, now: &Image<f32>, (x, y): (usize, usize), most: f32) -> f32 {
-    // One sum a column: they are added in vectors, and together only where it may end the matter.
-    let mut sums = [0.0f32; PATCH];
-    for (r, line) in template.iter().enumerate() {
-        let Some(row) = now.row(y + r).get(x..).and_then(|row| row.first_chunk::<PATCH>()) else {
-            return f32::INFINITY;
-        };
-        for ((sum, a), b) in sums.iter_mut().zip(line).zip(row) {
-            *sum += (a - b).abs();
-        }
-        if r % 3 == 2 && r + 1 < PATCH && sums.iter().sum::<f32>() > most {
-            return f32::INFINITY;
+/// The pixels in which a patch is looked for, from a first column and row on; infinite outside the image.
+fn window(now: &Image<f32>, (left, top): (i64, i64)) -> Window {
+    let mut out = [[f32::INFINITY; WIDE]; TALL];
+    let width = now.width() as i64;
+    let (from, until) = (left.clamp(0, width), (left + WIDE as i64).clamp(0, width));
+    for (line, y) in out.iter_mut().zip(top..) {
+        if from < until && (0..now.height() as i64).contains(&y) {
+            let (first, last) = ((from - left) as usize, (until - left) as usize);
+            line[first..last].copy_from_slice(&now.row(y as usize)[from as usize..until as usize]);
         }
     }
-    sums.iter().sum()
+    out
+}
+
+widest! {
+    /// Sums of absolute differences with the template's first pixel in each row and column of the search: those of a row are added up side by side.
+    fn differences(template: &Block, window: &Window, out: &mut [[f32; LANES]; SIDE]) {
+        for (i, sums) in out.iter_mut().enumerate() {
+            let mut row = [0.0f32; LANES];
+            for (line, pixels) in template.iter().zip(&window[i..]) {
+                for (c, t) in line.iter().enumerate() {
+                    let Some(beside) = pixels[c..].first_chunk::<LANES>() else { continue };
+                    for (sum, p) in row.iter_mut().zip(beside) {
+                        *sum += (t - p).abs();
+                    }
+                }
+            }
+            *sums = row;
+        }
+    }
 }
 
 /// The patch as it should look now; `None` if that needs pixels outside the key frame.
@@ -212,6 +224,29 @@ mod tests {
             let found = find(&key, &now, patch, &predicted).unwrap();
             let error = found - truth.apply(patch.middle());
             assert!(error.norm() < 0.05, "{x} {y}: {error}");
+        }
+    }
+
+    #[test]
+    fn sums_of_differences_are_those_of_each_place_and_infinite_beyond_the_image() {
+        let (key, now) = (waves(|p| p, 0.0), waves(|p| p + Vector2::new(1.3, 0.4), 1.0));
+        let patch = Patch { x: 40, y: 30, weight: 1.0 };
+        let template = template(&key, patch, &Similarity::identity()).unwrap();
+        for (left, top) in [(30, 20), (-5, -7), (100, 85), (119, 99), (200, -40), (-1_000, 20)] {
+            let mut costs = [[0.0; LANES]; SIDE];
+            differences(&template, &window(&now, (left, top)), &mut costs);
+            for (i, j) in (0..SIDE * SIDE).map(|n| (n / SIDE, n % SIDE)) {
+                let (x, y) = (left + j as i64, top + i as i64);
+                let inside = x >= 0 && y >= 0 && x + PATCH as i64 <= 120 && y + PATCH as i64 <= 100;
+                let pixel = |r: usize, c: usize| (template[r][c] - now.row(y as usize + r)[x as usize + c]).abs();
+                let sum =
+                    inside.then(|| (0..PATCH * PATCH).map(|n| f64::from(pixel(n / PATCH, n % PATCH))).sum::<f64>());
+                let cost = f64::from(costs[i][j]);
+                assert!(
+                    sum.map_or(cost == f64::INFINITY, |sum| (cost - sum).abs() < 1e-5 * (1.0 + sum)),
+                    "{left} {top} {i} {j}"
+                );
+            }
         }
     }
 

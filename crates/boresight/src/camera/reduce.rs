@@ -10,20 +10,26 @@ pub(super) fn factor(width: usize) -> usize {
     width.div_ceil(REDUCED_PX).max(1)
 }
 
-/// Reduces a frame of any pixel type by [`factor`].
-pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>) {
+/// Reduces a frame of any pixel type by [`factor`]; `sums` is scratch memory.
+pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>, sums: &mut Vec<f32>) {
     let factor = factor(pixels.width());
     match pixels {
-        Pixels::Gray8(i) => blocks(i, factor, out, f32::from),
-        Pixels::Gray16(i) => blocks(i, factor, out, f32::from),
-        Pixels::GrayF32(i) => blocks(i, factor, out, |p| p),
+        Pixels::Gray8(i) => blocks(i, factor, out, sums, f32::from),
+        Pixels::Gray16(i) => blocks(i, factor, out, sums, f32::from),
+        Pixels::GrayF32(i) => blocks(i, factor, out, sums, |p| p),
         // The green channel stands for the light.
-        Pixels::Rgb8(i) => blocks(i, factor, out, |p| f32::from(p[1])),
+        Pixels::Rgb8(i) => blocks(i, factor, out, sums, |p| f32::from(p[1])),
     }
 }
 
-/// Mean over blocks of `factor` x `factor` pixels.
-fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
+/// Mean over blocks of `factor` x `factor` pixels; `sums` is scratch memory.
+fn blocks<T: Copy>(
+    image: &Image<T>,
+    factor: usize,
+    out: &mut Image<f32>,
+    sums: &mut Vec<f32>,
+    value: impl Fn(T) -> f32 + Copy,
+) {
     let (w, h) = (image.width() / factor, image.height() / factor);
     out.reset(w, h, 0.0);
     if factor == 1 {
@@ -32,11 +38,13 @@ fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value:
     }
     let scale = 1.0 / (factor * factor) as f32;
     for y in 0..h {
-        for dy in 0..factor {
-            let row = image.row(y * factor + dy);
-            for (o, block) in out.row_mut(y).iter_mut().zip(row.chunks_exact(factor)) {
-                *o += scale * block.iter().map(|&p| value(p)).sum::<f32>();
-            }
+        sums.clear();
+        sums.resize(w * factor, 0.0);
+        for row in (y * factor..(y + 1) * factor).map(|y| image.row(y)) {
+            sums.iter_mut().zip(row).for_each(|(s, &p)| *s += value(p));
+        }
+        for (o, block) in out.row_mut(y).iter_mut().zip(sums.chunks_exact(factor)) {
+            *o = scale * block.iter().sum::<f32>();
         }
     }
 }
@@ -52,7 +60,7 @@ mod tests {
             wide.row_mut(y).iter_mut().enumerate().for_each(|(x, p)| *p = (x % 2 * 4) as u8 + y as u8);
         }
         let mut small = Image::default();
-        reduce(&Pixels::Gray8(wide), &mut small);
+        reduce(&Pixels::Gray8(wide), &mut small, &mut Vec::new());
         assert_eq!((small.width(), small.height(), small.row(0)[7], small.row(1)[319]), (320, 2, 2.5, 4.5));
     }
 }

@@ -77,22 +77,37 @@ pub(super) fn block(width: usize, height: usize, most: usize) -> usize {
 
 /// Means of blocks of `block` x `block` pixels, without those that are not finite; NaN where none is.
 pub(super) fn means<T: Copy>(image: &Image<T>, block: usize, value: impl Fn(&T) -> f32) -> Vec<f32> {
-    let across = image.width().div_ceil(block);
-    let mut means = Vec::with_capacity(across * image.height().div_ceil(block));
-    let mut sums = vec![(0.0f64, 0u32); across];
-    for y in 0..image.height() {
-        for (pixels, (sum, n)) in image.row(y).chunks(block).zip(&mut sums) {
-            for v in pixels.iter().map(&value).filter(|v| v.is_finite()) {
-                *sum += f64::from(v);
-                *n += 1;
-            }
+    let (width, height) = (image.width(), image.height());
+    let mut means = Vec::with_capacity(width.div_ceil(block) * height.div_ceil(block));
+    let mut columns = vec![0.0f32; width];
+    for top in (0..height).step_by(block) {
+        let rows = top..(top + block).min(height);
+        columns.fill(0.0);
+        for y in rows.clone() {
+            columns.iter_mut().zip(image.row(y)).for_each(|(sum, p)| *sum += value(p));
         }
-        if (y + 1) % block == 0 || y + 1 == image.height() {
-            means.extend(sums.iter().map(|(sum, n)| if *n > 0 { (sum / f64::from(*n)) as f32 } else { f32::NAN }));
-            sums.fill((0.0, 0));
+        for (left, part) in (0..width).step_by(block).zip(columns.chunks(block)) {
+            let sum: f32 = part.iter().sum();
+            let n = (part.len() * rows.len()) as f32;
+            means.push(if sum.is_finite() { sum / n } else { finite_mean(image, left, rows.clone(), block, &value) });
         }
     }
     means
+}
+
+/// Mean of those pixels of a block that are finite.
+#[cold]
+fn finite_mean<T: Copy>(
+    image: &Image<T>,
+    left: usize,
+    rows: std::ops::Range<usize>,
+    block: usize,
+    value: impl Fn(&T) -> f32,
+) -> f32 {
+    let right = (left + block).min(image.width());
+    let pixels = rows.flat_map(|y| image.row(y)[left..right].iter().map(&value).filter(|v| v.is_finite()));
+    let (sum, n) = pixels.fold((0.0f64, 0u32), |(sum, n), v| (sum + f64::from(v), n + 1));
+    if n > 0 { (sum / f64::from(n)) as f32 } else { f32::NAN }
 }
 
 #[cfg(test)]
@@ -110,5 +125,18 @@ mod tests {
         assert_eq!((picture.small_width, picture.small_height, picture.width), (1024, 1, 2048));
         assert_eq!((picture.gray[0], picture.gray[1023]), (255, 0));
         assert!(picture.data_url().unwrap().starts_with("data:image/png;base64,iVBORw0KGgo"));
+    }
+
+    #[test]
+    fn pixels_that_are_not_finite_count_for_nothing_and_the_last_blocks_are_smaller() {
+        let mut image = Image::filled(5, 3, 2.0f32);
+        image.row_mut(0)[0] = f32::NAN;
+        image.row_mut(1)[1] = 8.0;
+        image.row_mut(2)[4] = f32::INFINITY;
+        image.row_mut(2)[2] = f32::MAX;
+        image.row_mut(2)[3] = f32::MAX;
+        let means = means(&image, 2, |v| *v);
+        assert_eq!(&means[..5], &[4.0, 2.0, 2.0, 2.0, f32::MAX]);
+        assert!(means[5].is_nan() && means.len() == 6);
     }
 }

@@ -72,6 +72,18 @@ pub struct Bars {
     lowest: [Lowest; 2],
 }
 
+/// Clusters to which the same rings apply: the number of those that are too small for them, or none if the cells next to the peak's count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SideClass(Option<usize>);
+
+impl SideClass {
+    /// That of a cluster whose box's longer side is so long, px.
+    pub fn of(side: u32) -> Self {
+        let ends = |outer: usize| (CELL * outer + CELL / 2) as u32;
+        Self((side > NEXT).then(|| RINGS.iter().take_while(|r| ends(r.1) < side).count()))
+    }
+}
+
 /// What clusters of one peak and of some sizes need.
 #[derive(Clone, Copy, Debug)]
 pub struct Need {
@@ -89,20 +101,16 @@ impl Bars {
         self.lead(cells, bar);
     }
 
-    /// What a cluster that has grown to `side`, px, from the peak of a cell needs to be a target or become one; a peak that is not the highest of its cell leads to small
-    /// ones only. `None` if it cannot.
-    pub fn need(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, side: u32) -> Option<Need> {
+    /// What a cluster whose box's longer side is of that class needs to be a target or become one, if it has grown from the peak of a cell; a peak that is not the highest of
+    /// its cell leads to small ones only. `None` if it cannot.
+    pub fn need(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, class: SideClass) -> Option<Need> {
         let leads = if highest { usize::from(self.leads[cell]) } else { 1 };
         let mut need = Need { mean: f64::INFINITY, ground: f64::INFINITY };
-        let mut first = 0;
-        if side <= NEXT {
+        let first = class.0.unwrap_or_else(|| {
             need = Need { mean: f64::from(self.least[cell]), ground: f64::from(self.ground[cell]) };
             // The first ring is made of those cells.
-            first = 1;
-        } else {
-            let ends = |outer: usize| (CELL * outer + CELL / 2) as u32;
-            first += RINGS.iter().take_while(|r| ends(r.1) < side).count();
-        }
+            1
+        });
         if first < leads {
             let place = (cell % self.columns, cell / self.columns);
             for &(inner, outer) in &RINGS[first..leads] {
@@ -291,7 +299,8 @@ mod tests {
         let mut bars = Bars::default();
         bars.take(&cells, &bar);
         let cell = |x: usize, y: usize| y / CELL * 32 + x / CELL;
-        let need = |x: usize, highest: bool, side: u32| bars.need(&cells, &bar, cell(x, 60), highest, side);
+        let need =
+            |x: usize, highest: bool, side: u32| bars.need(&cells, &bar, cell(x, 60), highest, SideClass::of(side));
         let (quiet, loud) = (need(60, true, 1).unwrap().mean, need(200, true, 1).unwrap().mean);
         assert!(quiet > 102.0 && quiet < 106.0, "{quiet}");
         assert!(loud > 120.0 && loud < 150.0, "{loud}");

@@ -15,7 +15,7 @@
 //! ring is quieter than the cells of 8 x 8 px around them (`bars`). Cost: one pass over the pixels for the cells and
 //! one over those cells that a peak can be in, then what each peak grows.
 
-use super::bars::{Bar, Bars};
+use super::bars::{Bar, Bars, SideClass};
 use super::blob::Blob;
 use super::cells::Cells;
 use super::config::IsolatedConfig;
@@ -133,7 +133,9 @@ impl IsolatedDetector {
     /// Follows one peak down through the levels and notes every cluster that stands clear.
     fn grow<T: Pixel>(&mut self, image: &Image<T>, config: &DetectorConfig, bar: &Bar, peak: &Peak) {
         let Some(pixel) = image.row(peak.y as usize).get(peak.x as usize) else { return };
-        let Some(need) = self.bars.need(&self.cells, bar, peak.cell, peak.highest, 1) else { return };
+        let mut class = SideClass::of(1);
+        let wanted = |class| self.bars.need(&self.cells, bar, peak.cell, peak.highest, class);
+        let Some(mut need) = wanted(class) else { return };
         let (min_area, max_area) = config.cluster.area_limits();
         self.growth.start(peak.x, peak.y, self.steps.of(*pixel), self.steps.above(need.ground));
         let mut noted = false;
@@ -165,8 +167,12 @@ impl IsolatedDetector {
                 }
             }
             let (w, h) = blob.sides();
-            let need = self.bars.need(&self.cells, bar, peak.cell, peak.highest, w.max(h));
-            if !need.is_some_and(|need| level > need.ground && (noted || mean >= need.mean)) {
+            let grown = SideClass::of(w.max(h));
+            if grown != class {
+                let Some(more) = wanted(grown) else { return };
+                (class, need) = (grown, more);
+            }
+            if !(level > need.ground && (noted || mean >= need.mean)) {
                 return;
             }
         }

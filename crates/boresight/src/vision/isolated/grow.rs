@@ -16,18 +16,21 @@ use crate::vision::pixel::Pixel;
 const LEVEL_BITS: u32 = 9;
 const LEVEL: u32 = (1 << LEVEL_BITS) - 1;
 
+/// Marks of a cache line.
+const LINE: usize = 16;
+
 /// No pixel.
 const NONE: u32 = u32::MAX;
 
 /// The cluster of one peak while it grows; keeps its memory between peaks and frames.
 #[derive(Debug, Default)]
 pub struct Growth {
-    /// By pixel: the number of the peak that has seen it last, and the level. Rows are as long as a power of two.
+    /// By pixel: the number of the peak that has seen it last, and the level.
     marks: Vec<u32>,
     width: usize,
     height: usize,
-    /// Logarithm of a row's length.
-    shift: u32,
+    /// Length of a row of marks: an odd number of cache lines, so that the rows of a column do not fall upon each other in the cache.
+    stride: u32,
     /// From a pixel to its neighbours: among the marks, and in the image. Steps back wrap around.
     beside: [(u32, usize); 8],
     /// Marks from here on are of this frame.
@@ -70,13 +73,14 @@ impl Growth {
     pub fn frame(&mut self, width: usize, height: usize, levels: usize, max_side: u32) {
         if (self.width, self.height) != (width, height) {
             (self.width, self.height) = (width, height);
-            self.shift = width.next_power_of_two().trailing_zeros();
+            self.stride = (width.div_ceil(LINE) | 1) as u32 * LINE as u32;
             self.marks.clear();
-            self.marks.resize(height << self.shift, 0);
+            self.marks.resize(height * self.stride as usize, 0);
             (self.own, self.first) = (0, 0);
             let around = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
+            let stride = self.stride as isize;
             self.beside = around.map(|(down, along): (isize, isize)| {
-                (((down << self.shift) + along) as u32, (down * width as isize + along) as usize)
+                ((down * stride + along) as u32, (down * width as isize + along) as usize)
             });
         }
         self.next();
@@ -109,7 +113,7 @@ impl Growth {
         self.peak = f64::NEG_INFINITY;
         (self.top, self.deepest) = (usize::from(reached), usize::from(reached));
         self.waiting.clear();
-        let at = (y << self.shift) | x;
+        let at = y * self.stride + x;
         let mark = self.marks[at as usize];
         if mark >= self.first && (mark & LEVEL) as usize >= usize::from(reached) {
             self.met = usize::from(reached);
@@ -149,14 +153,14 @@ impl Growth {
     fn take_in<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, level: usize) -> bool {
         let (stack, waiting, heads, marks) =
             (&mut self.stack, &mut self.waiting, self.heads.as_mut_slice(), self.marks.as_mut_slice());
-        let (pixels, width, shift) = (image.as_slice(), self.width, self.shift);
+        let (pixels, width, stride, beside) = (image.as_slice(), self.width, self.stride.max(1), self.beside);
         let (right, bottom) = (width as u32 - 1, self.height as u32 - 1);
         let (own, floor, first) = (self.own, self.floor, self.first);
         let mut blob = self.blob.unwrap_or(Blob::none());
         let (mut sum, mut peak, mut deepest, mut met) = (self.sum, self.peak, self.deepest, self.met);
         let mut whole = true;
         'grow: while let Some(at) = stack.pop() {
-            let (x, y) = (at & ((1 << shift) - 1), at >> shift);
+            let (x, y) = (at % stride, at / stride);
             blob.add(x, y);
             let (w, h) = blob.sides();
             if x == 0 || y == 0 || x >= right || y >= bottom || w > self.max_side || h > self.max_side {
@@ -168,7 +172,7 @@ impl Growth {
             sum += value;
             peak = if value > peak { value } else { peak };
             marks[at as usize] = own | level as u32;
-            for (of_mark, of_pixel) in self.beside {
+            for &(of_mark, of_pixel) in &beside {
                 let next = at.wrapping_add(of_mark);
                 let Some(mark) = marks.get_mut(next as usize) else { continue };
                 if *mark >= own {

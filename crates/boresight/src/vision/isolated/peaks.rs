@@ -2,7 +2,7 @@
 //!
 //! Units: px, counts; values times the sign of the side.
 
-use super::bars::{Bar, Bars};
+use super::bars::{Bar, Bars, SideClass};
 use super::cells::{CELL, Cells};
 use crate::Image;
 use crate::vision::pixel::Pixel;
@@ -24,17 +24,18 @@ pub struct Peak {
 pub fn find<T: Pixel>(image: &Image<T>, cells: &Cells, bars: &Bars, bar: &Bar, lowest: f64, peaks: &mut Vec<Peak>) {
     peaks.clear();
     let columns = cells.size().0;
+    let small = SideClass::of(1);
     for (cell, high) in cells.highest(bar.sign < 0.0).enumerate() {
         let high = f64::from(high);
         if high < lowest {
             continue;
         }
-        let Some(need) = bars.need(cells, bar, cell, true, 1) else { continue };
+        let Some(need) = bars.need(cells, bar, cell, true, small) else { continue };
         if high < need.mean {
             continue;
         }
         // Of the others of the cell only small clusters are looked for.
-        let least = bars.need(cells, bar, cell, false, 1).map_or(high, |n| n.mean.min(high)).max(lowest);
+        let least = bars.need(cells, bar, cell, false, small).map_or(high, |n| n.mean.min(high)).max(lowest);
         let (left, top) = (cell % columns * CELL, cell / columns * CELL);
         for y in top.max(1)..(top + CELL).min(image.height().saturating_sub(1)) {
             let [above, row, below] = [y - 1, y, y + 1].map(|y| image.row(y));
