@@ -47,12 +47,14 @@ pub const RATE_WITHOUT_EFFECT: &str = "--false-tracks-per-hour has no effect her
     confirmed by the number of their hits (tracker.confirmation).";
 
 /// What was found, in the last of the passes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
     /// Tracks that were reported.
     pub n_targets: usize,
     /// Their detections a scan.
     pub per_scan: f64,
+    /// From when to when each target was followed, s.
+    pub spans_s: Vec<[f64; 2]>,
 }
 
 /// What is known of one track.
@@ -107,7 +109,9 @@ pub fn learn(
             begun += usize::from(t.first > coast);
             own += t.own;
         }
-        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64 };
+        let time_s = |k: usize| scans[k].time.ns as f64 * 1e-9;
+        let spans_s = targets().map(|t| [time_s(t.first), time_s(t.last)]).collect();
+        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64, spans_s };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;

@@ -5,13 +5,19 @@
 //! Limits: those of [`super::chains`].
 
 use super::chains::{Chain, chains};
+use super::first_scans::first;
 use super::sightings::Sightings;
+use crate::Scan;
+use crate::camera::SteadyGround;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 /// Orders of the scans in which chains are counted for comparison.
 const SURROGATES: usize = 4;
+/// Scans of a pass that are looked at, and their detections at most: a guard of time.
+const MOST_SCANS: usize = 250;
+const MOST_DETECTIONS: usize = 20_000;
 /// By chance a gain is larger once in a thousand choices: e to the minus gain.
 pub const SURE_GAIN: f64 = 6.9;
 /// Deviations by which a number of steps, or a gain, is surely more than another.
@@ -24,16 +30,40 @@ const FASTER_SHARE: f64 = 0.01;
 pub struct Evidence {
     /// The chains in the order of time that move.
     pub moving: Vec<Chain>,
+    /// Times of the scans, s.
+    pub times_s: Vec<f64>,
     /// Mean number and gain (nats) of a surrogate's moving chains.
     pub by_chance: [f64; 2],
+    /// The largest gain of any of them, nats.
+    pub most_by_chance: f64,
     /// Speeds of the steps of all surrogates' moving chains, px/s.
     speeds_by_chance: Vec<f64>,
 }
 
 impl Evidence {
+    /// Looks for chains in the first scans of a pass, on steady ground, in a field of that area, px².
+    pub fn of_scans(scans: &[Scan], area_px2: f64) -> Self {
+        let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
+        let (mut sightings, mut n_seen) = (Vec::new(), 0);
+        for scan in first(scans).iter().take(MOST_SCANS) {
+            ground = ground.after(scan);
+            if scan.blind {
+                continue;
+            }
+            ground.scan_on_ground(scan, &mut on_ground);
+            sightings.push(Sightings::of(&on_ground, None));
+            n_seen += on_ground.detections.len();
+            if n_seen > MOST_DETECTIONS {
+                break;
+            }
+        }
+        Self::of(&sightings, area_px2)
+    }
+
     /// Looks for chains in a field of that area, px².
     pub fn of(scans: &[Sightings], area_px2: f64) -> Self {
-        let mut out = Self { moving: chains(scans, area_px2), by_chance: [0.0; 2], speeds_by_chance: Vec::new() };
+        let times_s = scans.iter().map(|s| s.time_s).collect();
+        let mut out = Self { moving: chains(scans, area_px2), times_s, ..Self::default() };
         out.moving.retain(|c| c.moves);
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         for _ in 0..SURROGATES {
@@ -45,12 +75,22 @@ impl Evidence {
                 .map(|(s, from)| Sightings { time_s: s.time_s, all: scans[from].all.clone() })
                 .collect();
             for chain in chains(&shuffled, area_px2).into_iter().filter(|c| c.moves) {
+                out.most_by_chance = out.most_by_chance.max(chain.gain);
                 out.by_chance[0] += 1.0 / SURROGATES as f64;
                 out.by_chance[1] += chain.gain / SURROGATES as f64;
                 out.speeds_by_chance.extend(chain.speeds_px_per_s);
             }
         }
         out
+    }
+
+    /// The chains of which each gains surely more than one by chance.
+    ///
+    /// By chance one gains more than g with e^(-g/κ): κ is 1 where false detections lie as the density says, and more where they come in swarms. The largest of n surrogates is about
+    /// κ ln n.
+    pub fn sure(&self) -> impl Iterator<Item = &Chain> {
+        let scale = (self.most_by_chance / (SURROGATES as f64).ln()).max(1.0);
+        self.moving.iter().filter(move |c| c.gain > self.most_by_chance + scale * SURE_GAIN)
     }
 
     /// Gain of what moves beyond that of the surrogates, nats.
@@ -139,7 +179,7 @@ mod tests {
                 };
                 let mut all: Vec<Vector2<f64>> = all.into_iter().map(|at| noisy(at, &mut rng)).collect();
                 all.extend((0..n_false).map(|_| place(&mut rng)));
-                let sighting = |at| Sighting { at, variance: 0.09, side_px: 2.0 };
+                let sighting = |at| Sighting { at, variance: 0.09, side_px: 2.0, score: 0.0 };
                 Sightings { time_s: 0.04 * f64::from(k), all: all.into_iter().map(sighting).collect() }
             })
             .collect()
@@ -177,7 +217,8 @@ mod tests {
             let scans: Vec<Sightings> = (0..40)
                 .map(|k| {
                     let mut glint = || Vector2::from_fn(|_, _| 60.0 * rng.random::<f64>());
-                    let all = (0..40).map(|_| Sighting { at: glint(), variance: 0.09, side_px: 2.0 }).collect();
+                    let all =
+                        (0..40).map(|_| Sighting { at: glint(), variance: 0.09, side_px: 2.0, score: 0.0 }).collect();
                     Sightings { time_s: 0.04 * f64::from(k), all }
                 })
                 .collect();

@@ -8,12 +8,12 @@
 
 use super::choose::{Choice, choose_seen};
 use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
+use super::evidence::Evidence;
 use super::first_pass::FirstPass;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
-use super::spots::{INITIATION_SCORE, WEAK_INITIATION_SCORE};
-use super::{first_scans, noise, speed};
+use super::{first_scans, initiation_score, noise, speed};
 use crate::io::{LengthUnit, MOST_BYTES, Replay, frames_ahead};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
@@ -146,11 +146,20 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     }
     drop(at_once);
     let area_px2 = (info.width * info.height).max(1) as f64;
-    speed::learn(pass.scans(), area_px2, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
+    let evidence = Evidence::of_scans(pass.scans(), area_px2);
+    speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
-    let nothing = |found: Option<Found>| found.is_some_and(|f| f.n_targets == 0);
-    if choice.config.tracker.report == Report::Moving && nothing(found) {
+    let mut fainter = assumed.clone();
+    let clear_s = found.as_ref().map_or(&[][..], |f| &f.spans_s);
+    if initiation_score::learn(&evidence, clear_s, &mut fainter.config, &mut fainter.reasons) {
+        let more = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut fainter)?;
+        if more.is_some_and(|f| f.n_targets > 0) {
+            *choice = fainter;
+            return Ok(Box::new(pass));
+        }
+    }
+    if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
         // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them.
         let mut still = assumed.clone();
         still.config.tracker.report = Report::All;
@@ -162,17 +171,6 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
             ));
             *choice = still;
             return Ok(Box::new(pass));
-        }
-    }
-    if nothing(found) && assumed.config.tracker.min_initiation_score == INITIATION_SCORE {
-        let mut weak = assumed;
-        weak.config.tracker.min_initiation_score = WEAK_INITIATION_SCORE;
-        let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut weak)?;
-        if !nothing(things) {
-            weak.reasons.push(format!(
-                "No target of a score of {INITIATION_SCORE} moves, but some of {WEAK_INITIATION_SCORE}: these start tracks."
-            ));
-            *choice = weak;
         }
     }
     Ok(Box::new(pass))

@@ -7,6 +7,7 @@
 
 use super::detections::area_px2;
 use super::digits::round;
+use super::evidence::Evidence;
 use super::first_scans::first;
 use super::{noise, speed};
 use crate::io::LengthUnit;
@@ -70,7 +71,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
     )];
     let area = area_px2(scans);
     // A radar that measures well sees fast targets move far between its turns.
-    speed::learn(scans, area, unit, config, &mut told);
+    speed::learn(&Evidence::of_scans(scans, area), unit, config, &mut told);
     let n_assumed = told.len();
     let _ = noise::learn(scans, area, unit, config, &mut told);
     if let Some(speeds) = speeds(scans, config) {

@@ -19,12 +19,14 @@ pub struct Sighting {
     pub variance: f64,
     /// Longer side of its box, px.
     pub side_px: f64,
+    /// How clearly it stands out, in the detector's measure; 0 where that is not known.
+    pub score: f64,
 }
 
 impl Sighting {
     /// The middle of a box of that longer side, px, known to that variance, px².
     pub fn of_box(at: Vector2<f64>, variance: f64, side_px: f64) -> Self {
-        Self { at, variance: variance + LEAST_STD_PX.powi(2) + (SHARE_OF_SIDE * side_px).powi(2), side_px }
+        Self { at, variance: variance + LEAST_STD_PX.powi(2) + (SHARE_OF_SIDE * side_px).powi(2), side_px, score: 0.0 }
     }
 }
 
@@ -46,7 +48,8 @@ impl Sightings {
         let sighting = |i: usize| {
             let d = &scan.detections[i];
             let at = ground.map_or(d.position, |g| g.apply(d.position));
-            Sighting::of_box(at, 0.5 * d.cov.trace(), d.extent.width_px.max(d.extent.height_px))
+            let seen = Sighting::of_box(at, 0.5 * d.cov.trace(), d.extent.width_px.max(d.extent.height_px));
+            Sighting { score: f64::from(d.score), ..seen }
         };
         Self { time_s: scan.time.ns as f64 * 1e-9, all: order.into_iter().take(MOST_A_SCAN).map(sighting).collect() }
     }

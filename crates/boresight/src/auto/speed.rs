@@ -6,36 +6,16 @@
 
 use super::digits::round;
 use super::evidence::Evidence;
-use super::first_scans::first;
-use super::sightings::Sightings;
-use crate::camera::SteadyGround;
+use crate::Config;
 use crate::io::LengthUnit;
-use crate::{Config, Scan};
 
-/// Scans looked at, and their detections at most: a guard of time.
-const MOST_SCANS: usize = 250;
-const MOST_DETECTIONS: usize = 20_000;
 /// The largest speed over that which hardly a step exceeds: a target speeds up, another one is faster.
 const RESERVE: f64 = 1.5;
 
-/// Raises the largest speed to what the detections show; `unit` is what their positions are in.
-pub fn learn(scans: &[Scan], area_px2: f64, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
-    let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
-    let (mut sightings, mut n_seen) = (Vec::new(), 0);
-    for scan in first(scans).iter().take(MOST_SCANS) {
-        ground = ground.after(scan);
-        if scan.blind {
-            continue;
-        }
-        ground.scan_on_ground(scan, &mut on_ground);
-        sightings.push(Sightings::of(&on_ground, None));
-        n_seen += on_ground.detections.len();
-        if n_seen > MOST_DETECTIONS {
-            break;
-        }
-    }
+/// Raises the largest speed to what the chains of detections show; `unit` is what their positions are in.
+pub fn learn(evidence: &Evidence, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
     // Scans of one time (two sensors') would make any step infinitely fast.
-    let fastest = Evidence::of(&sightings, area_px2).fastest_px_per_s().filter(|f| f.is_finite());
+    let fastest = evidence.fastest_px_per_s().filter(|f| f.is_finite());
     let Some(fastest) = fastest else { return };
     let (speed, px) = (round(RESERVE * fastest), unit.sign());
     if speed > config.tracker.max_speed_px_per_s {
@@ -50,7 +30,7 @@ pub fn learn(scans: &[Scan], area_px2: f64, unit: LengthUnit, config: &mut Confi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Detection, FrameIndex, Timestamp};
+    use crate::{Detection, FrameIndex, Scan, Timestamp};
     use nalgebra::{Matrix2, Vector2};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -68,7 +48,8 @@ mod tests {
             .collect();
         let (mut config, mut reasons) = (Config::default(), Vec::new());
         config.tracker.max_speed_px_per_s = 160.0;
-        learn(&scans, 320.0 * 240.0, LengthUnit::Pixel, &mut config, &mut reasons);
+        let evidence = Evidence::of_scans(&scans, 320.0 * 240.0);
+        learn(&evidence, LengthUnit::Pixel, &mut config, &mut reasons);
         (config.tracker.max_speed_px_per_s, reasons.len())
     }
 

@@ -150,7 +150,7 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
     (info.width.min(info.height) * 2 / 5).clamp(8, 4096) as u32
 }
 
-/// Score from which a target starts a track where few are expected, and where there are many, or else none. Chosen: with 6, 4, 2.5 for all infrared clips of
+/// Score from which a target starts a track where few are expected, and where there are many, unless what moves is fainter ([`super::initiation_score`]). Chosen: with 6, 4, 2.5 for all infrared clips of
 /// the exam 1.1, 4.7, 8.3 false tracks a minute come in half A and 0.4, 1.2, 2.7 in half B, for 95.0, 95.1, 96.7 and 88.6, 89.9, 92.4 % held.
 pub const INITIATION_SCORE: f64 = 6.0;
 pub const WEAK_INITIATION_SCORE: f64 = 4.0;

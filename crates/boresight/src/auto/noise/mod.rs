@@ -14,8 +14,9 @@ use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use std::collections::BTreeMap;
 
-/// Fewer detections of confirmed tracks than this tell no noise.
-const LEAST_STEPS: usize = 60;
+/// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
+/// holds what they do not tell.
+const LEAST_STEPS: usize = 20;
 /// Probability that a target's detection lies in the gate, once the innovations are as wide as their covariances say: one true detection in
 /// ten thousand outside, a track's loss in some minutes of video. With 0.99 of covariances that were far too large the gate was as wide.
 const GATE_PROBABILITY: f64 = 0.9999;

@@ -1,0 +1,101 @@
+//! From which score on a detection starts a track, where what moves is fainter than assumed.
+//!
+//! Source: our own. Of a scene that nobody knows a target is assumed to stand out clearly; what moves and does not would never start a track. Whether it moves is told by the
+//! chains of the first pass ([`super::evidence`]), which know of no such score: those count of which each gains surely more than any in another order of the scans.
+//! How: the score is lowered to what three of four detections of every such chain reach. Where the surest of them is clear, another one counts only if in most of its
+//! time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target. Of several those count that gain a tenth
+//! of what the surest gains.
+//! Limits: lowers the score only; a faint target beside a clear one is not looked for.
+
+use super::chains::Chain;
+use super::digits::round;
+use super::evidence::Evidence;
+use crate::Config;
+
+/// Share of a chain's detections that start a track, less what comes back by following it backward: three of four.
+const MISSED_SHARE: f64 = 0.25;
+/// Share of the surest chain's gain from which another one counts.
+const GAIN_SHARE: f64 = 0.1;
+
+/// Lowers the least score that starts a track to what the chains show, and says whether it did; `clear_s` lists from when to when clear targets are followed, s.
+pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, reasons: &mut Vec<String>) -> bool {
+    let assumed = config.tracker.min_initiation_score;
+    let alone = |c: &Chain| {
+        let time = |h: &(usize, _)| evidence.times_s.get(h.0).copied().unwrap_or(f64::NAN);
+        let beside = |t: f64| clear_s.iter().any(|s| (s[0]..=s[1]).contains(&t));
+        2 * c.hits.iter().filter(|h| beside(time(h))).count() < c.hits.len()
+    };
+    let surest = evidence.sure().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let all_faint = surest.is_some_and(|c| faintest(c) < assumed);
+    let sure = || evidence.sure().filter(|c| all_faint || alone(c));
+    let most = sure().map(|c| c.gain).fold(0.0, f64::max);
+    let counting = || sure().filter(|c| c.gain >= GAIN_SHARE * most);
+    let score = round(counting().map(faintest).fold(f64::INFINITY, f64::min));
+    // A detector without scores says nothing.
+    if !(score > 0.0 && score < assumed) {
+        return false;
+    }
+    let n = counting().count();
+    reasons.push(format!(
+        "{n} chain{} though fainter than a score of {assumed}: detections of {score} start tracks.",
+        if n == 1 {
+            " of detections moves and is surely no chance,"
+        } else {
+            "s of detections move and are surely no chance,"
+        },
+    ));
+    config.tracker.min_initiation_score = score;
+    true
+}
+
+/// The score that all but [`MISSED_SHARE`] of a chain's detections reach.
+fn faintest(chain: &Chain) -> f64 {
+    let mut scores: Vec<f64> = chain.hits.iter().map(|h| h.1.score).collect();
+    let at = (MISSED_SHARE * scores.len() as f64) as usize;
+    if at >= scores.len() { 0.0 } else { *scores.select_nth_unstable_by(at, f64::total_cmp).1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detection, FrameIndex, Scan, Timestamp};
+    use nalgebra::Vector2;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// What starts tracks after 60 scans of 25 a second of targets that move by 2 px a scan, of these scores, with five false detections a scan of score 3; clear targets
+    /// are followed at these times, s.
+    fn learnt(targets: &[f32], clear_s: &[[f64; 2]]) -> (f64, usize) {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let scans: Vec<Scan> = (0..60u64)
+            .map(|k| {
+                let target = |(i, score): (usize, &f32)| {
+                    Detection::point(20.0 + 2.0 * k as f64, 40.0 + 50.0 * i as f64, 0.2).with_score(*score)
+                };
+                let mut all: Vec<Detection> = targets.iter().enumerate().map(target).collect();
+                all.extend((0..5).map(|_| {
+                    Detection::point(320.0 * rng.random::<f64>(), 240.0 * rng.random::<f64>(), 0.2).with_score(3.0)
+                }));
+                Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * k as f64)).with_detections(all)
+            })
+            .collect();
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        config.tracker.min_initiation_score = 6.0;
+        let evidence = Evidence::of_scans(&scans, 320.0 * 240.0);
+        let lowered = learn(&evidence, clear_s, &mut config, &mut reasons);
+        assert_eq!(lowered, config.tracker.min_initiation_score < 6.0);
+        (config.tracker.min_initiation_score, reasons.len())
+    }
+
+    #[test]
+    fn what_moves_faintly_starts_tracks_where_nothing_moves_clearly() {
+        assert_eq!(learnt(&[3.5], &[]), (3.5, 1));
+        assert_eq!(learnt(&[4.5, 3.5], &[]), (3.5, 1));
+        assert_eq!(learnt(&[20.0, 3.5], &[[0.0, 1.0]]), (3.5, 1), "the clear one is there for a time only");
+        assert_eq!(learnt(&[20.0, 3.5], &[[0.0, 2.4]]), (6.0, 0), "beside a clear one");
+        assert_eq!(learnt(&[5.0, 3.5], &[[0.0, 2.4]]), (3.5, 1), "followed by luck");
+        assert_eq!(learnt(&[20.0, 20.0], &[]), (6.0, 0), "clear targets start by themselves");
+        assert_eq!(learnt(&[], &[]), (6.0, 0), "false detections are no chains");
+        assert_eq!(learnt(&[0.0], &[]), (6.0, 0), "a detector without scores");
+    }
+}
