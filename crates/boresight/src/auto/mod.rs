@@ -35,6 +35,7 @@ mod sightings;
 mod speed;
 mod spots;
 mod spread;
+mod steadied;
 mod summed;
 
 pub use crate::io::Replay;

@@ -10,9 +10,12 @@ mod find_patch;
 mod fit;
 mod key_frame;
 mod motion;
+mod plane;
 mod reduce;
+mod register;
 mod steady;
 
 pub use estimate::{CameraConfig, CameraMotionEstimator};
 pub use motion::CameraPath;
+pub(crate) use register::{PlanePatches, Registration, WideSearch};
 pub use steady::SteadyGround;

@@ -23,7 +23,7 @@ pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>) {
 }
 
 /// Mean over blocks of `factor` x `factor` pixels.
-fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
+pub(super) fn blocks<T: Copy>(image: &Image<T>, factor: usize, out: &mut Image<f32>, value: impl Fn(T) -> f32) {
     let (w, h) = (image.width() / factor, image.height() / factor);
     out.reset(w, h, 0.0);
     if factor == 1 {
