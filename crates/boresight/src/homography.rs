@@ -74,9 +74,9 @@ mod tests {
 
     fn any() -> impl Strategy<Value = Homography> {
         let small = -1e-4..1e-4f64;
-        (-0.3..0.3f64, -0.3..0.3f64, -50.0..50.0f64, -50.0..50.0f64, small.clone(), small).prop_map(|(a, b, x, y, g, h)| {
-            Homography::of_matrix(Matrix3::new(1.0 + a, -b, x, b, 1.0 - a, y, g, h, 1.0)).unwrap()
-        })
+        (-0.3..0.3f64, -0.3..0.3f64, -50.0..50.0f64, -50.0..50.0f64, small.clone(), small).prop_map(
+            |(a, b, x, y, g, h)| Homography::of_matrix(Matrix3::new(1.0 + a, -b, x, b, 1.0 - a, y, g, h, 1.0)).unwrap(),
+        )
     }
 
     proptest! {

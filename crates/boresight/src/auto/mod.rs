@@ -17,6 +17,7 @@ mod faint;
 mod first_pass;
 mod first_scans;
 mod fixed_blocks;
+mod ground;
 mod interval;
 mod looks;
 mod moving;

@@ -5,15 +5,17 @@
 
 use super::digits::round;
 use super::evidence::Evidence;
+use super::ground::Ground;
 use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
 use super::spread::growing;
 use super::{faint, moving, spots};
 use crate::camera::CameraConfig;
+use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, Report, TwoPointConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::steadied::SteadiedConfig;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, Frame, Result, Scan, Similarity, SourceInfo};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// Lags tried, s: a factor of two apart.
 const LAGS_S: [f64; 3] = [0.16, 0.32, 0.64];
@@ -23,9 +25,11 @@ const LEAST_FRAMES: usize = 12;
 const LEAST_AREA: f64 = 3e-5;
 /// And in pixels: fewer make no region.
 const LEAST_PX: f64 = 4.0;
+/// Share of the regions that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
+const LEAST_EXPLAINED: f64 = 0.2;
 
 /// What was seen with one lag.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
     /// Time to the frames compared with, s.
     pub lag_s: f64,
@@ -35,6 +39,8 @@ pub struct Seen {
     pub side_px: f64,
     /// Chains of these.
     pub chains: Evidence,
+    /// Share of the regions that belong to chains that move.
+    pub explained: f64,
 }
 
 fn detector(lag_s: f64, info: &SourceInfo) -> DetectorConfig {
@@ -60,7 +66,7 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option
     }
     let mut best: Option<Seen> = None;
     for lag_s in LAGS_S {
-        let seen = look_at(lag_s, frames, &scene.ground, info)?;
+        let seen = look_at(lag_s, frames, &growing(frames.len()), &scene.ground, info)?;
         if best.as_ref().is_none_or(|b| seen.chains.gain() > b.chains.gain()) {
             best = Some(seen);
         }
@@ -79,9 +85,17 @@ pub fn look_beside(
     n_threads: usize,
 ) -> Result<Option<Seen>> {
     let Some(seen) = look(frames, scene, info)? else { return Ok(None) };
-    if std::env::var("DBG").is_ok() { eprintln!("steadied {} {} / isolated {}", seen.lag_s, seen.chains.words(), isolated.most().1.words()); }
-    if !seen.chains.is_sure() || !seen.chains.is_surely_more_than(isolated.most().1) {
+    let (polarity, of_isolated) = isolated.most();
+    if !seen.chains.is_sure() || seen.explained < LEAST_EXPLAINED || of_isolated.is_surely_more_than(&seen.chains) {
         return Ok(None);
+    }
+    if !seen.chains.is_surely_more_than(of_isolated) {
+        // Slow things hardly move between the first frames looked at: all of them tell more.
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let of_isolated = spots::look_at(frames, &all, &scene.ground, polarity, info, n_threads)?;
+        if !look_at(seen.lag_s, frames, &all, &scene.ground, info)?.chains.is_surely_more_than(&of_isolated.chains) {
+            return Ok(None);
+        }
     }
     if isolated.is_poor() {
         let faint = faint::better(faint::count(frames, &scene.ground, info, n_threads)?.0);
@@ -92,13 +106,14 @@ pub fn look_beside(
     Ok(Some(seen))
 }
 
-fn look_at(lag_s: f64, frames: &[Frame], ground: &[Similarity], info: &SourceInfo) -> Result<Seen> {
+/// What is seen with a lag in the frames at these places.
+fn look_at(lag_s: f64, frames: &[Frame], places: &[usize], ground: &[Ground], info: &SourceInfo) -> Result<Seen> {
     let mut detector = crate::vision::build(&detector(lag_s, info), info)?;
     let start = frames[0].time;
     let first = frames.iter().take_while(|f| f.time.seconds_since(start) <= detector.prime_s()).count();
     detector.prime(&frames[..first])?;
     let (mut scan, mut n, mut sides) = (Scan::default(), 0usize, Vec::new());
-    let (places, mut sightings) = (growing(frames.len()), Vec::new());
+    let mut sightings = Vec::with_capacity(places.len());
     for (k, frame) in frames.iter().enumerate() {
         detector.detect(frame, &mut scan)?;
         if places.contains(&k) {
@@ -108,11 +123,14 @@ fn look_at(lag_s: f64, frames: &[Frame], ground: &[Similarity], info: &SourceInf
         }
     }
     sides.sort_by(f64::total_cmp);
+    let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
+    let hits: usize = chains.moving.iter().map(|c| c.hits.len()).sum();
     Ok(Seen {
         lag_s,
         per_frame: n as f64 / places.len().max(1) as f64,
         side_px: sides.get(sides.len() / 2).copied().unwrap_or(0.0),
-        chains: Evidence::of(&sightings, (info.width * info.height) as f64),
+        explained: hits as f64 / n.max(1) as f64,
+        chains,
     })
 }
 
@@ -120,7 +138,13 @@ fn look_at(lag_s: f64, frames: &[Frame], ground: &[Similarity], info: &SourceInf
 pub fn configure(seen: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     config.detector = detector(seen.lag_s, info);
     config.detector.camera = CameraConfig::Moving;
-    moving::tracker(seen.side_px.max(LEAST_PX), info, &mut config.tracker);
+    let tracker = &mut config.tracker;
+    moving::tracker(seen.side_px.max(LEAST_PX), info, tracker);
+    // What differs in one place for a while, as leaves and poles do, is none that goes somewhere.
+    tracker.report = Report::Moving;
+    // Rims come and go: velocities are known from two of them, not from the size.
+    tracker.initiation = InitiationConfig::TwoPoint(TwoPointConfig::default());
+    tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
     reasons.push(format!(
         "The camera moves, and against frames {} s and {} s ago, steadied, {:.1} regions a frame move by themselves, median side {:.0} px, {}: so those are \
          detected (detector.threshold.steadied). What stands on the ground is not.",
@@ -145,7 +169,7 @@ pub fn configure_asked(
     let mut scene = scene.clone();
     scene.camera = Camera::Moving;
     let seen = look(frames, &scene, info)?;
-    let assumed = || Seen { lag_s: SteadiedConfig::default().lag_s, per_frame: 0.0, side_px: 0.0, chains: Evidence::default() };
+    let assumed = || Seen { lag_s: SteadiedConfig::default().lag_s, ..Seen::default() };
     configure(&seen.unwrap_or_else(assumed), info, config, reasons);
     Ok(())
 }

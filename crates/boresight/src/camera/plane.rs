@@ -45,9 +45,7 @@ type Basis = SMatrix<f64, 8, 2>;
 /// What each number of a correction moves at a point, px; `k` of them.
 fn basis(u: Vector2<f64>, k: usize) -> Basis {
     let (x, y) = (u.x, u.y);
-    let mut b = Basis::from_row_slice(&[
-        1.0, 0.0, 0.0, 1.0, x, y, -y, x, x, -y, y, x, x * x, x * y, x * y, y * y,
-    ]);
+    let mut b = Basis::from_row_slice(&[1.0, 0.0, 0.0, 1.0, x, y, -y, x, x, -y, y, x, x * x, x * y, x * y, y * y]);
     b.rows_mut(k, 8 - k).fill(0.0);
     b
 }
@@ -55,11 +53,8 @@ fn basis(u: Vector2<f64>, k: usize) -> Basis {
 /// The correction as a homography of px about `middle`.
 fn correction(theta: &SVector<f64, 8>, middle: Vector2<f64>, half: f64) -> Option<Homography> {
     let t = theta / half;
-    let unit = Matrix3::new(
-        1.0 + t[2] + t[4], -t[3] + t[5], t[0],
-        t[3] + t[5], 1.0 + t[2] - t[4], t[1],
-        -t[6], -t[7], 1.0,
-    );
+    let unit =
+        Matrix3::new(1.0 + t[2] + t[4], -t[3] + t[5], t[0], t[3] + t[5], 1.0 + t[2] - t[4], t[1], -t[6], -t[7], 1.0);
     let to_unit = Matrix3::new(1.0 / half, 0.0, -middle.x / half, 0.0, 1.0 / half, -middle.y / half, 0.0, 0.0, 1.0);
     let to_px = Matrix3::new(half, 0.0, middle.x, 0.0, half, middle.y, 0.0, 0.0, 1.0);
     Homography::of_matrix(to_px * unit * to_unit)

@@ -6,13 +6,12 @@
 //! the predicted one ([`super::find_patch`]); the motion by [`super::plane`]. Patches at the noise's own texture are left out where others stand out.
 //! Units: px of the images given. Limits: the prediction must be right to a pixel.
 
-use super::find_patch::{find, find_near};
+use super::find_patch::find_near;
 use super::fit::Match;
 use super::key_frame::{PATCH, Patch, texture};
 use super::plane;
-use super::reduce::blocks;
 use crate::{Homography, Image, Similarity};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
 /// Cells in x and y.
 const CELLS: (usize, usize) = (14, 8);
@@ -21,25 +20,16 @@ const LEAST_SHARE: f32 = 0.1;
 /// Steps in which a cell is looked through, px.
 const STEP: usize = 4;
 
-/// Width of the images that a motion nothing predicts is looked for in, px.
-const SMALL_PX: usize = 240;
 /// Share of patches found, and their deviation, px, from which on a registration is clear.
 const CLEAR_FOUND: f64 = 0.8;
 const CLEAR_SPREAD_PX: f64 = 0.15;
-const NONE: Match = Match { from: Vector2::new(0.0, 0.0), to: Vector2::new(0.0, 0.0), weight: 0.0 };
+/// A match that is none.
+pub(super) const NONE: Match = Match { from: Vector2::new(0.0, 0.0), to: Vector2::new(0.0, 0.0), weight: 0.0 };
 
 /// An image's patches.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlanePatches {
-    patches: Vec<Patch>,
-}
-
-/// Both images made small, for motions that nothing predicts.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct WideSearch {
-    own: Image<f32>,
-    other: Image<f32>,
-    patches: PlanePatches,
+    pub(super) patches: Vec<Patch>,
 }
 
 /// Where the plane of one image lies in another.
@@ -57,44 +47,6 @@ impl Registration {
     /// Whether nearly all patches are found where one plane has them: nothing better is to be looked for.
     pub fn is_clear(&self) -> bool {
         self.found >= CLEAR_FOUND && self.spread_px <= CLEAR_SPREAD_PX
-    }
-}
-
-impl WideSearch {
-    /// Where the plane of `own` lies in `other`, roughly: to be sharpened by [`PlanePatches::register`]. Patches are looked for within 10 of the small pixels, 40 of
-    /// 960 px, around their place.
-    pub fn look(&mut self, own: &Image<f32>, other: &Image<f32>) -> Option<Homography> {
-        let factor = own.width().div_ceil(SMALL_PX).max(1);
-        blocks(own, factor, &mut self.own, |p| p);
-        blocks(other, factor, &mut self.other, |p| p);
-        self.patches.choose(&self.own);
-        let mut matches = [NONE; plane::MOST_MATCHES];
-        let mut n = 0;
-        for p in &self.patches.patches {
-            if let Some(to) = find(&self.own, &self.other, *p, &Similarity::identity()) {
-                matches[n] = Match { from: p.middle(), to, weight: 1.0 };
-                n += 1;
-            }
-        }
-        let matches = &matches[..n];
-        if n == 0 {
-            return None;
-        }
-        // The middle shift of both axes is near enough to begin with.
-        let mut shift = [0.0; 2];
-        for (axis, s) in shift.iter_mut().enumerate() {
-            let mut all = [0.0; plane::MOST_MATCHES];
-            all.iter_mut().zip(matches).for_each(|(a, m)| *a = m.to[axis] - m.from[axis]);
-            *s = *all[..n].select_nth_unstable_by(n / 2, f64::total_cmp).1;
-        }
-        let start = Homography::of_similarity(&Similarity::shift(Vector2::from(shift)));
-        let middle = 0.5 * Vector2::new(self.own.width() as f64 - 1.0, self.own.height() as f64 - 1.0);
-        let small = plane::fit(matches, &start, middle)?.to_from;
-        // A small pixel's middle is that of its block.
-        let f = factor as f64;
-        let first = 0.5 * (f - 1.0);
-        let grow = Homography::of_matrix(Matrix3::new(f, 0.0, first, 0.0, f, first, 0.0, 0.0, 1.0))?;
-        Some(grow.inverse().then(&small).then(&grow))
     }
 }
 
@@ -138,23 +90,12 @@ impl PlanePatches {
     }
 
     /// Where the plane of `own`, the image of the patches, lies in `other`.
-    pub fn register(
-        &self,
-        own: &Image<f32>,
-        other: &Image<f32>,
-        predicted: &Homography,
-    ) -> Option<Registration> {
+    pub fn register(&self, own: &Image<f32>, other: &Image<f32>, predicted: &Homography) -> Option<Registration> {
         let mut matches = [NONE; plane::MOST_MATCHES];
         let mut n = 0;
         for p in &self.patches {
-            let (from, to) = (p.middle(), predicted.apply(p.middle()));
-            let a = predicted.linear_at(from);
-            let turned = Similarity::with_linear(0.5 * (a[(0, 0)] + a[(1, 1)]), 0.5 * (a[(1, 0)] - a[(0, 1)]), from, to);
-            // What neither turns nor zooms by a tenth of a pixel over the patch is only shifted.
-            let bends = (turned.linear() - nalgebra::Matrix2::identity()).norm() > 0.1 / PATCH as f64;
-            let turned = if bends { turned } else { Similarity::shift(to - from) };
-            if let Some(found) = find_near(own, other, *p, to, &turned) {
-                matches[n] = Match { from, to: found, weight: 1.0 };
+            if let Some(to) = place(own, other, *p, predicted) {
+                matches[n] = Match { from: p.middle(), to, weight: 1.0 };
                 n += 1;
             }
         }
@@ -167,4 +108,26 @@ impl PlanePatches {
         let plane = plane::fit(&matches[..n], predicted, middle)?;
         Some(Registration { to_from: plane.to_from, spread_px: plane.spread_px, found })
     }
+
+    /// Appends the middle of each patch and how far from the plane it lies in `other`, px; nothing where it is not found near it.
+    pub fn residuals(
+        &self,
+        own: &Image<f32>,
+        other: &Image<f32>,
+        plane: &Homography,
+        out: &mut Vec<(Vector2<f64>, Option<f64>)>,
+    ) {
+        let far = |p: &Patch| place(own, other, *p, plane).map(|to| (to - plane.apply(p.middle())).norm());
+        out.extend(self.patches.iter().map(|p| (p.middle(), far(p))));
+    }
+}
+
+/// Where the middle of a patch of `own` lies in `other`, if it lies within a pixel of the predicted place.
+fn place(own: &Image<f32>, other: &Image<f32>, p: Patch, predicted: &Homography) -> Option<Vector2<f64>> {
+    let (from, to) = (p.middle(), predicted.apply(p.middle()));
+    let a = predicted.linear_at(from);
+    let turned = Similarity::with_linear(0.5 * (a[(0, 0)] + a[(1, 1)]), 0.5 * (a[(1, 0)] - a[(0, 1)]), from, to);
+    // What neither turns nor zooms by a tenth of a pixel over the patch is only shifted.
+    let bends = (turned.linear() - nalgebra::Matrix2::identity()).norm() > 0.1 / PATCH as f64;
+    find_near(own, other, p, to, &if bends { turned } else { Similarity::shift(to - from) })
 }

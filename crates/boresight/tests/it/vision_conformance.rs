@@ -51,6 +51,7 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
         integrate(Polarity::Dark, StillBackground::Spatial),
         ThresholdConfig::Moving(Default::default()),
         ThresholdConfig::Difference(Default::default()),
+        ThresholdConfig::Steadied(Default::default()),
         ThresholdConfig::Colour(ColourMatchConfig { reference: [200, 100, 55], ..Default::default() }),
     ];
     for t in &all {
@@ -65,6 +66,7 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
             | ThresholdConfig::Integrate(_)
             | ThresholdConfig::Moving(_)
             | ThresholdConfig::Difference(_)
+            | ThresholdConfig::Steadied(_)
             | ThresholdConfig::Colour(_) => {}
         }
     }

@@ -6,7 +6,7 @@
 //! Limits: outside the other image there is NaN.
 
 use crate::vision::pixel::Pixel;
-use crate::{Homography, Image};
+use crate::{Homography, Image, Pixels};
 use nalgebra::Vector2;
 
 /// Pixels over which a place runs in a straight line.
@@ -30,8 +30,13 @@ pub(super) fn working<T: Pixel>(image: &Image<T>, factor: usize, line: &mut Vec<
             let row = &image.row(y * factor + dy)[..w * factor];
             match factor {
                 1 => to.iter_mut().zip(row).for_each(|(t, v)| *t = v.value_f32()),
-                2 => to.iter_mut().zip(row.chunks_exact(2)).for_each(|(t, v)| *t += v[0].value_f32() + v[1].value_f32()),
-                n => to.iter_mut().zip(row.chunks_exact(n)).for_each(|(t, v)| *t += v.iter().map(|v| v.value_f32()).sum::<f32>()),
+                2 => {
+                    to.iter_mut().zip(row.chunks_exact(2)).for_each(|(t, v)| *t += v[0].value_f32() + v[1].value_f32())
+                }
+                n => to
+                    .iter_mut()
+                    .zip(row.chunks_exact(n))
+                    .for_each(|(t, v)| *t += v.iter().map(|v| v.value_f32()).sum::<f32>()),
             }
         }
         let mut last = 0.0;
@@ -41,6 +46,21 @@ pub(super) fn working<T: Pixel>(image: &Image<T>, factor: usize, line: &mut Vec<
         }
     }
     smooth(out, line);
+}
+
+/// As [`working`] for frames of any kind, colours by their green; and the side of its blocks.
+pub(crate) fn plane_image(pixels: &Pixels, line: &mut Vec<f32>, out: &mut Image<f32>) -> usize {
+    let factor = factor(pixels.width(), pixels.height());
+    match pixels {
+        Pixels::Gray8(i) => working(i, factor, line, out),
+        Pixels::Gray16(i) => working(i, factor, line, out),
+        Pixels::GrayF32(i) => working(i, factor, line, out),
+        Pixels::Rgb8(i) => {
+            let green = Image::from_vec(i.width(), i.height(), i.as_slice().iter().map(|p| p[1]).collect());
+            working(&green.unwrap_or_default(), factor, line, out);
+        }
+    }
+    factor
 }
 
 /// [1 2 1]/4 along rows and columns, in place.

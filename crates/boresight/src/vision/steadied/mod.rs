@@ -10,6 +10,5 @@ mod references;
 mod segmenter;
 
 pub use config::SteadiedConfig;
+pub(crate) use cover::plane_image;
 pub(super) use segmenter::Steadied;
-#[cfg(test)]
-mod debug_tests;

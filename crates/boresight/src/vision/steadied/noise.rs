@@ -90,7 +90,14 @@ widest! {
 impl GroundNoise {
     /// Turns the differences of `now` from the covered frame in `z` (its pixels come in, NaN where it is not seen) into deviations of the ground's noise, but for the
     /// tiles' factors; `rounding` is the variance of the pixels' rounding, `least` the smallest difference that counts.
-    pub fn judge(&mut self, now: &Image<f32>, gradients: [&Image<f32>; 2], z: &mut Image<f32>, rounding: f32, least: f32) {
+    pub fn judge(
+        &mut self,
+        now: &Image<f32>,
+        gradients: [&Image<f32>; 2],
+        z: &mut Image<f32>,
+        rounding: f32,
+        least: f32,
+    ) {
         let n = now.as_slice().len();
         let step = (n / SAMPLES).max(1);
         // A step that divides the width would sample columns.
@@ -98,9 +105,12 @@ impl GroundNoise {
         let [own, other] = gradients.map(|g| g.as_slice());
         let offset = self.offset(now.as_slice(), z.as_slice(), step);
         self.samples.clear();
+        self.samples.reserve(n / step + 1);
         let pixels = now.as_slice().iter().zip(z.as_slice()).zip(own.iter().zip(other)).step_by(step);
         self.samples.extend(
-            pixels.map(|((a, b), (g, h))| (g.max(*h), (a - b - offset).abs())).filter(|s| s.1.is_finite() && s.0.is_finite()),
+            pixels
+                .map(|((a, b), (g, h))| (g.max(*h), (a - b - offset).abs()))
+                .filter(|s| s.1.is_finite() && s.0.is_finite()),
         );
         let (a, b) = fit(&mut self.samples, &mut self.values, rounding);
         for y in 0..now.height() {
@@ -114,6 +124,7 @@ impl GroundNoise {
     /// The median difference: the light's change.
     fn offset(&mut self, now: &[f32], covered: &[f32], step: usize) -> f32 {
         self.values.clear();
+        self.values.reserve(now.len() / step + 1);
         self.values.extend(now.iter().zip(covered).step_by(step).map(|(a, b)| a - b).filter(|d| d.is_finite()));
         median(&mut self.values)
     }

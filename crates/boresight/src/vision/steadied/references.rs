@@ -6,7 +6,7 @@
 //! Symbols: own, the present frame; other_from_own takes its points to those of a kept one (working px).
 //! Limits: where the motion is lost all is forgotten, and nothing is seen until two lags have passed.
 
-use crate::camera::{PlanePatches, Registration, WideSearch};
+use crate::camera::PlaneFollower;
 use crate::{Homography, Image};
 
 /// Frames kept in one lag.
@@ -29,14 +29,8 @@ pub(super) struct References {
     kept: Vec<Reference>,
     /// Frames whose memory is used again.
     spare: Vec<Image<f32>>,
-    last: Image<f32>,
-    patches: PlanePatches,
-    own_patches: PlanePatches,
-    wide: WideSearch,
-    /// The last motion from frame to frame.
-    motion: Homography,
+    plane: PlaneFollower,
     time_s: f64,
-    started: bool,
 }
 
 impl References {
@@ -47,26 +41,27 @@ impl References {
 
     /// Whether a frame was seen.
     pub fn has_started(&self) -> bool {
-        self.started
+        self.plane.has_started()
     }
 
     /// Time that frames shown beforehand should cover, s.
     pub fn prime_s(&self) -> f64 {
-        if self.started || !self.kept.is_empty() { 0.0 } else { (OLDEST - 0.25) * self.lag_s }
+        if self.has_started() || !self.kept.is_empty() { 0.0 } else { (OLDEST - 0.25) * self.lag_s }
     }
 
     /// Keeps frames of the first [`Self::prime_s`] seconds, evenly spread, the first among them.
     pub fn prime(&mut self, frames: Vec<Image<f32>>) {
         let step_s = self.prime_s() / frames.len().saturating_sub(1).max(1) as f64;
-        let (mut from_first, mut motion) = (Homography::identity(), Homography::identity());
+        let (mut plane, mut from_first) = (PlaneFollower::default(), Homography::identity());
         let mut kept: Vec<Reference> = Vec::new();
         for (i, image) in frames.into_iter().enumerate() {
-            if let Some(before) = kept.last() {
-                self.patches.choose(&before.image);
+            match plane.step(&image) {
+                Some(step) => from_first = from_first.then(&step.to_from),
                 // Whatever cannot be followed is of no use, nor what comes after it.
-                let Some(step) = registered(&self.patches, &mut self.wide, &before.image, &image, &motion) else { break };
-                (motion, from_first) = (step, from_first.then(&step));
+                None if i > 0 => break,
+                None => {}
             }
+            plane.keep(&mut image.clone());
             kept.push(Reference { time_s: i as f64 * step_s, image, other_from_own: from_first });
         }
         self.kept = kept;
@@ -74,22 +69,17 @@ impl References {
 
     /// Takes the next frame, `dt_s` after the last one; where the ground cannot be followed to it all that was kept is forgotten.
     pub fn step(&mut self, now: &Image<f32>, dt_s: f64) {
-        if self.started {
-            self.time_s += dt_s;
-            match registered(&self.patches, &mut self.wide, &self.last, now, &self.motion) {
-                Some(step) => {
-                    let back = step.inverse();
-                    self.kept.iter_mut().for_each(|r| r.other_from_own = back.then(&r.other_from_own));
-                    self.motion = step;
-                }
-                None => {
-                    self.spare.extend(self.kept.drain(..).map(|r| r.image));
-                    self.motion = Homography::identity();
-                }
+        let is_first = !self.has_started();
+        self.time_s += if is_first { 0.0 } else { dt_s };
+        match self.plane.step(now) {
+            Some(step) => {
+                let back = step.to_from.inverse();
+                self.kept.iter_mut().for_each(|r| r.other_from_own = back.then(&r.other_from_own));
             }
+            // Frames shown beforehand are already told from the first one.
+            None if is_first => {}
+            None => self.spare.extend(self.kept.drain(..).map(|r| r.image)),
         }
-        self.started = true;
-        self.own_patches.choose(now);
     }
 
     /// The two kept frames to compare with, each with where it lies; `now` is the frame of the last step.
@@ -97,7 +87,7 @@ impl References {
         let places = self.places()?;
         for place in places {
             let r = &mut self.kept[place];
-            if let Some(direct) = self.own_patches.register(now, &r.image, &r.other_from_own) {
+            if let Some(direct) = self.plane.patches().register(now, &r.image, &r.other_from_own) {
                 r.other_from_own = direct.to_from;
             }
         }
@@ -135,26 +125,6 @@ impl References {
             image.clone_from(now);
             self.kept.push(Reference { time_s: self.time_s, image, other_from_own: Homography::identity() });
         }
-        std::mem::swap(&mut self.last, now);
-        std::mem::swap(&mut self.patches, &mut self.own_patches);
+        self.plane.keep(now);
     }
-}
-
-/// The motion from `before` to `now`: near the last one, or looked for.
-fn registered(
-    patches: &PlanePatches,
-    wide: &mut WideSearch,
-    before: &Image<f32>,
-    now: &Image<f32>,
-    motion: &Homography,
-) -> Option<Homography> {
-    let near = patches.register(before, now, motion);
-    if let Some(clear) = near.filter(Registration::is_clear) {
-        return Some(clear.to_from);
-    }
-    let looked = wide.look(before, now).and_then(|rough| patches.register(before, now, &rough));
-    // A plane through many patches is a better one, then one that they lie close to.
-    let worth = |r: &Registration| r.found / r.spread_px.max(0.05);
-    let best = near.into_iter().chain(looked).max_by(|a, b| worth(a).total_cmp(&worth(b)))?;
-    Some(best.to_from)
 }
