@@ -68,8 +68,7 @@ fn spreads(residuals: &[(Vector2<f64>, Option<f64>)], (w, h): (usize, usize), ou
         for x in 0..CELLS.0 {
             let middle = Vector2::new((x as f64 + 0.5) * cw, (y as f64 + 0.5) * ch);
             let near = |p: &Vector2<f64>| (p.x - middle.x).abs() <= 1.5 * cw && (p.y - middle.y).abs() <= 1.5 * ch;
-            let mut around: Vec<f64> =
-                residuals.iter().filter(|r| near(&r.0)).map(|r| r.1.unwrap_or(f64::INFINITY)).collect();
+            let mut around: Vec<f64> = residuals.iter().filter(|r| near(&r.0)).filter_map(|r| r.1).collect();
             if around.len() < LEAST_AROUND {
                 out.push(0.0);
                 continue;
@@ -106,7 +105,7 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
                     first_patches.residuals(&first, &now, &image_from_first, &mut residuals);
                     if k <= SOLID_FRAMES {
                         solid.resize(residuals.len(), true);
-                        let found = residuals.iter().map(|r| r.1.is_some_and(|far| far < SOLID_PX));
+                        let found = residuals.iter().map(|r| r.1.is_none_or(|far| far < SOLID_PX));
                         solid.iter_mut().zip(found).for_each(|(s, f)| *s &= f);
                     }
                     let mut solid = solid.iter();

@@ -37,9 +37,11 @@ pub struct Seen {
     pub per_frame: f64,
     /// Median of the longer side of their boxes, px.
     pub side_px: f64,
-    /// Chains of these.
+    /// Chains of these in the frames at growing gaps.
     pub chains: Evidence,
-    /// Share of the regions that belong to chains that move.
+    /// Chains of the regions of all frames.
+    pub longer: Evidence,
+    /// Share of the regions that belong to these.
     pub explained: f64,
 }
 
@@ -57,7 +59,7 @@ fn detector(lag_s: f64, info: &SourceInfo) -> DetectorConfig {
     config
 }
 
-/// What moves by itself where the camera moves: the lag whose chains gain most; none where the camera does not, or too few frames are known.
+/// What moves by itself where the camera moves: the longest lag whose chains in all frames surely gain more than the shorter ones'; none where the camera does not, or too few frames are known.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option<Seen>> {
@@ -66,8 +68,9 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Option
     }
     let mut best: Option<Seen> = None;
     for lag_s in LAGS_S {
-        let seen = look_at(lag_s, frames, &growing(frames.len()), &scene.ground, info)?;
-        if best.as_ref().is_none_or(|b| seen.chains.gain() > b.chains.gain()) {
+        let seen = look_at(lag_s, frames, &scene.ground, info)?;
+        // The longer the lag, the more of what stands seems to move: it must surely gain.
+        if best.as_ref().is_none_or(|b| seen.longer.is_surely_more_than(&b.longer)) {
             best = Some(seen);
         }
     }
@@ -86,14 +89,17 @@ pub fn look_beside(
 ) -> Result<Option<Seen>> {
     let Some(seen) = look(frames, scene, info)? else { return Ok(None) };
     let (polarity, of_isolated) = isolated.most();
-    if !seen.chains.is_sure() || seen.explained < LEAST_EXPLAINED || of_isolated.is_surely_more_than(&seen.chains) {
+    if !seen.chains.is_sure() || of_isolated.is_surely_more_than(&seen.chains) {
+        return Ok(None);
+    }
+    if seen.explained < LEAST_EXPLAINED {
         return Ok(None);
     }
     if !seen.chains.is_surely_more_than(of_isolated) {
         // Slow things hardly move between the first frames looked at: all of them tell more.
         let all: Vec<usize> = (0..frames.len()).collect();
         let of_isolated = spots::look_at(frames, &all, &scene.ground, polarity, info, n_threads)?;
-        if !look_at(seen.lag_s, frames, &all, &scene.ground, info)?.chains.is_surely_more_than(&of_isolated.chains) {
+        if !seen.longer.is_surely_more_than(&of_isolated.chains) {
             return Ok(None);
         }
     }
@@ -106,31 +112,32 @@ pub fn look_beside(
     Ok(Some(seen))
 }
 
-/// What is seen with a lag in the frames at these places.
-fn look_at(lag_s: f64, frames: &[Frame], places: &[usize], ground: &[Ground], info: &SourceInfo) -> Result<Seen> {
+/// What is seen with a lag.
+fn look_at(lag_s: f64, frames: &[Frame], ground: &[Ground], info: &SourceInfo) -> Result<Seen> {
     let mut detector = crate::vision::build(&detector(lag_s, info), info)?;
     let start = frames[0].time;
     let first = frames.iter().take_while(|f| f.time.seconds_since(start) <= detector.prime_s()).count();
     detector.prime(&frames[..first])?;
     let (mut scan, mut n, mut sides) = (Scan::default(), 0usize, Vec::new());
-    let mut sightings = Vec::with_capacity(places.len());
+    let mut sightings = Vec::with_capacity(frames.len());
     for (k, frame) in frames.iter().enumerate() {
         detector.detect(frame, &mut scan)?;
-        if places.contains(&k) {
-            n += scan.detections.len();
-            sides.extend(scan.detections.iter().map(|d| d.extent.width_px.max(d.extent.height_px)));
-            sightings.push(Sightings::of(&scan, ground.get(k)));
-        }
+        n += scan.detections.len();
+        sides.extend(scan.detections.iter().map(|d| d.extent.width_px.max(d.extent.height_px)));
+        sightings.push(Sightings::of(&scan, ground.get(k)));
     }
     sides.sort_by(f64::total_cmp);
-    let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
-    let hits: usize = chains.moving.iter().map(|c| c.hits.len()).sum();
+    let area_px2 = (info.width * info.height) as f64;
+    let some: Vec<Sightings> = growing(frames.len()).into_iter().map(|k| sightings[k].clone()).collect();
+    let longer = Evidence::of(&sightings, area_px2);
+    let hits: usize = longer.moving.iter().map(|c| c.hits.len()).sum();
     Ok(Seen {
         lag_s,
-        per_frame: n as f64 / places.len().max(1) as f64,
+        per_frame: n as f64 / frames.len().max(1) as f64,
         side_px: sides.get(sides.len() / 2).copied().unwrap_or(0.0),
+        chains: Evidence::of(&some, area_px2),
         explained: hits as f64 / n.max(1) as f64,
-        chains,
+        longer,
     })
 }
 

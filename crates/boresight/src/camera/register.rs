@@ -23,6 +23,8 @@ const STEP: usize = 4;
 /// Share of patches found, and their deviation, px, from which on a registration is clear.
 const CLEAR_FOUND: f64 = 0.8;
 const CLEAR_SPREAD_PX: f64 = 0.15;
+/// Deviation from which on nothing is registered, px: places within a pixel at random deviate by some 0.5.
+const LOST_SPREAD_PX: f64 = 0.3;
 /// A match that is none.
 pub(super) const NONE: Match = Match { from: Vector2::new(0.0, 0.0), to: Vector2::new(0.0, 0.0), weight: 0.0 };
 
@@ -39,11 +41,16 @@ pub(crate) struct Registration {
     pub to_from: Homography,
     /// Robust deviation of the patches from it, px an axis: their noise, and what is no plane.
     pub spread_px: f64,
-    /// Share of the patches that were found.
+    /// Share of the patches that were found, of those that should lie in the other image.
     pub found: f64,
 }
 
 impl Registration {
+    /// Whether patches lie about as patches of another picture would: then it says nothing.
+    pub fn is_lost(&self) -> bool {
+        self.spread_px > LOST_SPREAD_PX
+    }
+
     /// Whether nearly all patches are found where one plane has them: nothing better is to be looked for.
     pub fn is_clear(&self) -> bool {
         self.found >= CLEAR_FOUND && self.spread_px <= CLEAR_SPREAD_PX
@@ -92,24 +99,26 @@ impl PlanePatches {
     /// Where the plane of `own`, the image of the patches, lies in `other`.
     pub fn register(&self, own: &Image<f32>, other: &Image<f32>, predicted: &Homography) -> Option<Registration> {
         let mut matches = [NONE; plane::MOST_MATCHES];
-        let mut n = 0;
-        for p in &self.patches {
+        let (mut n, mut n_inside) = (0, 0);
+        for p in self.patches.iter().filter(|p| is_inside(other, predicted.apply(p.middle()))) {
+            n_inside += 1;
             if let Some(to) = place(own, other, *p, predicted) {
                 matches[n] = Match { from: p.middle(), to, weight: 1.0 };
                 n += 1;
             }
         }
         // Where half of the patches are not found the prediction is wrong.
-        if 2 * n < self.patches.len() {
+        if 2 * n < n_inside {
             return None;
         }
-        let found = n as f64 / self.patches.len().max(1) as f64;
+        let found = n as f64 / n_inside.max(1) as f64;
         let middle = 0.5 * Vector2::new(own.width() as f64 - 1.0, own.height() as f64 - 1.0);
         let plane = plane::fit(&matches[..n], predicted, middle)?;
         Some(Registration { to_from: plane.to_from, spread_px: plane.spread_px, found })
     }
 
-    /// Appends the middle of each patch and how far from the plane it lies in `other`, px; nothing where it is not found near it.
+    /// Appends the middle of each patch and how far from the plane it lies in `other`, px: infinitely where it is not found near it, not at all where it should
+    /// lie outside.
     pub fn residuals(
         &self,
         own: &Image<f32>,
@@ -117,9 +126,20 @@ impl PlanePatches {
         plane: &Homography,
         out: &mut Vec<(Vector2<f64>, Option<f64>)>,
     ) {
-        let far = |p: &Patch| place(own, other, *p, plane).map(|to| (to - plane.apply(p.middle())).norm());
+        let far = |p: &Patch| {
+            let to = plane.apply(p.middle());
+            let found = || place(own, other, *p, plane).map_or(f64::INFINITY, |at| (at - to).norm());
+            is_inside(other, to).then(found)
+        };
         out.extend(self.patches.iter().map(|p| (p.middle(), far(p))));
     }
+}
+
+/// Whether a patch with that middle lies in the image with a pixel to spare.
+fn is_inside(image: &Image<f32>, middle: Vector2<f64>) -> bool {
+    let reach = 0.5 * PATCH as f64 + 1.0;
+    let (w, h) = (image.width() as f64, image.height() as f64);
+    middle.x >= reach && middle.y >= reach && middle.x < w - reach && middle.y < h - reach
 }
 
 /// Where the middle of a patch of `own` lies in `other`, if it lies within a pixel of the predicted place.

@@ -64,7 +64,7 @@ fn scene(seed: u64, camera: Camera, speeds: &[f64]) -> (Vec<Frame>, Vec<Vec<Vect
         .map(|(i, speed)| {
             let angle = std::f64::consts::TAU * rng.random::<f64>();
             let at = Vector2::new(60.0 + 200.0 * i as f64 / speeds.len() as f64, 60.0 + 120.0 * rng.random::<f64>());
-            let velocity = speed * Vector2::new(angle.cos(), angle.sin());
+            let velocity = *speed * Vector2::new(angle.cos(), angle.sin());
             // In the middle of its way in the middle of the time.
             (at - 0.5 * N_FRAMES as f64 * velocity, velocity)
         })
