@@ -4,7 +4,7 @@
 //! Limits: a camera whose motion is not seen has no such candidate.
 
 use super::digits::round;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
@@ -95,13 +95,15 @@ pub fn look_beside(
     if seen.explained < LEAST_EXPLAINED {
         return Ok(None);
     }
-    if !seen.chains.is_surely_more_than(of_isolated) {
-        // Slow things hardly move between the first frames looked at: all of them tell more.
-        let all: Vec<usize> = (0..frames.len()).collect();
-        let of_isolated = spots::look_at(frames, &all, &scene.ground, polarity, info, n_threads)?;
-        if !seen.longer.is_surely_more_than(&of_isolated.chains) {
-            return Ok(None);
-        }
+    // Slow things hardly move between the first frames looked at: all of them tell more.
+    let all: Vec<usize> = (0..frames.len()).collect();
+    let in_all = spots::look_at(frames, &all, &scene.ground, polarity, info, n_threads)?.chains;
+    // What isolated targets show as well is placed better by them.
+    if seen.longer.gain_beside(&in_all) <= SURE_GAIN {
+        return Ok(None);
+    }
+    if !seen.chains.is_surely_more_than(of_isolated) && !seen.longer.is_surely_more_than(&in_all) {
+        return Ok(None);
     }
     if isolated.is_poor() {
         let faint = faint::better(faint::count(frames, &scene.ground, info, n_threads)?.0);
