@@ -1,9 +1,9 @@
 //! Fuzz target: PNG, JPEG, BMP and PNM images.
 #![no_main]
 
-use boresight_fuzz::{frames, options};
+use boresight_fuzz::{catch_panics_of_others, frames, options};
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: catch_panics_of_others(), |data: &[u8]| {
     // A bitmap is told by its header's length, which mutations seldom hit: they mutate what stands behind it.
     if let Some(rest) = data.strip_prefix(b"BM") {
         let mut bitmap = b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0".to_vec();

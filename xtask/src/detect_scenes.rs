@@ -134,7 +134,7 @@ pub struct Labelled {
 /// Reads one still as 8-bit grey.
 pub fn still(path: &Path) -> Result<Image<u8>> {
     let options = OpenOptions { colour: Colour::Gray, ..OpenOptions::default() };
-    let mut source = open(&path.display().to_string(), &options)?;
+    let mut source = open(path, &options)?;
     match source.next_frame()?.map(|f| f.pixels) {
         Some(Pixels::Gray8(image)) => Ok(image),
         other => anyhow::bail!("{}: expected 8-bit grey, found {:?}", path.display(), other.map(|p| p.kind())),

@@ -81,8 +81,7 @@ fn truth(args: &Args) -> Result<HashMap<u64, [f64; 2]>> {
 pub fn table(args: &Args) -> Result<()> {
     let truth = Arc::new(truth(args)?);
     let base = Config::default();
-    let mut replay =
-        Replay::new(boresight::io::open(&args.clip.display().to_string(), &base.input.open_options())?, 48);
+    let mut replay = Replay::new(boresight::io::open(&args.clip, &base.input.open_options())?, 48);
     let info = replay.info().clone();
     let config = auto::choose(replay.ahead(), &info, &base)?.config;
     let detector = boresight::vision::build(&config.detector, &info)?;

@@ -96,7 +96,7 @@ fn scene(clutter: f64, args: &Args) -> Result<(Vec<Target>, Vec<Scan>)> {
 
 fn point(targets: &[Target], scans: &[Scan], allowed: f64, args: &Args) -> Result<Point> {
     let mut config = Config::default();
-    auto::for_detections(scans, RATE_HZ, Some(allowed), &mut config, &mut Vec::new());
+    auto::for_detections(scans, RATE_HZ, boresight::io::LengthUnit::Pixel, Some(allowed), &mut config, &mut Vec::new());
     let mut tracker = track::build(&config.tracker)?;
     let mut first: Vec<Option<usize>> = vec![None; targets.len()];
     let (mut held, mut all) = (0usize, 0usize);

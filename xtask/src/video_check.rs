@@ -112,9 +112,9 @@ pub fn run(args: &Args) -> Result<()> {
         }
         let start = Instant::now();
         let opened = if args.pipe {
-            boresight::io::video::open_ffmpeg(&file.to_string_lossy(), &options)
+            boresight::io::video::open_ffmpeg(file, &options)
         } else {
-            boresight::io::open(&file.to_string_lossy(), &options)
+            boresight::io::open(file, &options)
         };
         let ours = opened.map_err(anyhow::Error::from).and_then(|mut s| {
             let rows = our_rows(s.as_mut())?;

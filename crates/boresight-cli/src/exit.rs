@@ -20,8 +20,10 @@ pub const HELP: &str = "Exit codes:
 pub fn usage(words: &clap::Error) -> ExitCode {
     if words.kind() == clap::error::ErrorKind::InvalidUtf8 {
         // clap does not say which; neither its form nor a list of options would help.
-        say!("error: a name among the arguments is not UTF-8: {}", not_utf8().join(", "));
-        say!("hint: rename it, or give it a name through a link: ln -s OLD new");
+        say!("error: not UTF-8, where text is needed: {}", not_utf8().join(", "));
+        say!(
+            "hint: names of inputs and outputs may be anything; this one would go into a configuration or a manifest, which are text: rename it, or ln -s OLD new"
+        );
         return ExitCode::from(2);
     }
     let shown = words.print().and_then(|()| std::io::stdout().flush());

@@ -59,7 +59,7 @@ impl FrameWriter {
     pub fn create(dir: &Path, format: FrameFormat, info: &SourceInfo) -> boresight::Result<Self> {
         if format == FrameFormat::Y4m {
             let mut file = BufWriter::with_capacity(1 << 20, AtomicFile::create(dir.join("frames.y4m"))?);
-            header(&mut file, info)?;
+            header(&mut file, FILE, info)?;
             return Ok(Self::File(file));
         }
         let path = dir.join("frames");
@@ -85,7 +85,7 @@ impl FrameWriter {
 
     /// Starts a YUV4MPEG2 stream.
     pub fn stream(mut out: Box<dyn Write>, info: &SourceInfo) -> boresight::Result<Self> {
-        header(&mut out, info)?;
+        header(&mut out, STDOUT, info)?;
         Ok(Self::Stream(out))
     }
 
@@ -93,8 +93,8 @@ impl FrameWriter {
     pub fn put(&mut self, frame: &Frame) -> boresight::Result<()> {
         let (w, h) = (frame.pixels.width(), frame.pixels.height());
         match self {
-            Self::Stream(out) => append(out, frame),
-            Self::File(file) => append(file, frame),
+            Self::Stream(out) => append(out, STDOUT, frame),
+            Self::File(file) => append(file, FILE, frame),
             Self::Folder(folder, format) => {
                 let dir = folder.part_path();
                 let (sixteen, bytes) = match &frame.pixels {
@@ -128,20 +128,21 @@ impl FrameWriter {
     /// Ends the output.
     pub fn finish(self) -> boresight::Result<()> {
         match self {
-            Self::Stream(mut out) => out.flush().map_err(|e| output_error(Path::new(STREAM), e)),
+            Self::Stream(mut out) => out.flush().map_err(|e| output_error(Path::new(STDOUT), e)),
             Self::File(file) => match file.into_inner() {
                 Ok(file) => file.finish(),
-                Err(e) => Err(output_error(Path::new(STREAM), e.into_error())),
+                Err(e) => Err(output_error(Path::new(FILE), e.into_error())),
             },
             Self::Folder(folder, _) => folder.finish(),
         }
     }
 }
 
-/// What a stream of frames is called in errors.
-const STREAM: &str = "frames.y4m";
+/// What frames in one go are called in errors.
+const FILE: &str = "frames.y4m";
+const STDOUT: &str = "standard output";
 
-fn header(out: &mut dyn Write, info: &SourceInfo) -> boresight::Result<()> {
+fn header(out: &mut dyn Write, name: &str, info: &SourceInfo) -> boresight::Result<()> {
     if info.kind != boresight::PixelKind::Gray8 {
         return Err(Error::new(ErrorKind::Config, "YUV4MPEG2 holds 8-bit frames, these have more bits")
             .at("--format y4m")
@@ -150,13 +151,13 @@ fn header(out: &mut dyn Write, info: &SourceInfo) -> boresight::Result<()> {
     // Rates are written as a fraction of thousandths.
     let rate = (info.rate_hz.unwrap_or(ASSUMED_RATE_HZ) * 1000.0).round().max(1.0) as u64;
     let text = format!("YUV4MPEG2 W{} H{} F{rate}:1000 Ip A1:1 Cmono\n", info.width, info.height);
-    out.write_all(text.as_bytes()).map_err(|e| output_error(Path::new(STREAM), e))
+    out.write_all(text.as_bytes()).map_err(|e| output_error(Path::new(name), e))
 }
 
-fn append(out: &mut dyn Write, frame: &Frame) -> boresight::Result<()> {
+fn append(out: &mut dyn Write, name: &str, frame: &Frame) -> boresight::Result<()> {
     let Pixels::Gray8(image) = &frame.pixels else {
-        return Err(Error::new(ErrorKind::Unsupported, "YUV4MPEG2 holds 8-bit grey frames").at(STREAM));
+        return Err(Error::new(ErrorKind::Unsupported, "YUV4MPEG2 holds 8-bit grey frames").at(name));
     };
     let written = out.write_all(b"FRAME\n").and_then(|()| out.write_all(image.as_slice()));
-    written.map_err(|e| output_error(Path::new(STREAM), e))
+    written.map_err(|e| output_error(Path::new(name), e))
 }

@@ -2,6 +2,8 @@
 //!
 //! Rust's runtime opens `/dev/null` in the place of a standard stream that is closed (`>&-`), before `main`: what is written there is lost without an error. So it is asked
 //! earlier, by a function that the loader calls (`.init_array`, as the ELF specification has it).
+//! Afterwards it cannot be told: what the runtime opened has the flags, the device and the number (`/proc/self/fdinfo/1`: 0100002, read and write) that
+//! Python's `subprocess.DEVNULL` and daemons give a program whose output is not wanted, and that is no mistake.
 //! Limits: Linux; elsewhere a closed stream passes for one that is not read. The one file of the command with unsafe code: naming a section is, for what stands there runs before
 //! the runtime; the function below allocates, asks the file system, and stores one word.
 

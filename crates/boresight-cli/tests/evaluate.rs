@@ -139,6 +139,58 @@ fn frames_from_zero_on_request_score_the_same() {
 }
 
 #[test]
+fn a_truth_that_counts_from_one_is_told_and_read_when_it_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let named = |from: usize| {
+        let row = |f: usize| format!("{},1,{},20,12,12\n", f + from, 10.0 + 3.0 * f as f64);
+        "frame,track_id,left,top,width,height\n".to_string() + &(0..40).map(row).collect::<String>()
+    };
+    let (one, zero) = (put(dir.path(), "one.csv", &named(1)), put(dir.path(), "zero.csv", &named(0)));
+    for (truth, result, option) in [(&one, &zero, "--truth-from-one"), (&zero, &one, "--result-from-one")] {
+        let off = boresight(&["evaluate", truth, result, "--mot-only"]);
+        assert!(text(&off.stderr).contains(&format!("try {option}")), "{}", text(&off.stderr));
+        let out = boresight(&["evaluate", truth, result, "--mot-only", option, "--require", "HOTA=1"]);
+        assert!(out.status.success() && text(&out.stderr).is_empty(), "{option}: {}", text(&out.stderr));
+    }
+    // The mistake the other way round: MOTChallenge's count from 1, these from 0, without a row that shows it.
+    let later = |from| tracks(1, from, 0.0, true).lines().skip(1).map(|l| format!("{l}\n")).collect::<String>();
+    let truth = put(dir.path(), "gt.txt", &later(1));
+    let result = put(dir.path(), "zero.txt", &later(0));
+    let off = boresight(&["evaluate", &truth, &result, "--mot-only", "--rules", "none"]);
+    assert!(text(&off.stderr).contains("try --result-from-zero"), "{}", text(&off.stderr));
+    let said = boresight(&["evaluate", &result, &truth, "--mot-only", "--rules", "none"]);
+    assert!(text(&said.stderr).contains("try --truth-from-zero"), "{}", text(&said.stderr));
+}
+
+#[test]
+fn tables_in_metres_are_judged_in_metres() {
+    let dir = tempfile::tempdir().unwrap();
+    let table = |unit: &str, dx: f64| {
+        let row = |f: usize| format!("{f},1,{},20\n", 3.0 * f as f64 + dx);
+        format!("frame,track_id,x{unit},y{unit}\n") + &(0..40).map(row).collect::<String>()
+    };
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    for (unit, sign, other) in [("_m", "m", "px"), ("_px", "px", "m"), ("", "px", "m")] {
+        let truth = put(dir.path(), "truth.csv", &table(unit, 0.0));
+        let result = put(dir.path(), "result.csv", &table(unit, 1.5));
+        let (json, html) = (at("e.json"), at("e.html"));
+        let out = boresight(&["evaluate", &truth, &result, "--json", &json, "--html", &html]);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+        let (units, detail) = (&json["results"][0]["units"], &json["results"][0]["sequences"][0]["detail"]);
+        assert_eq!(units["RMSE"], sign, "{units}");
+        assert_eq!(units["GOSPA_location"], format!("{sign}^p"));
+        assert_eq!(detail["particle"][format!("rmse_{sign}")], 1.5, "{}", detail["particle"]);
+        assert!(detail["particle"].get(format!("rmse_{other}")).is_none());
+        let page = std::fs::read_to_string(html).unwrap();
+        assert!(page.contains(&format!("root mean square, {sign}<")), "{sign}");
+        assert!(page.contains(&format!("cost, {sign}^p")) && page.contains(&format!("<small>{sign}</small>")));
+        assert!(!page.contains(&format!("<small>{other}</small>")), "{other}");
+        assert_eq!(text(&out.stdout).contains("Distances are in m"), sign == "m");
+    }
+}
+
+#[test]
 fn folders_of_sequences_are_found_combined_and_compared() {
     let dir = tempfile::tempdir().unwrap();
     for seq in ["a", "b"] {

@@ -2,6 +2,7 @@
 
 use crate::source::{Arrived, Content};
 use boresight::auto::{self, DetectorKind, Request};
+use boresight::io::LengthUnit;
 use boresight::vision::Detector;
 use boresight::{Config, Error, ErrorKind, Frame, FrameSource, Result, Scan, SourceInfo, vision};
 use std::time::{Instant, SystemTime};
@@ -97,7 +98,7 @@ impl Kept {
         let Some(mut info) = self.info else {
             let rate_hz = mean_rate_hz(&self.scans).unwrap_or(base.input.rate_hz);
             let (mut config, mut reasons) = (set(base.clone())?, Vec::new());
-            auto::for_detections(&self.scans, rate_hz, None, &mut config, &mut reasons);
+            auto::for_detections(&self.scans, rate_hz, LengthUnit::Pixel, None, &mut config, &mut reasons);
             let contents = self.scans.into_iter().map(Content::Scan);
             let kept = contents.zip(self.clocks).map(|(content, c)| arrived(content, c)).collect();
             return Ok(Ready { config: set(config)?, reasons, detector: None, kept });

@@ -181,7 +181,14 @@ impl Wishes {
         } else {
             match turn {
                 Some((turn_s, unit)) => auto::for_radar(&scans, turn_s, unit, &mut config, &mut reasons),
-                None => auto::for_detections(&scans, rate_hz, self.false_tracks_per_hour, &mut config, &mut reasons),
+                None => auto::for_detections(
+                    &scans,
+                    rate_hz,
+                    io::LengthUnit::Pixel,
+                    self.false_tracks_per_hour,
+                    &mut config,
+                    &mut reasons,
+                ),
             }
             auto::report_whole(rate_hz, &mut config, &mut reasons);
             config = changed(config, &self.sets)?;

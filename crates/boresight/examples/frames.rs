@@ -24,7 +24,7 @@ fn run() -> Result<()> {
             _ => input = word,
         }
     }
-    let mut source = open(&input, &options)?;
+    let mut source = open(input, &options)?;
     eprintln!("{:?}", source.info());
     let mut out = std::io::stdout().lock();
     while let Some(frame) = source.next_frame()? {

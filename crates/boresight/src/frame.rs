@@ -108,6 +108,32 @@ pub struct SourceInfo {
 pub type Wanted = Box<dyn Fn(u64) -> bool + Send + Sync>;
 
 /// A sequence of frames.
+///
+/// One of one's own, a dot that moves through ten frames:
+/// ```
+/// use boresight::{Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp};
+///
+/// struct Dot(SourceInfo, u64);
+///
+/// impl FrameSource for Dot {
+///     fn info(&self) -> &SourceInfo {
+///         &self.0
+///     }
+///     fn next_frame(&mut self) -> Result<Option<Frame>> {
+///         let Self(info, k) = self;
+///         let mut image = Image::filled(info.width, info.height, 10_u8);
+///         image.as_mut_slice()[*k as usize] = 200;
+///         *k += 1;
+///         let time = Timestamp::from_secs_f64(*k as f64 / 25.0);
+///         Ok((*k <= 10).then(|| Frame { index: FrameIndex(*k - 1), time, pixels: Pixels::Gray8(image) }))
+///     }
+/// }
+///
+/// let (label, reader) = ("dot".to_string(), "made here".to_string());
+/// let (kind, n_frames, rate_hz) = (PixelKind::Gray8, Some(10), Some(25.0));
+/// let mut dot = Dot(SourceInfo { label, reader, width: 16, height: 12, kind, n_frames, rate_hz, true_times: true }, 0);
+/// assert_eq!(std::iter::from_fn(|| dot.next_frame().ok().flatten()).count(), 10);
+/// ```
 pub trait FrameSource: Send {
     /// What is known of the sequence.
     fn info(&self) -> &SourceInfo;

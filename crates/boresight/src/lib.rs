@@ -80,6 +80,7 @@ pub mod fuse;
 mod homography;
 mod image;
 pub mod io;
+mod length_unit;
 mod memory_budget;
 pub mod metrics;
 #[cfg(any(feature = "draw", feature = "report"))]
@@ -110,7 +111,7 @@ pub(crate) use homography::Homography;
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use similarity::Similarity;
-pub use time::{ASSUMED_RATE_HZ, FrameIndex, Timestamp};
+pub use time::{ASSUMED_RATE_HZ, FrameIndex, Timestamp, shown_rate};
 pub use tracks::{Column, PixelOrigin, RowState, StateColumns, TrackRow, TrackTable, TrackTableBuilder};
 pub use view::{Sink, View};
 

@@ -9,6 +9,7 @@
 //! (`pipeline/finders.rs`); the results are the same bytes for any number of threads.
 
 mod finders;
+mod held;
 mod made;
 mod outputs;
 mod primed;
@@ -17,9 +18,10 @@ mod retrospect;
 mod scans;
 mod summary;
 
+use self::held::Held;
 use self::outputs::{Counts, Outputs};
 pub(crate) use self::primed::prime;
-use self::retrospect::{Held, Retrospect};
+use self::retrospect::Retrospect;
 use self::scans::Scans;
 pub use self::summary::{StageTimes, Summary};
 use crate::track::Tracking;
@@ -35,8 +37,8 @@ pub enum Input {
     Frames(Box<dyn FrameSource>, Box<dyn Detector>),
     /// Detections made before, in time order.
     Scans(Vec<Scan>),
-    /// Detections made before, and a frame for each of them, to be drawn on: all are tracked before the first is shown, so that the tracks are those of the
-    /// detections alone however many frames fit into memory.
+    /// Detections made before, and a frame for each of them, to be drawn on. A frame is read when the tracks of its scan are given out, so that the tracks are
+    /// those of the detections alone however many frames fit into memory.
     Pictured(Box<dyn FrameSource>, Vec<Scan>),
 }
 
@@ -89,7 +91,10 @@ pub fn run_on(
     let mut summary = Summary::default();
     let mut counts = Counts::default();
     let mut outputs = Outputs { sinks, unwritten: Vec::new() };
-    let held = Retrospect::new(tracking.as_ref().map_or(0.0, |t| t.retrospective_s()));
+    let held = Retrospect::new(
+        tracking.as_ref().map_or(0.0, |t| t.retrospective_s()),
+        tracking.as_ref().and_then(|t| t.backward()),
+    );
     let run = Run {
         tracking: &mut tracking,
         outputs: &mut outputs,
@@ -140,30 +145,22 @@ fn drive(
             Ok(())
         }
         Input::Pictured(mut pictures, scans) => {
-            let mut tracked = Vec::with_capacity(scans.len());
-            for scan in scans {
-                run.track(None, 0, scan);
-                tracked.extend(std::iter::from_fn(|| run.held.pop(false)));
-            }
-            tracked.extend(std::iter::from_fn(|| run.held.pop(true)));
-            run.summary.frames = 0;
-            // What is left out is known at their end, which is one behind the last scan.
-            let mut tracked = tracked.into_iter();
+            let mut scans = scans.into_iter();
             let outcome = loop {
-                let started = Instant::now();
-                let frame = pictures.next_frame();
-                run.summary.times.read += started.elapsed();
-                let (frame, held) = match (frame, tracked.next()) {
-                    (Err(e), _) => break Err(e),
-                    (Ok(_), None) => break Ok(()),
-                    (Ok(frame), Some(held)) => (frame.filter(|f| f.index == held.scan.index), held),
-                };
-                run.summary.frames += 1;
-                if run.put(frame.as_ref(), &held).is_break() || asked(run.summary).is_break() {
-                    break Ok(());
+                let Some(scan) = scans.next() else { break run.give_pictured(true, &mut *pictures).map(|_| ()) };
+                run.track(None, 0, scan);
+                match run.give_pictured(false, &mut *pictures) {
+                    Ok(ControlFlow::Continue(())) => {}
+                    Ok(ControlFlow::Break(())) => break Ok(()),
+                    Err(e) => break Err(e),
                 }
-                frame.into_iter().for_each(|f| pictures.recycle(f));
+                if asked(run.summary).is_break() {
+                    break run.give_pictured(true, &mut *pictures).map(|_| ());
+                }
             };
+            // What is left out is known at their end, which is one behind the last scan.
+            let outcome =
+                if run.summary.interrupted { outcome } else { outcome.and_then(|()| pictures.next_frame().map(drop)) };
             run.summary.warnings = pictures.warnings().to_vec();
             outcome
         }
@@ -251,6 +248,28 @@ impl Run<'_, '_> {
         self.summary.times.write += started.elapsed();
         self.counts.add(&held.tracks, self.summary);
         written
+    }
+
+    /// As [`Run::give_out`], each scan with its picture, which is read only now.
+    fn give_pictured(&mut self, all: bool, pictures: &mut dyn FrameSource) -> Result<ControlFlow<()>> {
+        while let Some(held) = self.held.pop(all) {
+            let started = Instant::now();
+            let frame = loop {
+                match pictures.next_frame()? {
+                    // Of a scan that the tracker refused.
+                    Some(frame) if frame.index < held.scan.index => pictures.recycle(frame),
+                    frame => break frame.filter(|f| f.index == held.scan.index),
+                }
+            };
+            self.summary.times.read += started.elapsed();
+            let written = self.put(frame.as_ref(), &held);
+            frame.into_iter().for_each(|f| pictures.recycle(f));
+            self.held.recycle(held.tracks);
+            if written.is_break() {
+                return Ok(ControlFlow::Break(()));
+            }
+        }
+        Ok(ControlFlow::Continue(()))
     }
 
     /// Gives every sink the scans that need not wait any longer, or all of them; breaks when no sink is left.

@@ -47,6 +47,13 @@ impl Timestamp {
     }
 }
 
+/// A rate as people read it: five significant digits, no zeros behind the point (30, 29.97, 0.4).
+pub fn shown_rate(rate_hz: f64) -> String {
+    let magnitude = rate_hz.abs().max(1e-9).log10().floor() as i32;
+    let text = format!("{rate_hz:.*}", (4 - magnitude).clamp(0, 12) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
+}
+
 /// Refuses a rate whose frames whole nanoseconds cannot tell apart, or that 64 bits of them hold only a few of.
 pub(crate) fn check_rate(rate_hz: f64) -> Result<()> {
     if (1e-6..=1e9).contains(&rate_hz) {
@@ -67,6 +74,13 @@ mod tests {
         assert_eq!(Timestamp::from_ticks(3003, 1, 90_000).ns, 33_366_667);
         assert_eq!(Timestamp::from_ticks(-3003, 1, 90_000).ns, -33_366_667);
         assert_eq!(Timestamp::from_ticks(1, 1001, 30_000).ns, 33_366_667);
+    }
+
+    #[test]
+    fn rates_are_shown_without_digits_that_say_nothing() {
+        let rates = [30.0, 30_000.0 / 1001.0, 23.976, 0.4, 1.0 / 2.5, 1000.0, 123_456.7, 1e-6, 100.000_01];
+        let shown = ["30", "29.97", "23.976", "0.4", "0.4", "1000", "123457", "0.000001", "100"];
+        assert_eq!(rates.map(shown_rate), shown);
     }
 
     #[test]

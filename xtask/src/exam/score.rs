@@ -72,8 +72,7 @@ pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until:
     let mut truth = truth(&clip.truth, &clip.columns)?;
     truth.retain(|r| until.is_none_or(|u| r.frame < u));
     let started = std::time::Instant::now();
-    let (mut source, mut choice) =
-        auto::open_and_choose(&clip.input.display().to_string(), &Config::default(), request)?;
+    let (mut source, mut choice) = auto::open_and_choose(&clip.input, &Config::default(), request)?;
     let changed = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
     // As the command does: what is set holds for the first pass as well, and is not overruled by it.
     choice.config = changed(choice.config)?;

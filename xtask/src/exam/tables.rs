@@ -27,7 +27,7 @@ pub fn run(data: &Path, only: &str, sort: Option<&Path>) -> Result<String> {
             }
             let read = read_detections(folder.join(detections), &TableOptions::default())?;
             let mut config = Config::default();
-            auto::for_detections(&read.scans, read.rate_hz, None, &mut config, &mut Vec::new());
+            auto::for_detections(&read.scans, read.rate_hz, read.unit, None, &mut config, &mut Vec::new());
             auto::report_whole(read.rate_hz, &mut config, &mut Vec::new());
             let truth = table(&folder.join("gt.txt"))?;
             let scores = judged(&truth, &tracked(&config.tracker, &read.scans)?, rules)?;

@@ -29,7 +29,7 @@ fn uniform(places: &[[f64; 2]]) -> ([f64; 2], usize) {
 
 /// Positions in every fifth frame, and the share of them that is fitted.
 fn ours(folder: &Path, fit: Option<FitConfig>) -> Result<(Vec<[f64; 2]>, f64)> {
-    let mut source = boresight::io::open(&folder.join("frames").display().to_string(), &Default::default())?;
+    let mut source = boresight::io::open(folder.join("frames"), &Default::default())?;
     // Particles of diameter 11 px, darker than the water, as trackpy's walkthrough looks for them.
     let spot = SpotConfig {
         size_px: 11.0,

@@ -62,7 +62,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.output.as_os_str() != "-" {
         refuse_to_overwrite(&args.input, [args.output.as_path()])?;
     }
-    let options = ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, frames_from_zero: args.from_zero };
+    let options =
+        ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: true, first_frame: args.from_zero.then_some(0) };
     let mut file = read(&args.input, args.from, options, args.tentative)?;
     file.table.size_px = args.size.map(|(w, h)| [w as u32, h as u32]);
     if let Some(first) = &file.bad.first {

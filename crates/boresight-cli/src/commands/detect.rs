@@ -1,6 +1,7 @@
 //! `boresight detect`: frames in, detections out.
 
 use super::run_options::{self, InputArgs, TrackerArgs};
+use super::run_outcome;
 use super::stop::Stop;
 use crate::console::say;
 use crate::progress;
@@ -36,8 +37,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let stop = Stop::on_signal()?;
     let plan = run_options::plan(&args.input, &TrackerArgs::default(), None)?;
     let sink = if to_stdout { DetectionsCsv::to(Output::stdout())? } else { DetectionsCsv::create(&path)? };
-    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
-    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(unit);
+    let sink = sink.with_fits(plan.config.detector.centroid.fit.is_some()).with_unit(plan.unit);
     if !args.input.quiet {
         plan.reasons.iter().for_each(|r| say!("  {r}"));
     }
@@ -51,10 +51,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     bar.finish_and_clear();
     if !args.input.quiet {
         say!("{} frames, {} detections", done.summary.frames, done.summary.detections);
-        if let Some(fits) = run_options::fits(&done.summary) {
+        if let Some(fits) = run_outcome::fits(&done.summary) {
             say!("{fits}");
         }
     }
     plan.lost.iter().chain(&done.summary.warnings).for_each(|w| say!("warning: {w}"));
-    run_options::outcome(&args.input.input, done)
+    run_outcome::outcome(&args.input.input, done)
 }

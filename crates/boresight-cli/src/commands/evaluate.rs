@@ -18,6 +18,7 @@ use boresight::metrics::evaluation::{self, Comparison, ResultEvaluation};
 use demand::met;
 use judged::Judged;
 use rayon::prelude::*;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -30,7 +31,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.distance > 0.0 && args.distance.is_finite()) {
         bail!(boresight::Error::new(boresight::ErrorKind::Config, "expected a distance above 0 px").at("--distance"));
     }
-    let named = [&args.truth, &args.result].into_iter().chain(&args.compare).chain(&args.detections);
+    let detections = args.detections.as_ref().map(OsString::from);
+    let named = [&args.truth, &args.result].into_iter().chain(&args.compare).chain(&detections);
     named.into_iter().try_for_each(|input| refuse(&args, input))?;
     if images::are_frames(&args.truth) {
         return images::run(&args);
@@ -41,7 +43,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         found.iter().flat_map(|s| [Some(&s.truth), s.result.as_ref()]).flatten().try_for_each(|i| refuse(&args, i))?;
         let read: Vec<_> = found.par_iter().map(|s| read::judge(&args, s)).collect::<boresight::Result<_>>()?;
         let (sequences, notes): (Vec<_>, Vec<Vec<String>>) = read.into_iter().unzip();
-        let evaluation = ResultEvaluation::new(result, sequences);
+        let evaluation = ResultEvaluation::new(result.to_string_lossy(), sequences);
         let notes = named_notes(&evaluation, notes);
         for note in &notes {
             say!("note: {note}");

@@ -15,6 +15,7 @@ pub mod preview;
 pub mod reproduce;
 mod run_folder;
 mod run_options;
+mod run_outcome;
 mod run_summary;
 pub mod sensor;
 pub mod simulate;

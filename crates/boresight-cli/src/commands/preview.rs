@@ -3,6 +3,7 @@
 use super::command_line;
 use crate::console::say;
 use boresight::{Config, auto};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 pub struct Args {
     /// A video, a folder or glob of images, an image stack.
     #[arg(value_name = "INPUT")]
-    input: String,
+    input: OsString,
     /// The page; INPUT's name with `.preview.html` if absent.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -41,7 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let output = args.output.clone().unwrap_or_else(|| super::run_options::default_folder(&args.input, "preview.html"));
     boresight::io::refuse_to_overwrite(&args.input, [output.as_path()])?;
     let mut base = args.sets.iter().try_fold(Config::default(), |c, set| c.with(set))?;
-    let mut command = format!("boresight track {}", command_line::word(&args.input));
+    let mut command = format!("boresight track {}", command_line::os_word(&args.input));
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
         command.push_str(&format!(" --rate-hz {rate}"));

@@ -6,6 +6,7 @@
 use super::run_options::Plan;
 use boresight::io::{AtomicFile, is_same_file};
 use boresight::{Error, ErrorKind};
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +48,7 @@ impl RunFolder {
     /// A folder that `made` will be written to (names of [`NAMES`]), unless that would replace the input.
     /// # Errors
     /// Standard output instead of a folder; the input in the place of an output.
-    pub fn new(dir: PathBuf, made: Vec<&'static str>, input: &str) -> boresight::Result<Self> {
+    pub fn new(dir: PathBuf, made: Vec<&'static str>, input: &OsStr) -> boresight::Result<Self> {
         if dir.as_os_str() == "-" {
             return Err(Error::new(ErrorKind::Config, "expected a folder: the results are several files")
                 .at("--output -")
@@ -61,7 +62,7 @@ impl RunFolder {
     /// Refuses an input in the place of an output.
     /// # Errors
     /// [`ErrorKind::Output`] that names both.
-    pub fn spares(&self, input: &str) -> boresight::Result<()> {
+    pub fn spares(&self, input: &OsStr) -> boresight::Result<()> {
         let outputs: Vec<PathBuf> = self.made.iter().map(|name| self.path(name)).collect();
         boresight::io::refuse_to_overwrite(input, outputs.iter().map(PathBuf::as_path))
             .map_err(|e| e.hint("give a folder of its own with --output DIR"))
@@ -100,7 +101,7 @@ impl RunFolder {
     }
 
     /// What an earlier run says it made here and this run does not make, but for the input itself.
-    fn left_over(&self, input: &str) -> Vec<PathBuf> {
+    fn left_over(&self, input: &OsStr) -> Vec<PathBuf> {
         let earlier = std::fs::read_to_string(self.path("config.toml")).unwrap_or_default();
         let listed = earlier.lines().find_map(|l| l.strip_prefix(LIST)).unwrap_or_default();
         let gone = NAMES.iter().filter(|n| listed.split_whitespace().any(|l| l == **n) && !self.makes(n));
@@ -110,7 +111,7 @@ impl RunFolder {
     /// Begins `config.toml`, which appears with the results of the run.
     /// # Errors
     /// A file that cannot be written.
-    pub fn begin_config(&self, plan: &Plan, input: &str) -> boresight::Result<ConfigFile> {
+    pub fn begin_config(&self, plan: &Plan, input: &OsStr) -> boresight::Result<ConfigFile> {
         let mut text = format!(
             "# The configuration of this run; `--config` with this file gives the identical result.\n{LIST} {}\n",
             self.made.join(" ")

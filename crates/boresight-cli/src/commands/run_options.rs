@@ -1,13 +1,13 @@
 //! What `track` and `detect` share: the input, the configuration or its automatic choice, the outcome.
 
-use crate::console::say;
 use boresight::FrameSource as _;
 use boresight::auto;
-use boresight::io::{Pictures, SequenceInfo};
-use boresight::pipeline::{Input, Outcome};
+use boresight::io::{LengthUnit, Pictures, SequenceInfo};
+use boresight::pipeline::Input;
 use boresight::{Config, Error, ErrorKind, vision};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Where frames come from and how they are treated.
 #[derive(Debug, clap::Args)]
@@ -15,7 +15,7 @@ pub struct InputArgs {
     /// A video, a folder or glob of images, an image stack, `-` for YUV4MPEG2 on standard input, a stream's address, a camera
     /// (/dev/video0), or a table of detections (.csv, .txt).
     #[arg(value_name = "INPUT")]
-    pub input: String,
+    pub input: OsString,
     /// Configuration file; without it everything is chosen by looking at the first frames.
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -31,6 +31,12 @@ pub struct InputArgs {
     /// Columns of a table of detections whose names are not understood: `x=cx,y=cy,frame=t`; numbers count columns from 1.
     #[arg(long, value_name = "PAIRS")]
     pub columns: Option<String>,
+    /// Least score of a detection: of a table's rows, or of the detector `isolated`.
+    #[arg(long, value_name = "SCORE", allow_negative_numbers = true)]
+    pub min_score: Option<f32>,
+    /// What a table's positions are counted in: px or m. Without it what its columns' names say (x_m), else px.
+    #[arg(long, value_name = "UNIT", value_parser = unit())]
+    pub units: Option<LengthUnit>,
     /// Leave out rows of a table that cannot be read, and count them.
     #[arg(long)]
     pub skip_bad_rows: bool,
@@ -68,6 +74,10 @@ pub struct TrackerArgs {
     pub false_tracks_per_hour: Option<f64>,
 }
 
+fn unit() -> impl TypedValueParser<Value = LengthUnit> {
+    PossibleValuesParser::new(["px", "m"]).map(|name| if name == "m" { LengthUnit::Metre } else { LengthUnit::Pixel })
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0".to_string())
 }
@@ -84,9 +94,27 @@ pub struct Plan {
     pub lost: Vec<String>,
     /// What is known of the source.
     pub info: Option<boresight::SourceInfo>,
+    /// What positions are counted in.
+    pub unit: LengthUnit,
     /// Where the radar was, of a radar's plots.
     pub radar: Option<boresight::io::RadarPicture>,
     n_scans: Option<u64>,
+}
+
+impl Plan {
+    /// The plan of a run on frames.
+    fn of_frames(input: Input, config: Config, reasons: Vec<String>, info: boresight::SourceInfo) -> Self {
+        Self {
+            input,
+            config,
+            reasons,
+            lost: Vec::new(),
+            info: Some(info),
+            unit: LengthUnit::Pixel,
+            radar: None,
+            n_scans: None,
+        }
+    }
 }
 
 impl Plan {
@@ -97,7 +125,7 @@ impl Plan {
 }
 
 /// Opens the input and settles the configuration; `frames` are the pictures of a table.
-pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> anyhow::Result<Plan> {
+pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> anyhow::Result<Plan> {
     if let Some(mb) = args.max_memory {
         boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
     }
@@ -138,9 +166,14 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
     if boresight::io::is_table(&args.input) {
         return plan_table(args, tracker, given, base, frames);
     }
+    if args.units == Some(LengthUnit::Metre) {
+        return Err(Error::new(ErrorKind::Config, "frames are in pixels, only tables can be in metres")
+            .at("--units m")
+            .into());
+    }
     if let Some(frames) = frames {
         return Err(Error::new(ErrorKind::Config, "only a table of detections needs pictures beside it")
-            .at(format!("--frames {frames}"))
+            .at(format!("--frames {}", frames.display()))
             .hint("leave --frames out: the input is frames itself")
             .into());
     }
@@ -152,7 +185,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));
         let input = Input::Frames(source, detector);
-        return Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None });
+        return Ok(Plan::of_frames(input, config, reasons, info));
     }
     let request = auto::Request {
         detector: args.detector,
@@ -167,7 +200,7 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&str>) -> an
     let config = changed(choice.config, args, tracker)?;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
-    Ok(Plan { input, config, reasons, lost: Vec::new(), info: Some(info), radar: None, n_scans: None })
+    Ok(Plan::of_frames(input, config, reasons, info))
 }
 
 /// A sentence that names the detector's keys that are set in vain.
@@ -193,6 +226,19 @@ fn changed(mut config: Config, args: &InputArgs, tracker: &TrackerArgs) -> anyho
     if tracker.no_stitch {
         config.tracker.reidentification.max_gap_s = 0.0;
     }
+    if let Some(score) = args.min_score.filter(|_| !boresight::io::is_table(&args.input)) {
+        let name = config.detector.threshold.name();
+        if name != "isolated" {
+            let e = Error::new(ErrorKind::Config, format!("the detector is {name}, which has no least score"));
+            return Err(e
+                .at(format!("--min-score {score}"))
+                .hint(format!(
+                    "`boresight config --explain detector.threshold.{name}` lists its keys; --detector isolated has one"
+                ))
+                .into());
+        }
+        config = config.with(&format!("detector.threshold.isolated.min-score={score:?}"))?;
+    }
     for set in &args.sets {
         config = config.with(set)?;
     }
@@ -204,7 +250,7 @@ fn plan_table(
     tracker: &TrackerArgs,
     given: Option<Config>,
     base: Config,
-    frames: Option<&str>,
+    frames: Option<&OsStr>,
 ) -> anyhow::Result<Plan> {
     let mut base = base;
     let sequence = SequenceInfo::beside(Path::new(&args.input));
@@ -221,10 +267,16 @@ fn plan_table(
     }
     options.rate_hz = args.rate_hz.or(options.rate_hz);
     options.skip_bad_rows |= args.skip_bad_rows;
+    options.unit = args.units.or(options.unit);
+    options.min_score = args.min_score.or(options.min_score);
     let table = boresight::io::read_detections(&args.input, &base.input.table_options())?;
+    if table.radar.is_some() && (args.min_score.is_some() || args.units.is_some_and(|u| u != table.unit)) {
+        let e = Error::new(ErrorKind::Config, "a radar's plots have no scores, and their columns name their units");
+        return Err(e.at(args.input.display()).hint("leave --min-score and --units out").into());
+    }
     if table.scans.is_empty() {
         return Err(Error::new(ErrorKind::Damaged, "the table has no rows: there is nothing to track")
-            .at(&args.input)
+            .at(args.input.display())
             .into());
     }
     let n_read = table.n_rows - table.n_skipped;
@@ -238,7 +290,7 @@ fn plan_table(
         None => format!(
             "{n_read} detections in {} frames at {} frames/s, read as {}.",
             table.scans.len(),
-            table.rate_hz,
+            boresight::shown_rate(table.rate_hz),
             table.format
         ),
     }];
@@ -252,7 +304,9 @@ fn plan_table(
             let allowed = tracker.false_tracks_per_hour;
             match &table.radar {
                 Some(radar) => auto::for_radar(&table.scans, radar.turn_s, radar.unit, &mut config, &mut reasons),
-                None => auto::for_detections(&table.scans, table.rate_hz, allowed, &mut config, &mut reasons),
+                None => {
+                    auto::for_detections(&table.scans, table.rate_hz, table.unit, allowed, &mut config, &mut reasons)
+                }
             }
             auto::report_whole(table.rate_hz, &mut config, &mut reasons);
         }
@@ -262,14 +316,20 @@ fn plan_table(
     let (input, info) = match frames {
         Some(frames) if table.radar.is_some() => {
             return Err(Error::new(ErrorKind::Config, "a radar's plots have no pictures to be drawn on")
-                .at(format!("--frames {frames}"))
+                .at(format!("--frames {}", frames.display()))
                 .hint("leave --frames out: the report draws a map")
+                .into());
+        }
+        Some(frames) if table.unit == LengthUnit::Metre => {
+            return Err(Error::new(ErrorKind::Config, "positions in metres have no place on pictures")
+                .at(format!("--frames {}", frames.display()))
+                .hint("leave --frames out, or say --units px")
                 .into());
         }
         Some(frames) => {
             let pictures = Pictures::open(frames, &config.input.open_options(), &table, &sequence)?;
             let info = pictures.info().clone();
-            reasons.push(format!("Drawn on the pictures of {frames}, read as {}.", info.reader));
+            reasons.push(format!("Drawn on the pictures of {}, read as {}.", frames.display(), info.reader));
             (Input::Pictured(Box::new(pictures), table.scans), Some(info))
         }
         None => {
@@ -279,53 +339,15 @@ fn plan_table(
             (Input::Scans(table.scans), None)
         }
     };
-    Ok(Plan { input, config, reasons, lost: table.lost, info, radar: table.radar, n_scans })
+    Ok(Plan { input, config, reasons, lost: table.lost, info, unit: table.unit, radar: table.radar, n_scans })
 }
 
 /// INPUT's name beside the working directory, with an ending.
-pub fn default_folder(input: &str, ending: &str) -> PathBuf {
-    let name = Path::new(input)
-        .file_stem()
-        .and_then(|s| s.to_str())
-        .filter(|s| !s.is_empty() && *s != "-")
-        .unwrap_or("boresight");
+pub fn default_folder(input: impl AsRef<Path>, ending: &str) -> PathBuf {
+    let stem = input.as_ref().file_stem().map(OsStr::to_string_lossy);
+    let name = stem.filter(|s| !s.is_empty() && s != "-").unwrap_or("boresight".into());
     let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     PathBuf::from(format!("{name}.{ending}"))
-}
-
-/// A sentence on how many positions are fitted, where a fit was asked for.
-pub fn fits(s: &boresight::pipeline::Summary) -> Option<String> {
-    let [fitted, kept] = s.fits;
-    (fitted + kept > 0).then(|| {
-        format!(
-            "{fitted} positions by fitted spots; {kept} by the centroid, since the fit was poor or the target too large"
-        )
-    })
-}
-
-/// The exit code of a run, or what went wrong: an output that is not there weighs more than an input that breaks off.
-/// # Errors
-/// The first output's that was abandoned (the others are said), what broke the run off, an input without a frame.
-pub fn outcome(input: &str, done: Outcome) -> anyhow::Result<ExitCode> {
-    let Outcome { summary, broken, unwritten } = done;
-    let kept = match summary.frames {
-        0 => "nothing is written; what an earlier run wrote stays".to_string(),
-        1 => "the frame before it is in the results".to_string(),
-        n => format!("the {n} frames before it are in the results"),
-    };
-    let mut errors: Vec<Error> = unwritten;
-    errors.extend(broken.map(|e| e.hint(&kept)));
-    if errors.is_empty() && summary.frames == 0 && !summary.interrupted {
-        errors.push(Error::new(ErrorKind::Damaged, "holds no frames").at(input).hint(kept));
-    }
-    let mut errors = errors.into_iter();
-    let Some(first) = errors.next() else {
-        return Ok(if summary.interrupted { ExitCode::from(130) } else { ExitCode::SUCCESS });
-    };
-    for other in errors {
-        say!("error: {other}");
-    }
-    Err(first.into())
 }
 
 #[cfg(test)]
@@ -341,6 +363,8 @@ mod tests {
             sets: Vec::new(),
             rate_hz: None,
             columns: None,
+            min_score: None,
+            units: None,
             skip_bad_rows: false,
             dark: None,
             flat: None,

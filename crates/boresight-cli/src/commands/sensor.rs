@@ -8,6 +8,7 @@ use boresight::io::{Colour, OpenOptions};
 use boresight::sensor::{Level, MeanMap, PhotonTransfer, find_defects};
 use boresight::{Config, Error, ErrorKind, Pixels};
 use measured::{Measured, text};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,7 +27,7 @@ const DEFECT_FRAMES: u32 = 32;
 pub struct Args {
     /// A video, a folder or glob of images, an image stack, a camera; the light should differ over the frame or in time.
     #[arg(value_name = "INPUT")]
-    input: String,
+    input: OsString,
     /// Frames taken without light.
     #[arg(long, value_name = "INPUT")]
     dark: Option<String>,
@@ -71,14 +72,14 @@ fn measure(args: &Args, config: &Config) -> anyhow::Result<Measured> {
         size = (frame.pixels.width(), frame.pixels.height());
         transfer.push(&frame.pixels);
         if n_frames < DEFECT_FRAMES {
-            map.push(&frame.pixels).map_err(|e| e.at(&args.input))?;
+            map.push(&frame.pixels).map_err(|e| e.at(args.input.display()))?;
         }
         n_frames += 1;
         source.recycle(frame);
     }
     let curve = transfer.curve().ok_or_else(|| {
         Error::new(ErrorKind::Damaged, format!("{n_frames} frames show too little to measure noise in"))
-            .at(&args.input)
+            .at(args.input.display())
             .hint("two frames of 32 x 32 px at least, of one size, not full and not 0")
     })?;
     let (mut dark, mut of_dark) = (None, false);
@@ -98,7 +99,7 @@ fn measure(args: &Args, config: &Config) -> anyhow::Result<Measured> {
         }
     }
     let defects = find_defects(&map);
-    Ok(Measured { input: args.input.clone(), size, n_frames, curve, dark, defects, of_dark })
+    Ok(Measured { input: args.input.to_string_lossy().into_owned(), size, n_frames, curve, dark, defects, of_dark })
 }
 
 /// Counts added to dark frames, where a 0 is a value and not cut off.

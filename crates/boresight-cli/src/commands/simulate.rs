@@ -11,6 +11,7 @@ use boresight::io::{
 };
 use boresight::sim::{SceneConfig, SceneSource, Seed, named, scene::Background};
 use boresight::{Error, ErrorKind, FrameSource, Scan, Sink, View};
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,7 +28,7 @@ use std::process::ExitCode;
 Scenes by name: ds1, ds2, ds3, imager-1, imager-2, imager-radar, imager-radar-loss, lms-sines, lms-singer, montecarlo.")]
 pub struct Args {
     /// Name of a scene, a TOML file, or (with --radars) a table of tracks that radars look at.
-    scene: String,
+    scene: OsString,
     /// Seed: the same seed gives the same bits.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -54,7 +55,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let seed = Seed::new(args.seed).of_run(args.run);
-    if boresight::io::is_table(&args.scene) && !args.scene.ends_with(".toml") {
+    if boresight::io::is_table(&args.scene) && Path::new(&args.scene).extension().is_none_or(|e| e != "toml") {
         return on_tracks(&args, seed);
     }
     let mut scene = read_scene(&args.scene, seed)?;
@@ -113,7 +114,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Box::new(truth).finish()?;
     let mut written = vec!["frames".to_string(), "truth.csv".into(), "gt.txt".into(), "frames.csv".into()];
     written.extend(radars.finish()?);
-    if let Some(config) = config::for_scene(&args.scene, &scene) {
+    if let Some(config) = config::for_scene(&args.scene.to_string_lossy(), &scene) {
         write("track.toml", &config.to_toml()?)?;
         written.push("track.toml".into());
     } else if earlier {
@@ -128,10 +129,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     write("scene.toml", &toml::to_string(&scene)?)?;
     say!(
         "{}: {n_frames} frames of {} x {} px at {} frames/s, {n_boxes} truth positions, seed {} run {}\n  {}",
-        args.scene,
+        args.scene.display(),
         source.info().width,
         source.info().height,
-        scene.rate_hz,
+        boresight::shown_rate(scene.rate_hz),
         args.seed,
         args.run,
         written.iter().map(|f| dir.join(f).display().to_string()).collect::<Vec<_>>().join("\n  ")
@@ -156,11 +157,12 @@ fn refuse_inputs(args: &Args, scene: &SceneConfig) -> boresight::Result<()> {
 /// Radars that look at a table of tracks.
 fn on_tracks(args: &Args, seed: Seed) -> anyhow::Result<ExitCode> {
     let Some(file) = &args.radars else {
-        let e = Error::new(ErrorKind::Config, "a table of tracks needs radars that look at it").at(&args.scene);
+        let e =
+            Error::new(ErrorKind::Config, "a table of tracks needs radars that look at it").at(args.scene.display());
         return Err(e.hint("give --radars FILE with [[radars]]; docs/simulate.md shows one").into());
     };
     let table = read_tracks(&args.scene, &TableOptions::default())?;
-    table.warnings.iter().for_each(|w| say!("warning: {}: {w}", args.scene));
+    table.warnings.iter().for_each(|w| say!("warning: {}: {w}", args.scene.display()));
     std::fs::create_dir_all(&args.output)
         .map_err(|e| Error::new(ErrorKind::Output, "the folder cannot be made").at(args.output.display()).because(e))?;
     let configs = plots::read_radars(file)?;
@@ -180,13 +182,13 @@ fn on_tracks(args: &Args, seed: Seed) -> anyhow::Result<ExitCode> {
 }
 
 /// A named scene or a file.
-fn read_scene(name: &str, seed: Seed) -> boresight::Result<SceneConfig> {
+fn read_scene(name: &OsStr, seed: Seed) -> boresight::Result<SceneConfig> {
     if !Path::new(name).is_file() {
-        return named(name, seed);
+        return named(&name.to_string_lossy(), seed);
     }
     let text = std::fs::read_to_string(name)
-        .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be read").at(name).because(e))?;
-    SceneConfig::from_toml(&text).map_err(|e| e.at(name))
+        .map_err(|e| Error::new(ErrorKind::NotFound, "cannot be read").at(name.display()).because(e))?;
+    SceneConfig::from_toml(&text).map_err(|e| e.at(name.display()))
 }
 
 /// Starts the scene, over its background file if it has one.

@@ -4,6 +4,7 @@ use super::also;
 use super::command_line;
 use super::run_folder::RunFolder;
 use super::run_options::{self, InputArgs, Plan, TrackerArgs};
+use super::run_outcome;
 use super::run_summary::RunSummary;
 use super::stop::Stop;
 use crate::console::say;
@@ -15,6 +16,7 @@ use boresight::pipeline::{self, Input, Outcome, Summary};
 use boresight::report::{HtmlReport, Notes};
 use boresight::verdict::Observed;
 use boresight::{Error, ErrorKind, Sink, track};
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -50,7 +52,10 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Pictures of a table of detections, to draw on: a folder, a quoted pattern or a video. MOTChallenge's frame 1 is 000001.jpg.
     #[arg(long, value_name = "INPUT")]
-    frames: Option<String>,
+    frames: Option<OsString>,
+    /// Write only rows in which something was measured to the tables of tracks, no predicted ones.
+    #[arg(long)]
+    measured: bool,
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
@@ -92,7 +97,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.end_with_stdin {
         super::stop::end_with_stdin();
     }
-    let input = args.input.input.as_str();
+    let input = args.input.input.as_os_str();
     let dir = args.output.clone().unwrap_or_else(|| run_options::default_folder(input, "tracks"));
     let mut folder = RunFolder::new(dir, made(&args), input)?;
     if let Some(frames) = &args.frames {
@@ -105,22 +110,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if matches!(plan.input, Input::Scans(..)) {
         folder.leave_out(&["annotated.mp4", "frames/", "thumbnail.png"]);
     }
-    if let Some(radar) = &plan.radar {
+    let unit = plan.unit;
+    if plan.radar.is_some() || unit == LengthUnit::Metre {
         folder.leave_out(&["mot.txt"]);
-        if let (LengthUnit::Metre, Some(name)) = (radar.unit, args.also.first()) {
-            let e = Error::new(ErrorKind::Config, "these formats hold pixels, and the tracks of a radar are in metres");
-            return Err(e.at(format!("--also ({name})")).hint("leave it out: tracks.csv names its units").into());
-        }
     }
-    let unit = plan.radar.as_ref().map(|r| r.unit).unwrap_or_default();
+    if let (LengthUnit::Metre, Some(name)) = (unit, args.also.first()) {
+        let e = Error::new(ErrorKind::Config, "these formats hold pixels, and these tracks are in metres");
+        return Err(e.at(format!("--also ({name})")).hint("leave it out: tracks.csv names its units").into());
+    }
     folder.make()?;
     let tracking = track::build(&plan.config.tracker)?;
-    let mut report = (!args.no_report).then(|| HtmlReport::create(folder.path("report.html"))).transpose()?;
+    let mut report = (!args.no_report)
+        .then(|| HtmlReport::create(folder.path("report.html")))
+        .transpose()?
+        .map(|r| r.with_unit(unit));
     if let Some(radar) = &plan.radar {
         report = report.map(|r| r.with_map(radar.clone()));
     }
     let mut observed = plan.info.as_ref().map_or_else(Observed::default, |i| Observed::of_frames(i.width, i.height));
-    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, input, unit)?;
+    let mut sinks: Vec<Box<dyn Sink + '_>> = sinks(&folder, &plan, &args, unit)?;
     if let Some(report) = &mut report {
         sinks.push(Box::new(report.sink()));
     }
@@ -145,7 +153,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let next = verdict.next.clone().filter(|options| can_be_added(&args, options));
     let can_be_looked_at = args.input.config.is_none() && is_on_disk(input);
     let look = (verdict.is_to_be_looked_at && can_be_looked_at)
-        .then(|| format!("boresight preview {}", command_line::word(input)));
+        .then(|| format!("boresight preview {}", command_line::os_word(input)));
     let warnings: Vec<String> = plan.lost.iter().chain(&done.summary.warnings).cloned().collect();
     if done.summary.frames > 0 {
         notes.warnings = warnings.clone();
@@ -162,7 +170,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             done.unwritten.extend(also::write(&folder, &args.also, size_px, quiet));
         }
         if folder.makes("summary.json") {
-            let told = RunSummary::new(input, &done.summary, &verdict, next.as_deref(), &notes.warnings);
+            let told =
+                RunSummary::new(&input.to_string_lossy(), &done.summary, &verdict, next.as_deref(), &notes.warnings);
             done.unwritten.extend(told.write(&folder.path("summary.json")).err());
         }
         match config.finish(&notes.warnings) {
@@ -185,13 +194,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             say!("or look:  {look}");
         }
     }
-    run_options::outcome(input, done)
+    run_outcome::outcome(input, done)
 }
 
 /// Whether an input is frames on disk.
-fn is_on_disk(input: &str) -> bool {
-    let on_disk = std::path::Path::new(input).exists() && !input.starts_with("/dev/");
-    (on_disk || (input.contains('*') && !input.contains("://"))) && !boresight::io::is_table(input)
+fn is_on_disk(input: &OsStr) -> bool {
+    let says = |what: fn(&str) -> bool| input.to_str().is_some_and(what);
+    let on_disk = std::path::Path::new(input).exists() && !says(|t| t.starts_with("/dev/"));
+    (on_disk || says(|t| t.contains('*') && !t.contains("://"))) && !boresight::io::is_table(input)
 }
 
 /// Whether these options may stand beside those given.
@@ -224,18 +234,20 @@ fn made(args: &Args) -> Vec<&'static str> {
     asked.into_iter().filter_map(|(name, asked)| asked.then_some(name)).chain(args.also.iter().copied()).collect()
 }
 
-fn sinks(folder: &RunFolder, plan: &Plan, input: &str, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
-    use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MotWriter, TracksCsv};
+fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> boresight::Result<Vec<Box<dyn Sink>>> {
+    use boresight::io::{CameraCsv, DetectionsCsv, JsonLines, MeasuredOnly, MotWriter, TracksCsv};
     let with_fits = plan.config.detector.centroid.fit.is_some();
+    let input = args.input.input.as_os_str();
+    let of_tracks = |sink: Box<dyn Sink>| if args.measured { Box::new(MeasuredOnly::new(sink)) } else { sink };
     let mut sinks: Vec<Box<dyn Sink>> = vec![
-        Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit)),
+        of_tracks(Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit))),
         Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits).with_unit(unit)),
     ];
     if folder.makes("mot.txt") {
-        sinks.push(Box::new(MotWriter::create(folder.path("mot.txt"))?));
+        sinks.push(of_tracks(Box::new(MotWriter::create(folder.path("mot.txt"))?)));
     }
     if folder.makes("tracks.jsonl") {
-        sinks.push(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?.with_unit(unit)));
+        sinks.push(of_tracks(Box::new(JsonLines::create(folder.path("tracks.jsonl"))?.with_unit(unit))));
     }
     if folder.makes("camera.csv") {
         sinks.push(Box::new(CameraCsv::create(folder.path("camera.csv"))?));
@@ -256,7 +268,7 @@ fn sinks(folder: &RunFolder, plan: &Plan, input: &str, unit: LengthUnit) -> bore
 }
 
 /// The colours of a file that is detected in as grey, unless it is asked for as grey or mended.
-fn colours(plan: &Plan, input: &str) -> Option<Colours> {
+fn colours(plan: &Plan, input: &OsStr) -> Option<Colours> {
     use boresight::{PixelKind, io::Colour, io::OpenOptions};
     let own = &plan.config.input;
     let is_grey = plan.info.as_ref().is_some_and(|i| i.kind != PixelKind::Rgb8);
@@ -276,7 +288,7 @@ fn notes(args: &Args, plan: &Plan) -> anyhow::Result<Notes> {
         facts.push(("Times".to_string(), times.to_string()));
     }
     Ok(Notes {
-        input: args.input.input.clone(),
+        input: args.input.input.to_string_lossy().into_owned(),
         facts,
         settings: plan.reasons.clone(),
         configuration: Some(plan.config.to_toml()?),
@@ -312,7 +324,7 @@ fn print_summary(s: &Summary, looked: Duration, run: Duration) {
         counted(s.confirmed_tracks, "confirmed track"),
         s.most_at_once
     );
-    if let Some(fits) = run_options::fits(s) {
+    if let Some(fits) = run_outcome::fits(s) {
         say!("{fits}");
     }
     if let Some((nis, n)) = s.mean_nis {

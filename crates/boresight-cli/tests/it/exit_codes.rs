@@ -179,16 +179,3 @@ fn a_closed_standard_output_is_an_error_of_the_output_and_one_that_is_thrown_awa
         assert_eq!(run(kept).status.code(), Some(0), "{kept}");
     }
 }
-
-#[cfg(unix)]
-#[test]
-fn a_name_that_is_not_utf8_is_said_as_it_is() {
-    use std::os::unix::ffi::OsStrExt;
-    let name = std::ffi::OsStr::from_bytes(b"clip\xff.mp4");
-    for command in ["track", "detect"] {
-        let out = std::process::Command::new(env!("CARGO_BIN_EXE_boresight")).arg(command).arg(name).output().unwrap();
-        assert_eq!(out.status.code(), Some(2));
-        let said = stderr(&out);
-        assert!(said.contains("clip\\xff.mp4") && said.contains("ln -s"), "{said}");
-    }
-}

@@ -61,6 +61,51 @@ fn an_interrupted_run_keeps_whole_tables() {
     assert!(video.windows(4).any(|w| w == b"moov"));
 }
 
+/// Pictures that show nothing, and a table of a target in them.
+fn table_with_pictures(dir: &std::path::Path, n: usize) {
+    let mut stream = b"YUV4MPEG2 W96 H64 F25:1 Cmono\n".to_vec();
+    let mut table = "frame,x,y\n".to_string();
+    for k in 0..n {
+        stream.extend(b"FRAME\n");
+        stream.extend(std::iter::repeat_n((k % 200) as u8, 96 * 64));
+        table += &format!("{k},{},{}\n", 10.0 + 0.01 * k as f64, 30);
+    }
+    std::fs::write(dir.join("film.y4m"), stream).unwrap();
+    std::fs::write(dir.join("d.csv"), table).unwrap();
+}
+
+#[test]
+fn an_interrupted_table_with_pictures_stops_promptly_and_keeps_what_was_computed() {
+    let dir = tempfile::tempdir().unwrap();
+    let n = 6000;
+    table_with_pictures(dir.path(), n);
+    let mut child = boresight()
+        .current_dir(dir.path())
+        .args(["track", "d.csv", "--frames", "film.y4m", "-o", "out"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let part = dir.path().join("out/tracks.csv.part");
+    let started = Instant::now();
+    // Rows of the first scans are there long before the last scan is tracked.
+    while part.metadata().map_or(0, |m| m.len()) < 20_000 {
+        assert!(started.elapsed() < Duration::from_secs(60), "no rows yet");
+        assert!(child.try_wait().unwrap().is_none(), "it was done before it could be told to end");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let told = Instant::now();
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let out = child.wait_with_output().unwrap();
+    assert_eq!(out.status.code(), Some(130), "{}", stderr(&out));
+    assert!(told.elapsed() < Duration::from_secs(5), "{:?}", told.elapsed());
+    let rows = read_csv(&dir.path().join("out/tracks.csv"));
+    let last = rows.iter().filter_map(|r| r["frame"].parse::<usize>().ok()).max();
+    assert!(last > Some(50) && last < Some(n - 1), "{last:?}");
+    assert!(!part.exists());
+    let video = std::fs::read(dir.path().join("out/annotated.mp4")).unwrap();
+    assert!(video.windows(4).any(|w| w == b"moov"));
+}
+
 #[test]
 fn a_killed_run_leaves_nothing_under_the_final_names() {
     let dir = tempfile::tempdir().unwrap();

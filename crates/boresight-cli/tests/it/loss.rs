@@ -206,8 +206,24 @@ fn links_in_a_circle_and_names_that_are_no_text_end_in_words() {
     assert!(dir.path().join(std::ffi::OsStr::from_bytes(b"u\xff.csv")).exists());
     let out = run(&["convert".as_ref(), odd, odd, "--to".as_ref(), "csv".as_ref()]);
     assert_eq!(out.status.code(), Some(5), "{}", stderr(&out));
-    let out = run(&["track".as_ref(), odd]);
-    assert!(out.status.code() == Some(2) && stderr(&out).contains("UTF-8"), "{}", stderr(&out));
+}
+
+#[test]
+fn pictures_of_two_cameras_in_one_folder_are_said_and_the_pattern_takes_one() {
+    let dir = tempfile::tempdir().unwrap();
+    ok(dir.path(), "simulate ds2 --frames 8 -o s");
+    std::fs::create_dir(dir.path().join("both")).unwrap();
+    for k in 0..8 {
+        for camera in ["cam1", "cam2"] {
+            let to = dir.path().join(format!("both/{camera}_{k:03}.png"));
+            std::fs::copy(dir.path().join(format!("s/frames/frame_{k:06}.png")), to).unwrap();
+        }
+    }
+    let out = ok(dir.path(), "track both --config s/track.toml -q -o out --no-video");
+    let said = stderr(&out);
+    assert!(said.contains("2 sequences (cam1_, cam2_)") && said.contains("'both/cam1_*'"), "{said}");
+    let one = at(dir.path(), "track both/cam1_* --config s/track.toml -q -o one --no-video");
+    assert!(one.status.success() && stderr(&one).is_empty(), "{}", stderr(&one));
 }
 
 #[test]

@@ -20,12 +20,18 @@ pub(super) fn inputs() -> tempfile::TempDir {
     };
     at(&["simulate", "ds2", "--frames", "24", "--format", "y4m", "-o", "sim"]);
     at(&["track", "sim/frames.y4m", "--config", "sim/track.toml", "-o", "run", "--no-video", "-q"]);
+    for (kind, table) in [("truth", "sim/gt.txt"), ("result", "run/mot.txt")] {
+        std::fs::create_dir_all(dir.path().join("pairs").join(kind)).unwrap();
+        for name in ["a.txt", "b.txt"] {
+            std::fs::copy(dir.path().join(table), dir.path().join("pairs").join(kind).join(name)).unwrap();
+        }
+    }
     std::fs::write(dir.path().join("radars.toml"), "[[radars]]\nname = \"far\"\nscan-period-s = 0.5\n").unwrap();
     dir
 }
 
 /// Every command once, with outputs in `out/`: arguments, and the files that are made there.
-pub(super) const COMMANDS: [(&str, &[&str]); 14] = [
+pub(super) const COMMANDS: [(&str, &[&str]); 18] = [
     (
         "track sim/frames.y4m --config sim/track.toml -o out --json --camera --png --summary --thumbnail \
          --also geff,trackmate-xml,cvat,mot-zip,napari",
@@ -55,11 +61,15 @@ pub(super) const COMMANDS: [(&str, &[&str]); 14] = [
         &["e.csv", "e.json", "e.html"],
     ),
     ("evaluate sim/frames.y4m sim/frames.y4m --csv out/i.csv --json out/i.json", &["i.csv", "i.json"]),
+    ("evaluate pairs/truth pairs/result --html out/s.html --json out/s.json", &["s.html", "s.json"]),
     ("fuse run/tracks.csv run/tracks.csv -o out/fused.csv", &["fused.csv"]),
     ("smooth run/tracks.csv -o out/smooth.csv", &["smooth.csv"]),
     ("stitch run/tracks.csv -o out/stitched.txt --smooth", &["stitched.txt"]),
     ("convert run/tracks.csv out/c.csv --to csv", &["c.csv"]),
     ("convert run/tracks.csv out/g --to geff", &["g/edges/ids/0.0"]),
+    ("preview sim/frames.y4m -q -o out/p.html", &["p.html"]),
+    ("sensor sim/frames.y4m -o out/s.html", &["s.html"]),
+    ("track run/detections.csv --frames sim/frames.y4m -o out", &["tracks.csv", "annotated.mp4", "report.html"]),
     ("convert run/tracks.csv out/ctc --to ctc --size 64x64", &["ctc/res_track.txt", "ctc/mask023.tif"]),
     ("reproduce srif-1 --runs 2 -o out", &["index.html", "reproduce.json"]),
     (
@@ -104,7 +114,7 @@ fn words_that_cannot_be_said_do_not_lose_a_run() {
 }
 
 /// What prints to standard output.
-const PRINTING: [&str; 12] = [
+pub(super) const PRINTING: [&str; 15] = [
     "detect sim/frames.y4m --config sim/track.toml -q -o -",
     "simulate ds2 --frames 24 -o -",
     "simulate ds2 --print",
@@ -114,6 +124,9 @@ const PRINTING: [&str; 12] = [
     "config",
     "config --schema",
     "completions bash",
+    "config --list filters",
+    "config --explain tracker",
+    "sensor sim/frames.y4m -o sensor.html",
     "reproduce --list",
     "reproduce srif-1 --runs 2",
     "--help",
@@ -184,4 +197,16 @@ fn a_reader_of_the_words_who_leaves_after_the_first_does_not_end_the_run() {
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert!(dir.path().join("tracks.csv").exists());
+}
+
+#[test]
+fn a_standard_input_that_never_ends_or_is_empty_is_refused() {
+    for (file, says) in [("/dev/full", "expected YUV4MPEG2"), ("/dev/null", "nothing came")] {
+        for line in ["track - -o out", "detect - -o d.csv"] {
+            let dir = tempfile::tempdir().unwrap();
+            let out = command(dir.path(), line).stdin(Stdio::from(File::open(file).unwrap())).output().unwrap();
+            assert!(out.status.code() == Some(3) && stderr(&out).contains(says), "{line} <{file}: {}", stderr(&out));
+            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "{line} <{file}");
+        }
+    }
 }

@@ -257,3 +257,84 @@ fn a_detector_is_asked_for_by_one_word() {
     let table = table.display().to_string();
     refused(&[&table, "--detector", "cfar"], "needs no detector");
 }
+
+#[test]
+fn a_truth_of_the_public_clips_that_counts_from_one_is_told_from_one_that_counts_from_zero() {
+    let truth = clip().with_file_name("IR_DRONE_046.gt.csv");
+    let judged = |options: &[&str]| {
+        let mut args = vec!["evaluate".as_ref(), truth.as_os_str()];
+        let table = tracked().join("tracks.csv");
+        args.extend([table.as_os_str(), "--match".as_ref(), "centre".as_ref(), "--distance".as_ref(), "10".as_ref()]);
+        args.extend(options.iter().map(std::ffi::OsStr::new));
+        stderr(&run_ok(args))
+    };
+    assert!(judged(&[]).contains("try --truth-from-one"), "{}", judged(&[]));
+    assert!(!judged(&["--truth-from-one"]).contains("one frame"), "{}", judged(&["--truth-from-one"]));
+}
+
+#[test]
+fn a_word_sets_the_least_score_the_unit_and_what_the_tables_hold() {
+    let dir = tempfile::tempdir().unwrap();
+    // A target with a hole of three frames, and weak rows elsewhere.
+    let mut table = "frame,x,y,score\n".to_string();
+    for k in (0..60).filter(|k| !(30..33).contains(k)) {
+        table += &format!("{k},{},20,9\n{k},{},{},2\n", 10 + 2 * k, 50 + (k * 37) % 200, 90 + (k * 91) % 100);
+    }
+    std::fs::write(dir.path().join("d.csv"), &table).unwrap();
+    std::fs::write(dir.path().join("m.csv"), table.replace("x,y", "x_m,y_m")).unwrap();
+    let track = |line: &str| {
+        let out = boresight().current_dir(dir.path()).args(line.split_whitespace()).output().unwrap();
+        assert!(out.status.success(), "{line}: {}", stderr(&out));
+        stderr(&out)
+    };
+    let first =
+        |file: &str| std::fs::read_to_string(dir.path().join(file)).unwrap().lines().next().unwrap().to_string();
+    let said = track("track d.csv -o out --min-score 5 --json");
+    assert!(said.contains("57 of 114 rows have a score below 5"), "{said}");
+    assert!(read_csv(&dir.path().join("out/detections.csv")).iter().all(|r| number(r, "score") >= 5.0));
+    let rows = read_csv(&dir.path().join("out/tracks.csv"));
+    assert!(rows.iter().any(|r| r["detection"].is_empty()), "the hole is predicted over");
+    // The configuration holds it: the same again without the word.
+    track("track d.csv -o again --config out/config.toml");
+    let bytes = |file: &str| std::fs::read(dir.path().join(file)).unwrap();
+    assert!(bytes("out/tracks.csv") == bytes("again/tracks.csv"));
+    track("track d.csv -o measured --min-score 5 --json --measured");
+    let measured = read_csv(&dir.path().join("measured/tracks.csv"));
+    assert!(measured.iter().all(|r| !r["detection"].is_empty()));
+    assert_eq!(measured.len(), rows.iter().filter(|r| !r["detection"].is_empty()).count());
+    assert_eq!(bytes("measured/mot.txt").iter().filter(|b| **b == b'\n').count(), measured.len());
+    // Metres: said by the word, or by the names of the columns.
+    for line in ["track d.csv --units m -o metres", "track m.csv -o metres"] {
+        let said = track(line);
+        assert!(!said.contains("px") && said.contains(" m/s"), "{line}: {said}");
+        assert!(first("metres/tracks.csv").contains("x_m,") && first("metres/detections.csv").contains("x_m,"));
+        assert!(!dir.path().join("metres/mot.txt").exists());
+        assert!(std::fs::read_to_string(dir.path().join("metres/report.html")).unwrap().contains("\"unit\":\"m\""));
+    }
+    track("detect d.csv -o d.csv.m --units m --min-score 5");
+    assert!(first("d.csv.m").contains("x_m,"));
+    assert!(first("out/tracks.csv").contains("x_px,"));
+    let video = clip();
+    let score = run_ok([
+        "detect".as_ref(),
+        video.as_os_str(),
+        "--min-score".as_ref(),
+        "9".as_ref(),
+        "-o".as_ref(),
+        "-".as_ref(),
+    ]);
+    let least = crate::stdout(&score)
+        .lines()
+        .skip(1)
+        .map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert!((9.0..40.0).contains(&least), "{least}");
+    for (options, says) in
+        [(["--detector", "cfar"], "which has no least score"), (["--units", "m"], "only tables can be in metres")]
+    {
+        let mut args = vec!["track".as_ref(), video.as_os_str(), "--min-score".as_ref(), "9".as_ref()];
+        args.extend(options.map(std::ffi::OsStr::new));
+        let out = run(args);
+        assert!(out.status.code() == Some(2) && stderr(&out).contains(says), "{}", stderr(&out));
+    }
+}

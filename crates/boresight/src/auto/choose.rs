@@ -11,7 +11,7 @@ use super::spots::Seen;
 use super::{cells, colour, faint, moving, particles, spots, steadied};
 use crate::io::Colour;
 use crate::vision::threshold::Polarity;
-use crate::{Config, Frame, Result, SourceInfo};
+use crate::{Config, Frame, Result, SourceInfo, shown_rate};
 
 /// How long a target may be hidden and keep its id, s, where it is not known how long targets stay: someone behind a lamp post.
 pub(super) const REIDENTIFY_S: f64 = 2.0;
@@ -73,11 +73,11 @@ pub(super) fn choose_looked(
         _ => 0.0,
     };
     reasons.push(format!(
-        "{} x {} {:?}, {:.4} frames/s ({}), from {n_looked} {} of the first {over_s:.1} s.",
+        "{} x {} {:?}, {} frames/s ({}), from {n_looked} {} of the first {over_s:.1} s.",
         info.width,
         info.height,
         info.kind,
-        1.0 / interval_s,
+        shown_rate(1.0 / interval_s),
         if info.true_times { "the file's times" } else { "no times in the input: the given rate" },
         if n_looked == 1 { "frame" } else { "frames" },
     ));

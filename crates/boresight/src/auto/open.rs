@@ -19,6 +19,7 @@ use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Frame, FrameSource, Result, Scan};
+use std::ffi::OsStr;
 
 /// Frames looked at by the automatic choice.
 pub const PROBE_FRAMES: usize = 48;
@@ -51,7 +52,8 @@ opaque_debug!(Opened);
 /// Opens an input and proposes its configuration; the source hands out every frame from the first on.
 /// # Errors
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
-pub fn open_and_choose(input: &str, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
+pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
+    let input = input.as_ref();
     let read = |config: &Config| -> Result<Replay> {
         let source = config.input.mend(crate::io::open(input, &config.input.open_options())?)?;
         // A stream waits for nothing longer than the choice needs.
@@ -236,7 +238,7 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
 /// ```
 /// # Errors
 /// An input that cannot be read; a parameter out of its range.
-pub fn open(input: &str, base: &Config) -> Result<Opened> {
+pub fn open(input: impl AsRef<OsStr>, base: &Config) -> Result<Opened> {
     let (mut frames, mut choice) = open_and_choose(input, base, &Request::default())?;
     let detector = learn(&mut frames, &mut choice, &Request::default())?;
     Ok(Opened {

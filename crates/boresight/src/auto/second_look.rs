@@ -4,6 +4,7 @@
 
 use crate::io::{Colour, OpenOptions};
 use crate::{Config, Frame, FrameSource, PixelKind};
+use std::ffi::OsStr;
 use std::path::Path;
 
 /// Frames of a file that are looked through when its camera stands still.
@@ -12,9 +13,9 @@ pub const SECOND_LOOK_FRAMES: usize = 400;
 const MAX_BYTES: usize = 256 << 20;
 
 /// Whether the input is a file or files, which are the same when they are read again.
-pub(super) fn can_be_opened_twice(input: &str) -> bool {
+pub(super) fn can_be_opened_twice(input: &OsStr) -> bool {
     let on_disk = std::fs::metadata(Path::new(input)).is_ok_and(|m| m.is_file() || m.is_dir());
-    on_disk || (input.contains('*') && !input.contains("://"))
+    on_disk || input.to_str().is_some_and(|t| t.contains('*') && !t.contains("://"))
 }
 
 /// Which frames are kept, so that at most `most` of any number stay, spread evenly.
@@ -45,13 +46,13 @@ impl Spread {
 }
 
 /// At most `n_kept` frames spread evenly over the beginning, in colour if the file has it; what cannot be read ends them.
-pub(super) fn frames(input: &str, base: &Config, n_kept: usize) -> Vec<Frame> {
+pub(super) fn frames(input: &OsStr, base: &Config, n_kept: usize) -> Vec<Frame> {
     // Frames that are lost shift the others: then the numbers do not tell which are wanted.
     kept(input, base, n_kept, true).or_else(|| kept(input, base, n_kept, false)).unwrap_or_default()
 }
 
 /// The frames; `None` if one that is wanted came without pixels.
-fn kept(input: &str, base: &Config, n_kept: usize, sparing: bool) -> Option<Vec<Frame>> {
+fn kept(input: &OsStr, base: &Config, n_kept: usize, sparing: bool) -> Option<Vec<Frame>> {
     let options = OpenOptions { colour: Colour::Rgb, ..base.input.open_options() };
     match crate::io::open(input, &options) {
         // Colours are not mended, and what cannot be mended is looked at as it is: the run itself says why.
@@ -124,7 +125,7 @@ mod tests {
     #[test]
     fn frames_that_nobody_keeps_change_none_of_those_kept() {
         let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
-        let [spared, all] = [true, false].map(|sparing| kept(clip, &Config::default(), 8, sparing));
+        let [spared, all] = [true, false].map(|sparing| kept(OsStr::new(clip), &Config::default(), 8, sparing));
         assert_eq!(all.as_ref().map(Vec::len), Some(5));
         assert!(spared == all);
     }
@@ -132,9 +133,9 @@ mod tests {
     #[test]
     fn streams_and_cameras_are_opened_once() {
         for once in ["-", "rtsp://host/stream", "/dev/video0", "/no/such/file.mp4"] {
-            assert!(!can_be_opened_twice(once), "{once}");
+            assert!(!can_be_opened_twice(OsStr::new(once)), "{once}");
         }
-        assert!(can_be_opened_twice("frames/*.png"));
-        assert!(can_be_opened_twice(env!("CARGO_MANIFEST_DIR")));
+        assert!(can_be_opened_twice(OsStr::new("frames/*.png")));
+        assert!(can_be_opened_twice(OsStr::new(env!("CARGO_MANIFEST_DIR"))));
     }
 }

@@ -8,7 +8,7 @@
 //! Limits: boxes keep their sides along the image's axes; numbers of the tracker's configuration in px are px of the first scan (at a zoom of 2 they are 2 px
 //! of the image); where the motion is unknown the ground is taken to stand still in the image.
 
-use crate::{CameraMotion, Extent, Scan, Similarity, Timestamp, TrackState};
+use crate::{CameraMotion, Detection, Extent, Scan, Similarity, Timestamp, TrackState};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 /// Where the first scan's background lies in the image now.
@@ -48,19 +48,36 @@ impl SteadyGround {
         on_ground.camera_motion = scan.camera_motion;
         on_ground.blind = scan.blind;
         on_ground.detections.clone_from(&scan.detections);
-        let ground = self.image_from_ground.inverse();
-        // Exactly known motions change no covariance, not even in the last bit.
-        let motion = self.motion.filter(|m| m.cov != Matrix4::zeros());
+        let (ground, motion) = self.way_to_ground();
         for d in &mut on_ground.detections {
-            // Measured over frames between which the ground moved: it is not the velocity on it.
-            d.velocity = None;
-            if let Some(m) = motion {
-                d.cov += m.cov_at(d.position);
-            }
-            d.cov = ground.turn_cov(&d.cov);
-            d.position = ground.apply(d.position);
-            d.extent = moved(d.extent, &ground);
+            to_ground(d, &ground, motion.as_ref());
         }
+    }
+
+    /// A detection of the scan with the ground's position, covariance and box.
+    pub(crate) fn detection_on_ground(self, d: &Detection) -> Detection {
+        let mut d = d.clone();
+        if self.moved {
+            let (ground, motion) = self.way_to_ground();
+            to_ground(&mut d, &ground, motion.as_ref());
+        }
+        d
+    }
+
+    /// Where a place on the ground lies in the image, px.
+    pub(crate) fn in_image(self, on_ground: Vector2<f64>) -> Vector2<f64> {
+        self.image_from_ground.apply(on_ground)
+    }
+
+    /// How much larger the ground looks than in the first scan.
+    pub(crate) fn zoom(self) -> f64 {
+        self.image_from_ground.zoom()
+    }
+
+    /// From the image to the ground, and the motion whose uncertainty counts.
+    fn way_to_ground(self) -> (Similarity, Option<CameraMotion>) {
+        // Exactly known motions change no covariance, not even in the last bit.
+        (self.image_from_ground.inverse(), self.motion.filter(|m| m.cov != Matrix4::zeros()))
     }
 
     /// Turns tracks on the ground into the image's.
@@ -109,6 +126,19 @@ impl SteadyGround {
             i.cov = image.turn_cov(&i.cov);
         }
     }
+}
+
+/// Turns a detection to the ground.
+#[inline]
+fn to_ground(d: &mut Detection, ground: &Similarity, motion: Option<&CameraMotion>) {
+    // Measured over frames between which the ground moved: it is not the velocity on it.
+    d.velocity = None;
+    if let Some(m) = motion {
+        d.cov += m.cov_at(d.position);
+    }
+    d.cov = ground.turn_cov(&d.cov);
+    d.position = ground.apply(d.position);
+    d.extent = moved(d.extent, ground);
 }
 
 /// The matrix over `[x, vx, y, vy]` of a block for positions and one for velocities.

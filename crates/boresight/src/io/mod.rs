@@ -51,7 +51,7 @@ pub use stack::gif::GifFrames;
 pub use stream::raw::RawFrames;
 pub use stream::y4m::Y4m;
 pub use tables::{
-    AzimuthFrom, CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, LengthUnit, MotWriter, RadarOptions,
-    RadarPicture, SequenceInfo, ShipReports, StateTable, TableOptions, TracksCsv, read_detections, read_ship_reports,
-    read_tracks,
+    AzimuthFrom, CameraCsv, Columns, DetectionTable, DetectionsCsv, JsonLines, LengthUnit, MeasuredOnly, MotWriter,
+    RadarOptions, RadarPicture, SequenceInfo, ShipReports, StateTable, TableOptions, TracksCsv, read_detections,
+    read_ship_reports, read_tracks,
 };

@@ -6,6 +6,7 @@ use super::sniff::{self, Content, sniff};
 use super::stream::raw::RawFrames;
 use super::stream::y4m::Y4m;
 use crate::{Error, ErrorKind, FrameSource, Result};
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -18,33 +19,34 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`ErrorKind::NotFound`] if nothing is there, [`ErrorKind::Damaged`] or [`ErrorKind::Unsupported`] if its first frame
 /// cannot be read, [`ErrorKind::MissingTool`] if it needs an `ffmpeg` that is not installed.
-pub fn open(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+pub fn open(input: impl AsRef<OsStr>, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     options.validate()?;
+    let input = input.as_ref();
     if input == "-" {
         return open_stdin(options);
     }
-    if input.contains("://") || input.starts_with("/dev/video") {
+    if input.to_str().is_some_and(|t| t.contains("://") || t.starts_with("/dev/video")) {
         return open_other_video(input, options);
     }
-    let path = Path::new(input);
+    let (path, label) = (Path::new(input), &*input.to_string_lossy());
     if path.is_dir() {
         if let Some(format) = options.raw {
-            return Ok(Box::new(RawFrames::files(input, list_folder(path, |_| true)?, format, options)?));
+            return Ok(Box::new(RawFrames::files(label, list_folder(path, |_| true)?, format, options)?));
         }
-        return open_images(input, list_folder(path, has_image_name)?, options);
+        return open_images(label, list_folder(path, has_image_name)?, options);
     }
     if path.exists() {
         return open_file(input, path, options);
     }
     #[cfg(feature = "images")]
-    if let Some(files) = super::pattern::expand(input)? {
-        return open_images(input, files, options);
+    if let Some(files) = input.to_str().map(super::pattern::expand).transpose()?.flatten() {
+        return open_images(label, files, options);
     }
     if path.is_symlink() {
-        return Err(Error::new(ErrorKind::NotFound, "is a link that leads nowhere, or in a circle").at(input));
+        return Err(Error::new(ErrorKind::NotFound, "is a link that leads nowhere, or in a circle").at(label));
     }
     Err(Error::new(ErrorKind::NotFound, "no such file or folder")
-        .at(input)
+        .at(label)
         .hint("give a video, an image, a folder of images, a quoted glob such as 'frames/*.png', an address, or - for standard input"))
 }
 
@@ -69,7 +71,7 @@ pub(super) fn files_of(path: &Path) -> Vec<PathBuf> {
 
 /// The images that a folder or a pattern stands for, in their order; `None` for any other input.
 #[cfg(feature = "images")]
-pub(super) fn images_of(input: &str) -> Option<Vec<PathBuf>> {
+pub(super) fn images_of(input: &OsStr) -> Option<Vec<PathBuf>> {
     let path = Path::new(input);
     if path.is_dir() {
         return list_folder(path, has_image_name).ok();
@@ -77,36 +79,37 @@ pub(super) fn images_of(input: &str) -> Option<Vec<PathBuf>> {
     if path.exists() {
         return None;
     }
-    super::pattern::expand(input).ok().flatten()
+    super::pattern::expand(input.to_str()?).ok().flatten()
 }
 
 /// Whether an input is a file of text: a table of detections or tracks, not frames.
-pub fn is_table(input: &str) -> bool {
-    let path = Path::new(input);
+pub fn is_table(input: impl AsRef<OsStr>) -> bool {
+    let path = Path::new(input.as_ref());
     let head = path.is_file().then(|| sniff::read_up_to(&mut File::open(path).ok()?, sniff::SNIFF_BYTES).ok());
     head.flatten().is_some_and(|head| matches!(sniff(&head), Content::Text | Content::Utf16))
 }
 
-fn open_file(input: &str, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+fn open_file(input: &OsStr, path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    let label = &*input.to_string_lossy();
     if let Some(format) = options.raw {
-        return Ok(Box::new(RawFrames::files(input, vec![path.to_path_buf()], format, options)?));
+        return Ok(Box::new(RawFrames::files(label, vec![path.to_path_buf()], format, options)?));
     }
-    let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be read").at(input).because(e);
+    let cannot = |e: std::io::Error| Error::new(ErrorKind::NotFound, "cannot be read").at(label).because(e);
     let mut file = File::open(path).map_err(cannot)?;
     let data = file.metadata().map_err(cannot)?;
     let head = sniff::read_up_to(&mut file, sniff::SNIFF_BYTES).map_err(cannot)?;
     let whole = BufReader::new(Cursor::new(head.clone()).chain(file));
     match sniff(&head) {
-        Content::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(input)),
+        Content::Empty => Err(Error::new(ErrorKind::Damaged, "the file is empty (0 bytes)").at(label)),
         Content::Text | Content::Utf16 => {
             Err(Error::new(ErrorKind::Unsupported, "expected images or a video, found text")
-                .at(input)
+                .at(label)
                 .hint("a table of detections goes to 'boresight track' as it is, and needs no frames"))
         }
-        Content::Y4m => Ok(Box::new(Y4m::open(input, whole, data.is_file().then_some(data.len()), options)?)),
-        Content::Gif => open_gif(input, whole, options),
+        Content::Y4m => Ok(Box::new(Y4m::open(label, whole, data.is_file().then_some(data.len()), options)?)),
+        Content::Gif => open_gif(label, whole, options),
         content if content.is_image() && content != Content::Apng => {
-            open_images(input, vec![path.to_path_buf()], options)
+            open_images(label, vec![path.to_path_buf()], options)
         }
         Content::Mp4 => open_mp4(path, options),
         _ => open_other_video(input, options),
@@ -159,7 +162,7 @@ fn list_folder(folder: &Path, wanted: fn(&Path) -> bool) -> Result<Vec<PathBuf>>
             None => error,
         });
     }
-    files.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
+    files.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
     Ok(files)
 }
 
@@ -194,11 +197,11 @@ fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> 
 
 /// What is neither image nor MP4: through `ffmpeg`.
 #[cfg_attr(not(feature = "video"), allow(unused_variables))]
-fn open_other_video(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+fn open_other_video(input: &OsStr, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     #[cfg(feature = "video")]
     return super::video::open_ffmpeg(input, options);
     #[cfg(not(feature = "video"))]
-    return Err(not_built(input, "video", "video"));
+    return Err(not_built(&input.to_string_lossy(), "video", "video"));
 }
 
 #[cfg(not(all(feature = "images", feature = "video")))]

@@ -14,6 +14,7 @@ use super::tables::{DetectionTable, SequenceInfo};
 use crate::{
     Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
 };
+use std::ffi::OsStr;
 #[cfg(feature = "images")]
 use std::path::Path;
 
@@ -41,7 +42,13 @@ impl Pictures {
     /// Opens the pictures of a table: a folder, a pattern or a video; in colour if they have it.
     /// # Errors
     /// What [`open`] fails with; [`ErrorKind::Damaged`] if the table's frames or places do not fit the pictures, with what to do.
-    pub fn open(input: &str, options: &OpenOptions, table: &DetectionTable, sequence: &SequenceInfo) -> Result<Self> {
+    pub fn open(
+        input: impl AsRef<OsStr>,
+        options: &OpenOptions,
+        table: &DetectionTable,
+        sequence: &SequenceInfo,
+    ) -> Result<Self> {
+        let input = input.as_ref();
         let source = open(input, &OpenOptions { colour: Colour::Rgb, ..options.clone() })?;
         let mut info = source.info().clone();
         let frames: Vec<(FrameIndex, Timestamp)> = table.scans.iter().map(|s| (s.index, s.time)).collect();
@@ -67,13 +74,15 @@ impl Pictures {
     }
 
     /// Whether the pictures reach from the table's first to its last frame.
-    fn check_frames(&self, input: &str, table: &DetectionTable, sequence: &SequenceInfo) -> Result<()> {
+    fn check_frames(&self, input: &OsStr, table: &DetectionTable, sequence: &SequenceInfo) -> Result<()> {
         let (Some(first), Some(last)) = (table.scans.first(), table.scans.last()) else { return Ok(()) };
         let called = |frame: u64| frame + self.first_frame;
         let last = last.index.0;
         if let Some(n) = sequence.n_frames.filter(|n| last >= *n as u64) {
             let what = format!("has rows in frame {}, seqinfo.ini says {n} frames", called(last));
-            return Err(Error::new(ErrorKind::Damaged, what).at(input).hint("is the table of another sequence?"));
+            return Err(Error::new(ErrorKind::Damaged, what)
+                .at(input.display())
+                .hint("is the table of another sequence?"));
         }
         let pictures = match (&self.numbers, self.source.info().n_frames) {
             (Some(numbers), _) => numbers.first().copied().zip(numbers.last().copied()),
@@ -89,7 +98,7 @@ impl Pictures {
                     called(from),
                     called(to)
                 );
-                Err(Error::new(ErrorKind::Damaged, what).at(input).hint(
+                Err(Error::new(ErrorKind::Damaged, what).at(input.display()).hint(
                     "give the pictures of this sequence; if the table counts from another number, say which it gives to the first picture: --set input.table.first-frame=1",
                 ))
             }
@@ -99,7 +108,7 @@ impl Pictures {
 
     /// The place of the last file whose name has a number.
     #[cfg(feature = "images")]
-    fn last_place(&self, input: &str) -> Option<u64> {
+    fn last_place(&self, input: &OsStr) -> Option<u64> {
         let files = images_of(input)?;
         let n_files = super::numbered::numbers(&files)?.len() as u64;
         if n_files != self.source.info().n_frames.unwrap_or(0) {
@@ -110,17 +119,17 @@ impl Pictures {
 
     /// Without images there are no numbered files.
     #[cfg(not(feature = "images"))]
-    fn last_place(&self, _: &str) -> Option<u64> {
+    fn last_place(&self, _: &OsStr) -> Option<u64> {
         None
     }
 
     /// Whether the detections lie in the pictures.
-    fn check_places(&self, input: &str, table: &DetectionTable, sequence: &SequenceInfo) -> Result<()> {
+    fn check_places(&self, input: &OsStr, table: &DetectionTable, sequence: &SequenceInfo) -> Result<()> {
         let (w, h) = (self.info.width as f64, self.info.height as f64);
         if let Some((sw, sh)) = sequence.size_px.filter(|s| *s != (w, h)) {
             let what = format!("the pictures have {w} x {h} px, seqinfo.ini says {sw} x {sh}");
             return Err(Error::new(ErrorKind::Damaged, what)
-                .at(input)
+                .at(input.display())
                 .hint("give the pictures that the detections were made in, in their own size"));
         }
         let all = || table.scans.iter().flat_map(|s| &s.detections);
@@ -135,7 +144,7 @@ impl Pictures {
                 far[1]
             );
             return Err(Error::new(ErrorKind::Damaged, what)
-                .at(input)
+                .at(input.display())
                 .hint("give the pictures that the detections were made in, in their own size"));
         }
         Ok(())
@@ -182,7 +191,7 @@ impl Pictures {
 
 /// The frames of a table that pictures belong to by the numbers in their names, where both count from 1.
 #[cfg(feature = "images")]
-fn numbers(input: &str, info: &SourceInfo, first_frame: u64) -> Option<Vec<u64>> {
+fn numbers(input: &OsStr, info: &SourceInfo, first_frame: u64) -> Option<Vec<u64>> {
     if first_frame == 0 || Path::new(input).is_file() {
         return None;
     }
@@ -195,7 +204,7 @@ fn numbers(input: &str, info: &SourceInfo, first_frame: u64) -> Option<Vec<u64>>
 
 /// Without images there are no numbered files.
 #[cfg(not(feature = "images"))]
-fn numbers(_: &str, _: &SourceInfo, _: u64) -> Option<Vec<u64>> {
+fn numbers(_: &OsStr, _: &SourceInfo, _: u64) -> Option<Vec<u64>> {
     None
 }
 

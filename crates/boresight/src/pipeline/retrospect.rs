@@ -5,10 +5,14 @@
 //! Method: a queue of scans with their tracks. A state of a track that is reported now turns the same track's tentative states in the queue into confirmed
 //! (with a detection) or coasting ones (without). One that had been reported before and was thought gone since gets back only the states with a detection.
 //! A track that continues a lost one takes that one's id back in time as well; where the lost one was still coasting, the one with a detection stays.
-//! A scan leaves the queue when none of its tracks is tentative, when it has waited for its time, or when the queue holds [`MOST_FRAME_BYTES`] of frames or
+//! A track that is confirmed for the first time is then continued backward, through detections that nobody took ([`Backward`]).
+//! A scan leaves the queue when it has waited for its time (where nothing is continued backward also when none of its tracks is tentative), or when the queue holds [`MOST_FRAME_BYTES`] of frames or
 //! [`MOST_STATES`] states. The frames are counted whether or not a sink wants them, so that no table depends on what else is written.
 //! Limits: a track that is confirmed later than that is reported from the oldest scan held back on.
 
+use super::held::Held;
+use crate::camera::SteadyGround;
+use crate::track::{Backward, Own};
 use crate::{Frame, Scan, TrackId, TrackState, TrackStatus};
 use std::collections::{BTreeSet, VecDeque};
 
@@ -17,18 +21,11 @@ const MOST_FRAME_BYTES: usize = 64 << 20;
 /// Most states of tracks that are held back: some 64 MiB.
 const MOST_STATES: usize = (64 << 20) / size_of::<TrackState>();
 
-/// One scan with its tracks.
-pub(super) struct Held {
-    /// The frame, if it came with one and a sink wants it.
-    pub frame: Option<Frame>,
-    pub scan: Scan,
-    pub tracks: Vec<TrackState>,
-    bytes: usize,
-}
-
 /// What is held back.
 pub(super) struct Retrospect {
     hold_s: f64,
+    backward: Option<Backward>,
+    ground: SteadyGround,
     queue: VecDeque<Held>,
     bytes: usize,
     n_states: usize,
@@ -39,9 +36,18 @@ pub(super) struct Retrospect {
 }
 
 impl Retrospect {
-    /// Holds back for so long, s.
-    pub fn new(hold_s: f64) -> Self {
-        Self { hold_s, queue: VecDeque::new(), bytes: 0, n_states: 0, reported: BTreeSet::new(), spare: Vec::new() }
+    /// Holds back for so long, s, and continues tracks backward.
+    pub fn new(hold_s: f64, backward: Option<Backward>) -> Self {
+        Self {
+            hold_s,
+            backward,
+            ground: SteadyGround::default(),
+            queue: VecDeque::new(),
+            bytes: 0,
+            n_states: 0,
+            reported: BTreeSet::new(),
+            spare: Vec::new(),
+        }
     }
 
     /// Takes the newest scan with its tracks; `bytes` is its frame's size.
@@ -52,14 +58,15 @@ impl Retrospect {
         }
         self.bytes += bytes;
         self.n_states += tracks.len();
-        self.queue.push_back(Held { frame, scan, tracks, bytes });
+        self.ground = self.ground.after(&scan);
+        self.queue.push_back(Held::new(frame, scan, tracks, bytes, self.ground));
     }
 
     /// The oldest scan, if it need not wait any longer; `all` asks for it in any case.
     pub fn pop(&mut self, all: bool) -> Option<Held> {
         let (oldest, newest) = (self.queue.front()?, self.queue.back()?);
         let may_go = all
-            || oldest.tracks.iter().all(|t| t.status != TrackStatus::Tentative)
+            || (self.backward.is_none() && oldest.tracks.iter().all(|t| t.status != TrackStatus::Tentative))
             || newest.scan.time.seconds_since(oldest.scan.time) >= self.hold_s
             || self.bytes > MOST_FRAME_BYTES
             || self.n_states > MOST_STATES;
@@ -85,7 +92,7 @@ impl Retrospect {
 
     /// Reports the tracks that the newest scan reports in the scans before as well; `renamed` got another id in it.
     pub fn confirm(&mut self, renamed: &[(TrackId, TrackId)]) {
-        let Self { hold_s, queue, n_states, reported, .. } = self;
+        let Self { hold_s, backward, queue, n_states, reported, .. } = self;
         if *hold_s <= 0.0 {
             return;
         }
@@ -100,7 +107,11 @@ impl Retrospect {
                 let Ok(i) = held.tracks.binary_search_by_key(&track.id, |t| t.id) else { continue };
                 let state = &mut held.tracks[i];
                 match (state.status, state.detection) {
-                    (TrackStatus::Tentative, Some(_)) => state.status = TrackStatus::Confirmed,
+                    (TrackStatus::Tentative, Some(_)) => {
+                        state.status = TrackStatus::Confirmed;
+                        let detection = state.detection;
+                        held.take(detection);
+                    }
                     (TrackStatus::Tentative, None) if !was_reported => state.status = TrackStatus::Coasting,
                     // It was thought gone, and nobody saw it.
                     (TrackStatus::Tentative, None) => {}
@@ -108,9 +119,33 @@ impl Retrospect {
                     _ => break,
                 }
             }
+            if let Some(backward) = backward.as_ref().filter(|_| !was_reported) {
+                *n_states += continue_back(queue, &newest, track, backward);
+            }
         }
         queue.push_back(newest);
     }
+}
+
+/// Continues a track of the newest scan into the scans before its first one; how many states that gave.
+fn continue_back(queue: &mut VecDeque<Held>, newest: &Held, track: &TrackState, backward: &Backward) -> usize {
+    let own = |held: &Held| held.tracks.binary_search_by_key(&track.id, |t| t.id).ok();
+    let first = queue.iter().position(|held| own(held).is_some()).unwrap_or(queue.len());
+    if first == 0 {
+        return 0;
+    }
+    let taken = queue.range(first..).chain([newest]).filter_map(|held| {
+        let detection = held.tracks[own(held)?].detection?;
+        Some(Own { scan: &held.scan, ground: held.ground, detection })
+    });
+    let states = backward.continue_back(track.id, taken, queue.range(..first).rev().map(Held::past));
+    let n = states.len();
+    for (held, state) in queue.range_mut(..first).rev().zip(states) {
+        held.take(state.detection);
+        let place = held.tracks.partition_point(|t| t.id < state.id);
+        held.tracks.insert(place, state);
+    }
+    n
 }
 
 /// Gives the state of track `was` the id `is`, and says how many states were left out for it: of two with one id that with a detection stays, else the older track's.
@@ -166,7 +201,7 @@ mod tests {
 
     impl Scripted {
         fn of(hold_s: f64) -> Self {
-            Self { held: Retrospect::new(hold_s), k: 0, out: Vec::new() }
+            Self { held: Retrospect::new(hold_s, None), k: 0, out: Vec::new() }
         }
 
         fn scan(&mut self, bytes: usize, tracks: &[TrackState], renamed: &[(u64, u64)]) {

@@ -6,6 +6,7 @@ use super::notes::Notes;
 use super::text::{head, printable, short};
 use super::{curves, trajectories};
 use crate::TrackStatus;
+use crate::io::LengthUnit;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Tracks with curves and rows of their own; the rest is counted.
@@ -14,7 +15,7 @@ const N_DETAILED: usize = 50;
 const N_WARNINGS: usize = 50;
 
 /// Writes the page.
-pub(super) fn page(notes: &Notes, seen: &Collected, map: Option<&Map>) -> String {
+pub(super) fn page(notes: &Notes, seen: &Collected, map: Option<&Map>, unit: LengthUnit) -> String {
     let name = notes.input.trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or_default();
     let title = [notes.title.as_str(), name, "Tracks"].into_iter().find(|t| !t.is_empty()).unwrap_or_default();
     let title = printable(title);
@@ -48,7 +49,7 @@ pub(super) fn page(notes: &Notes, seen: &Collected, map: Option<&Map>) -> String
                     (stages(notes, seen))
                     noscript { p { "The curves need JavaScript; the summary, the trajectories and the tables do not." } }
                 }
-                script type="application/json" id="data" { (PreEscaped(curves::json(seen, &detailed, map.map(Map::unit).unwrap_or_default()))) }
+                script type="application/json" id="data" { (PreEscaped(curves::json(seen, &detailed, unit))) }
                 script { (PreEscaped(include_str!("page.js"))) }
             }
         }

@@ -4,7 +4,7 @@ use super::collect::Collected;
 use super::map::Map;
 use super::notes::Notes;
 use super::page;
-use crate::io::{AtomicFile, RadarPicture};
+use crate::io::{AtomicFile, LengthUnit, RadarPicture};
 use crate::{Error, ErrorKind, Result, Sink, View};
 use std::io::Write;
 use std::path::PathBuf;
@@ -30,6 +30,7 @@ pub struct HtmlReport {
     file: AtomicFile,
     seen: Collected,
     map: Option<Map>,
+    unit: LengthUnit,
 }
 
 opaque_debug!(HtmlReport);
@@ -39,12 +40,19 @@ impl HtmlReport {
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be written.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
-        Ok(Self { file: AtomicFile::create(path)?, seen: Collected::default(), map: None })
+        Ok(Self { file: AtomicFile::create(path)?, seen: Collected::default(), map: None, unit: LengthUnit::Pixel })
     }
 
     /// Draws a map, north up, in the place of trajectories over a picture.
     pub fn with_map(mut self, radar: RadarPicture) -> Self {
+        self.unit = radar.unit;
         self.map = Some(Map::new(radar));
+        self
+    }
+
+    /// Says what positions are counted in; pixels if nothing is said.
+    pub fn with_unit(mut self, unit: LengthUnit) -> Self {
+        self.unit = unit;
         self
     }
 
@@ -57,7 +65,7 @@ impl HtmlReport {
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be written.
     pub fn write(mut self, notes: &Notes) -> Result<()> {
-        let html = page::page(notes, &self.seen, self.map.as_ref());
+        let html = page::page(notes, &self.seen, self.map.as_ref(), self.unit);
         self.file.write_all(html.as_bytes()).map_err(|e| {
             Error::new(ErrorKind::Output, "cannot be written").at(self.file.part_path().display()).because(e)
         })?;

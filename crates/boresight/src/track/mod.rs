@@ -5,6 +5,7 @@
 
 mod appearance;
 pub(crate) mod association_cost;
+mod backward;
 mod build;
 mod clock;
 pub(crate) mod clutter;
@@ -32,6 +33,8 @@ mod tracking;
 
 pub use appearance::Appearance;
 pub use association_cost::{AssociationCostConfig, OverlapConfig, OverlapKind};
+pub use backward::Backward;
+pub(crate) use backward::{Own, Past};
 pub use build::build;
 pub use clutter::{ClutterConfig, ClutterMapConfig, PerScanConfig};
 pub use config::{TrackerConfig, TwoStageConfig};

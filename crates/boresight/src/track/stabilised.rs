@@ -5,6 +5,7 @@
 //! Where the image's size is known, tracks that have left it are no longer reported (they may come back while they coast).
 //! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a motion.
 
+use super::backward::Backward;
 use super::tracking::Tracking;
 use crate::camera::SteadyGround;
 use crate::{Result, Scan, TrackId, TrackState};
@@ -54,6 +55,10 @@ impl Tracking for Stabilised {
 
     fn retrospective_s(&self) -> f64 {
         self.inner.retrospective_s()
+    }
+
+    fn backward(&self) -> Option<Backward> {
+        self.inner.backward()
     }
 }
 

@@ -10,6 +10,7 @@
 //! Limits: detections of a scan share its time; `max_tracks` tracks.
 
 use super::association_cost::AssociationCost;
+use super::backward::Backward;
 use super::clock::Clock;
 use super::clutter::Clutter;
 use super::config::TrackerConfig;
@@ -288,5 +289,9 @@ impl Tracking for Tracker {
 
     fn retrospective_s(&self) -> f64 {
         self.config.retrospective_s
+    }
+
+    fn backward(&self) -> Option<Backward> {
+        Backward::of(&self.config)
     }
 }

@@ -1,5 +1,6 @@
 //! The trait of everything that turns scans into tracks.
 
+use super::backward::Backward;
 use crate::{Result, Scan, TrackId, TrackState};
 
 /// Turns scans into tracks: the tracker, or the multiple-hypothesis tracker.
@@ -17,5 +18,10 @@ pub trait Tracking: Send {
     /// For how long a run holds back its results, so that a track that is confirmed is reported from its first detection on, s; 0 gives them at once.
     fn retrospective_s(&self) -> f64 {
         0.0
+    }
+
+    /// What continues a track backward from its first detection, where results are held back; none if it cannot be said how likely that is.
+    fn backward(&self) -> Option<Backward> {
+        None
     }
 }

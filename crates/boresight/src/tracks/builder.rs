@@ -4,6 +4,7 @@ use super::column::Column;
 use super::row::{PixelOrigin, TrackRow};
 use super::state::{RowState, StateColumns};
 use super::table::TrackTable;
+use crate::length_unit::LengthUnit;
 use crate::{Error, ErrorKind, Result};
 use std::collections::HashMap;
 
@@ -24,6 +25,7 @@ impl TrackTableBuilder {
         let table = TrackTable {
             label: label.into(),
             origin,
+            unit: LengthUnit::Pixel,
             is_points: false,
             boxes: Vec::new(),
             tracks: Vec::new(),
@@ -60,6 +62,11 @@ impl TrackTableBuilder {
     /// Says that the rows are points.
     pub fn points(&mut self) {
         self.table.is_points = true;
+    }
+
+    /// Says what positions and sizes are counted in; pixels if nothing is said.
+    pub fn unit(&mut self, unit: LengthUnit) {
+        self.table.unit = unit;
     }
 
     /// Adds a region that does not count.

@@ -8,6 +8,7 @@ use super::column::Column;
 use super::row::{PixelOrigin, TrackRow};
 use super::state::StateColumns;
 use crate::Extent;
+use crate::length_unit::LengthUnit;
 use std::ops::Range;
 
 /// Tracks as a table, its rows in the order of their frames.
@@ -17,6 +18,8 @@ pub struct TrackTable {
     pub label: String,
     /// What the coordinates count from.
     pub origin: PixelOrigin,
+    /// What they are counted in.
+    pub unit: LengthUnit,
     /// Whether rows are points (no width, no height) rather than boxes.
     pub is_points: bool,
     /// Left, top, width, height of each row, px.
@@ -145,6 +148,7 @@ impl TrackTable {
         let mut out = Self {
             label: self.label.clone(),
             origin: self.origin,
+            unit: self.unit,
             is_points: self.is_points,
             boxes: rows.iter().map(|&r| self.boxes[r as usize]).collect(),
             tracks: rows.iter().map(|&r| new_of[self.tracks[r as usize] as usize]).collect(),

@@ -48,6 +48,33 @@ pub use detector::build;
 use crate::{Frame, Result, Scan};
 
 /// Turns frames into detections.
+///
+/// One of one's own, which finds the brightest pixel:
+/// ```
+/// use boresight::vision::Detector;
+/// use boresight::{Detection, Frame, Image, Pixels, Result, Scan};
+///
+/// struct Brightest;
+///
+/// impl Detector for Brightest {
+///     fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
+///         *scan = Scan::at(frame.index, frame.time);
+///         let Pixels::Gray8(image) = &frame.pixels else { return Ok(()) };
+///         let brightest = image.as_slice().iter().enumerate().max_by_key(|(_, v)| **v);
+///         let place = |i: usize| ((i % image.width()) as f64, (i / image.width()) as f64);
+///         scan.detections.extend(brightest.map(|(i, _)| place(i)).map(|(x, y)| Detection::point(x, y, 0.3)));
+///         Ok(())
+///     }
+/// }
+///
+/// let mut image = Image::filled(8, 6, 10_u8);
+/// image.as_mut_slice()[3 * 8 + 5] = 200;
+/// let frame = Frame { index: Default::default(), time: Default::default(), pixels: Pixels::Gray8(image) };
+/// let mut scan = Scan::at(frame.index, frame.time);
+/// Brightest.detect(&frame, &mut scan)?;
+/// assert_eq!(scan.detections, [Detection::point(5.0, 3.0, 0.3)]);
+/// # Ok::<(), boresight::Error>(())
+/// ```
 pub trait Detector: Send {
     /// Replaces `scan` by the detections of `frame`, keeping its memory.
     /// # Errors

@@ -23,6 +23,8 @@ pub trait Pixel: BackgroundPixel + PartialOrd {
     const STEP: f32;
     /// The value, counts.
     fn value(self) -> f64;
+    /// The value as a place in a table of all values; 0 for a float.
+    fn index(self) -> usize;
     /// The value as f32; exact for every type here.
     fn value_f32(self) -> f32;
     /// Writes 1 into `states` for every `row[x] >= level[x]` (`above`) or `row[x] <= level[x]`, else 0; NaN gives 0.
@@ -65,6 +67,10 @@ macro_rules! integer_pixel {
                 f64::from(self)
             }
             #[inline]
+            fn index(self) -> usize {
+                usize::from(self)
+            }
+            #[inline]
             fn value_f32(self) -> f32 {
                 f32::from(self)
             }
@@ -101,6 +107,10 @@ impl Pixel for f32 {
     #[inline]
     fn value(self) -> f64 {
         f64::from(self)
+    }
+    #[inline]
+    fn index(self) -> usize {
+        0
     }
     #[inline]
     fn value_f32(self) -> f32 {

@@ -1,7 +1,6 @@
 //! Runs of set bits: a row of bits becomes the first and last columns of its runs.
 //!
-//! Source: our own. [`find_runs`] writes both lists without a branch for each bit; [`runs`] calls back for each run, for rows
-//! that are mostly empty. Bit `x % 64` of word `x / 64` is column `x`.
+//! Source: our own. [`find_runs`] writes both lists without a branch for each bit. Bit `x % 64` of word `x / 64` is column `x`.
 
 /// The runs of one row, from the left: first and last column, and the region of each.
 #[derive(Clone, Debug, Default)]
@@ -38,41 +37,6 @@ impl RowRuns {
         // The last column's right neighbour may lie past the words: then all runs have started.
         let Some(word) = self.words.get(x as usize / 64) else { return self.n };
         (word.n_starts + (word.starts & (!0 >> (63 - x % 64))).count_ones()) as usize
-    }
-}
-
-/// Calls `run(start, last)` for every run of set bits, from the left.
-pub(crate) fn runs(bits: &[u64], mut run: impl FnMut(u32, u32)) {
-    let mut open: Option<u32> = None;
-    for (w, &word) in bits.iter().enumerate() {
-        let base = w as u32 * 64;
-        let mut rest = word;
-        if let Some(start) = open {
-            let ones = rest.trailing_ones();
-            if ones == 64 {
-                continue;
-            }
-            if ones == 0 {
-                run(start, base - 1);
-            } else {
-                run(start, base + ones - 1);
-                rest &= !0 << ones;
-            }
-            open = None;
-        }
-        while rest != 0 {
-            let start = rest.trailing_zeros();
-            let ones = (rest >> start).trailing_ones();
-            if start + ones == 64 {
-                open = Some(base + start);
-                break;
-            }
-            run(base + start, base + start + ones - 1);
-            rest &= !0 << (start + ones);
-        }
-    }
-    if let Some(start) = open {
-        run(start, bits.len() as u32 * 64 - 1);
     }
 }
 

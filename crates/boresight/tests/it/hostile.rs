@@ -107,7 +107,7 @@ fn options() -> OpenOptions {
 
 /// Reads all frames, up to a thousand: damage can multiply the frames of an animation.
 fn frames(path: &Path, options: &OpenOptions) -> Result<(), Error> {
-    let mut source = open(&path.to_string_lossy(), options)?;
+    let mut source = open(path, options)?;
     for _ in 0..1000 {
         let Some(frame) = source.next_frame()? else { break };
         assert!(frame.pixels.width() * frame.pixels.height() <= 1 << 16);

@@ -21,6 +21,7 @@ const LEAVES: &[&str] = &[
     "view",
     "error",
     "time",
+    "length_unit",
     "union_find",
     "validate",
     "cpu",

@@ -18,9 +18,7 @@ real_tests! {
 
 /// The detector chosen and all reasons as one text.
 fn chosen(name: &str) -> (ThresholdConfig, String) {
-    let (_, choice) =
-        auto::open_and_choose(&data(name).display().to_string(), &Config::default(), &auto::Request::default())
-            .unwrap();
+    let (_, choice) = auto::open_and_choose(data(name), &Config::default(), &auto::Request::default()).unwrap();
     (choice.config.detector.threshold, choice.reasons.join(" "))
 }
 

@@ -12,7 +12,7 @@ real_tests! {
 fn chosen_hue(name: &str, n_frames: usize, step: usize) -> f64 {
     let options = OpenOptions { colour: Colour::Rgb, ..OpenOptions::default() };
     let path = data("ball_green_trflorian").join(name);
-    let mut source = open(&path.display().to_string(), &options).unwrap();
+    let mut source = open(&path, &options).unwrap();
     let mut frames = Vec::new();
     for i in 0..n_frames {
         let Some(frame) = source.next_frame().unwrap() else { break };

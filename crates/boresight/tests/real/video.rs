@@ -84,7 +84,7 @@ fn check(line: &str, root: &Path, whole: bool) {
     let [name, n, head, all] = fields[..] else { panic!("odd line {line}") };
     let path = root.join(name);
     let in_process = is_in_process(name);
-    let mut source = open(&path.to_string_lossy(), &OpenOptions::default()).unwrap();
+    let mut source = open(&path, &OpenOptions::default()).unwrap();
     assert_eq!(source.info().reader.starts_with("H.264 in process"), in_process, "{name}: {}", source.info().reader);
     let n: usize = n.parse().unwrap();
     if in_process {
@@ -102,7 +102,7 @@ fn colour_of_the_test_pattern_is_what_ffmpeg_shows() {
     let path = data_folder().join("b_frames.mp4");
     let options = OpenOptions { colour: Colour::Rgb, ..OpenOptions::default() };
     let mut ours = open_mp4(&path, &options).unwrap();
-    let mut theirs = open_ffmpeg(&path.to_string_lossy(), &options).unwrap();
+    let mut theirs = open_ffmpeg(&path, &options).unwrap();
     while let Some(a) = ours.next_frame().unwrap() {
         let b = theirs.next_frame().unwrap().unwrap();
         let (Pixels::Rgb8(a), Pixels::Rgb8(b)) = (&a.pixels, &b.pixels) else { panic!("colour wanted") };
@@ -121,15 +121,15 @@ fn inputs_that_look_like_options_are_files() {
     for name in ["-version", "a:b%03d.mp4"] {
         let path = dir.path().join(name);
         std::fs::copy(data_folder().join("hevc.mp4"), &path).unwrap();
-        let mut source = open_ffmpeg(&path.to_string_lossy(), &OpenOptions::default()).unwrap();
+        let mut source = open_ffmpeg(&path, &OpenOptions::default()).unwrap();
         assert_eq!((rows(source.as_mut(), usize::MAX).len(), source.info().rate_hz), (25, Some(25.0)), "{name}");
     }
     let err = open_ffmpeg("-version", &OpenOptions::default()).err().unwrap();
     assert_eq!(err.kind(), ErrorKind::NotFound);
     std::fs::write(dir.path().join("noise.mkv"), [7u8; 5000]).unwrap();
-    let err = open_ffmpeg(&dir.path().join("noise.mkv").to_string_lossy(), &OpenOptions::default()).err().unwrap();
+    let err = open_ffmpeg(dir.path().join("noise.mkv"), &OpenOptions::default()).err().unwrap();
     assert!(err.to_string().contains("ffmpeg cannot read it"), "{err}");
     // Dropped before its end, the program must not linger: this would hang if it did.
-    let source = open_ffmpeg(&data_folder().join("yuv444.mp4").to_string_lossy(), &OpenOptions::default()).unwrap();
+    let source = open_ffmpeg(data_folder().join("yuv444.mp4"), &OpenOptions::default()).unwrap();
     drop(source);
 }

@@ -8,6 +8,7 @@ use boresight::metrics::set::{OspaAssignment, SetOptions};
 use boresight::metrics::{KittiClass, Rules};
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Headings of what is seldom needed.
@@ -33,21 +34,21 @@ videos are compared pixel by pixel.")]
 Each measure is explained in docs/evaluate.md.")]
 pub struct Args {
     /// The truth: a table, a folder of sequences, or a path with {seq}.
-    pub truth: String,
+    pub truth: OsString,
     /// The result, likewise.
-    pub result: String,
+    pub result: OsString,
     /// What makes a truth and a result match: overlap of boxes, or nearness of centres. Points always match by centres.
     #[arg(long = "match", value_enum, default_value = "iou")]
     pub matching: MatchArg,
     /// Overlap from which a pair matches, in (0, 1].
     #[arg(long, default_value_t = 0.5)]
     pub threshold: f64,
-    /// Distance up to which centres match, px.
+    /// Distance up to which centres match, px (m where the tables are in metres, as all distances here).
     #[arg(long, default_value_t = 5.0)]
     pub distance: f64,
     /// Further results to compare with the first, with confidence intervals.
     #[arg(long, num_args = 1.., value_name = "RESULT")]
-    pub compare: Vec<String>,
+    pub compare: Vec<OsString>,
     /// Demand a score, for instance HOTA=0.4 (at least), GOSPA=5 (at most) or ANEES=1.5..2.5 (within); exit code 1 if it is
     /// not met.
     #[arg(long, value_name = "MEASURE=VALUE", value_parser = demand)]
@@ -76,6 +77,12 @@ pub struct Args {
     /// Frames of MOTChallenge results count from 0 in the file.
     #[arg(help_heading = READING, long)]
     pub result_from_zero: bool,
+    /// Frames of the truth count from 1 in the file (for tables that are not MOTChallenge's, as the Svanström clips' CSV).
+    #[arg(help_heading = READING, long, conflicts_with = "truth_from_zero")]
+    pub truth_from_one: bool,
+    /// Frames of the results count from 1 in the file.
+    #[arg(help_heading = READING, long, conflicts_with = "result_from_zero")]
+    pub result_from_one: bool,
     /// What is left out before counting.
     #[arg(help_heading = READING, long, value_enum, default_value = "auto")]
     pub rules: RulesArg,

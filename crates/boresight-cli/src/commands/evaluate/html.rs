@@ -33,7 +33,7 @@ fn table(e: &ResultEvaluation) -> Markup {
             table {
                 tr {
                     th { "sequence" }
-                    @for v in &all { th { (v.name) } }
+                    @for v in &all { th { (v.name) @if !v.unit.is_empty() { br; small { (v.unit) } } } }
                 }
                 @for s in &e.sequences { (row(&s.name, &s.values())) }
                 @if e.sequences.len() > 1 { (row("COMBINED", &all)) }
@@ -69,6 +69,7 @@ fn optional_plots(e: &ResultEvaluation) -> Markup {
     let alarms = by_sequence(e, |s| curve(s).iter().map(|p| (p.fp_per_frame, p.recall)).collect());
     let errors =
         by_sequence(e, |s| state(s).map_or(Vec::new(), |s| s.rsspe.iter().map(|&(f, v)| (f64::from(f), v)).collect()));
+    let unit = e.sequences.first().map_or("px", |s| s.unit.sign());
     let runs = nees_over_runs(e.sequences.iter().filter_map(state));
     let nees = |name: &str, f: fn(&Consistency) -> f64| Line {
         name: name.into(),
@@ -78,10 +79,10 @@ fn optional_plots(e: &ResultEvaluation) -> Markup {
     html! {
         (plot("Operating curve over the score", "recall", "precision", &operating, Some(1.0)))
         (plot("Recall against false alarms", "false alarms per frame", "recall", &alarms, Some(1.0)))
-        (plot("Position error of the matched rows", "frame", "root mean square, px", &errors, None))
+        (plot("Position error of the matched rows", "frame", &format!("root mean square, {unit}"), &errors, None))
         (plot("Position NEES over the runs", "frame", "average", &nees, None))
         @for s in e.sequences.iter().take(PLOTS) {
-            (plot(&format!("GOSPA by parts: {}", s.name), "frame", "cost, px^p", &gospa_parts(s), None))
+            (plot(&format!("GOSPA by parts: {}", s.name), "frame", &format!("cost, {unit}^p"), &gospa_parts(s), None))
         }
     }
 }

@@ -10,14 +10,18 @@ use boresight::io::{OpenOptions, is_table, open};
 use boresight::metrics::evaluation::Value;
 use boresight::metrics::image::{ImageMetrics, compare_pixels, mean_values};
 use boresight::{Error, ErrorKind, Pixels};
+use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Whether an input is an image, a folder or glob of images, or a video, rather than a table or a folder of tables.
-pub fn are_frames(input: &str) -> bool {
+pub fn are_frames(input: &OsStr) -> bool {
     let path = Path::new(input);
-    if input.contains("{seq}") || path.is_dir() && boresight::io::tracks::ctc::is_ctc(path) || is_table(input) {
+    if input.to_str().is_some_and(|t| t.contains("{seq}"))
+        || path.is_dir() && boresight::io::tracks::ctc::is_ctc(path)
+        || is_table(input)
+    {
         return false;
     }
     let no_bytes = path.metadata().is_ok_and(|m| m.is_file() && m.len() == 0);
@@ -52,10 +56,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             (a, _) => {
                 let short = if a.is_none() { &args.truth } else { &args.result };
                 let what = format!("ends after {} frames, the other goes on: expected as many in both", frames.len());
-                bail!(Error::new(ErrorKind::Damaged, what).at(short));
+                bail!(Error::new(ErrorKind::Damaged, what).at(short.display()));
             }
         };
-        let at = format!("{} and {}, frame {}", args.truth, args.result, frames.len());
+        let at = format!("{} and {}, frame {}", args.truth.display(), args.result.display(), frames.len());
         frames.push(frame(&a.pixels, &b.pixels, args.peak).map_err(|e| e.at(at))?);
     }
     for warning in truth.warnings().iter().chain(result.warnings()) {

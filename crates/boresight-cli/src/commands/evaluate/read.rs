@@ -6,7 +6,7 @@ use boresight::io::tracks::{Format, ReadOptions, TrackFile, ctc, read, sniff};
 use boresight::io::{TableOptions, read_detections};
 use boresight::metrics::cells::{CellFrame, CellSequence};
 use boresight::metrics::evaluation::{Evaluation, Note, Sequence};
-use boresight::metrics::{KittiClass, Rules};
+use boresight::metrics::{KittiClass, Rules, SanityWarning};
 use boresight::{Error, ErrorKind, Result, Scan, TrackTable};
 use std::path::Path;
 
@@ -16,15 +16,12 @@ fn open(args: &Args, path: &Path, truth: bool) -> Result<TrackFile> {
         Some(f) => f,
         None => sniff(path)?,
     };
-    let options = ReadOptions {
-        skip_bad_rows: args.skip_bad_rows,
-        keep_extra: false,
-        frames_from_zero: if truth { args.truth_from_zero } else { args.result_from_zero },
-    };
+    let options =
+        ReadOptions { skip_bad_rows: args.skip_bad_rows, keep_extra: false, first_frame: first_frame(args, truth) };
     let mut file = read(path, Some(format), options, args.tentative).map_err(|e| {
         // A table that is sound once its frames count from 0 is one that does.
-        let from_zero = ReadOptions { frames_from_zero: true, ..options };
-        if !options.frames_from_zero && read(path, Some(format), from_zero, args.tentative).is_ok() {
+        let from_zero = ReadOptions { first_frame: Some(0), ..options };
+        if options.first_frame.is_none() && read(path, Some(format), from_zero, args.tentative).is_ok() {
             let flag = if truth { "--truth-from-zero" } else { "--result-from-zero" };
             return e.hint(format!("frames that count from 0: {flag}"));
         }
@@ -32,6 +29,30 @@ fn open(args: &Args, path: &Path, truth: bool) -> Result<TrackFile> {
     })?;
     file.table.label = path.display().to_string();
     Ok(file)
+}
+
+/// What a table calls its first frame, where it is said.
+fn first_frame(args: &Args, truth: bool) -> Option<u64> {
+    let [zero, one] =
+        if truth { [args.truth_from_zero, args.truth_from_one] } else { [args.result_from_zero, args.result_from_one] };
+    if zero { Some(0) } else { one.then_some(1) }
+}
+
+/// The option that moves one of the tables as a shift by one frame asks for it; `later`: the result is a frame late.
+fn mend_of_shift(args: &Args, truth: &TrackFile, result: &TrackFile, later: bool) -> Option<&'static str> {
+    // Only MOTChallenge's count from 1.
+    let from_one = |f: &TrackFile, truth| match first_frame(args, truth) {
+        Some(first) => first == 1,
+        None => matches!(f.format, Format::Mot | Format::MotTruth),
+    };
+    match (later, from_one(truth, true), from_one(result, false)) {
+        // The result's numbers are one too high, or the truth's one too low.
+        (true, _, false) => Some("--result-from-one"),
+        (true, true, _) => Some("--truth-from-zero"),
+        (false, false, _) => Some("--truth-from-one"),
+        (false, _, true) => Some("--result-from-zero"),
+        _ => None,
+    }
 }
 
 /// Reads and judges a sequence; the notes come with it.
@@ -72,7 +93,14 @@ pub fn judge(args: &Args, s: &sequences::Sequence) -> Result<(Evaluation, Vec<St
     sequence.detections = detections.as_deref();
     sequence.cells = cells.as_ref();
     let evaluation = sequence.evaluate(&options)?;
-    notes.extend(evaluation.notes.iter().map(|n| sentence(n, place.as_deref().unwrap_or_default())));
+    let place = place.as_deref().unwrap_or_default();
+    notes.extend(evaluation.notes.iter().map(|note| match note {
+        Note::Sanity(SanityWarning::ShiftedFrames { later, .. }) => {
+            let mend = mend_of_shift(args, &truth, &result, *later);
+            mend.map_or(note.to_string(), |option| format!("{note} try {option}"))
+        }
+        note => sentence(note, place),
+    }));
     Ok((evaluation, notes))
 }
 

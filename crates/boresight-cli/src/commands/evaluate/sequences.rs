@@ -2,6 +2,7 @@
 
 use boresight::io::SequenceInfo;
 use boresight::{Error, ErrorKind, Result};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// A truth and a result of one sequence, and what seqinfo.ini says of it.
@@ -40,13 +41,15 @@ fn names_of_pattern(pattern: &str) -> Result<Vec<String>> {
 /// Finds the sequences.
 /// # Errors
 /// A path that is not there; a folder without sequences; a result that fits none of them.
-pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
+pub fn find(truth: &OsStr, result: &OsStr) -> Result<Vec<Sequence>> {
+    let pattern = |text: &OsStr| text.to_str().filter(|t| t.contains("{seq}")).map(str::to_string);
+    let (truth_pattern, result_pattern) = (pattern(truth), pattern(result));
     let (truth_path, result_path) = (Path::new(truth), Path::new(result));
     let single = |p: &Path| p.is_file() || p.is_dir() && boresight::io::tracks::ctc::is_ctc(p);
     let mut out = Vec::new();
     let result_of = |name: &str| {
-        if result.contains("{seq}") {
-            let p = PathBuf::from(result.replace("{seq}", name));
+        if let Some(pattern) = &result_pattern {
+            let p = PathBuf::from(pattern.replace("{seq}", name));
             return p.exists().then_some(p);
         }
         let short = name.trim_end_matches(".txt");
@@ -58,9 +61,9 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
             result_path.join("data").join(format!("{short}.txt")),
         ])
     };
-    if truth.contains("{seq}") {
-        for name in names_of_pattern(truth)? {
-            let path = PathBuf::from(truth.replace("{seq}", &name));
+    if let Some(pattern) = &truth_pattern {
+        for name in names_of_pattern(pattern)? {
+            let path = PathBuf::from(pattern.replace("{seq}", &name));
             out.push(Sequence { info: SequenceInfo::beside(&path), truth: path, result: result_of(&name), name });
         }
     } else if truth_path.is_dir() && !single(truth_path) {
@@ -88,7 +91,9 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
                 return Err(Error::new(ErrorKind::NotFound, "no such file or folder").at(p.display()));
             }
         }
-        let name = truth_path.file_stem().map_or_else(|| truth.to_string(), |s| s.to_string_lossy().into_owned());
+        let name = truth_path
+            .file_stem()
+            .map_or_else(|| truth.to_string_lossy().into_owned(), |s| s.to_string_lossy().into_owned());
         out.push(Sequence {
             name,
             info: SequenceInfo::beside(truth_path),
@@ -98,7 +103,7 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
     }
     if out.is_empty() {
         return Err(Error::new(ErrorKind::NotFound, "no sequences here")
-            .at(truth)
+            .at(truth.display())
             .hint("expected SEQ/gt/gt.txt, SEQ/gt.txt or SEQ.txt in it, or a path with {seq}"));
     }
     if out.iter().all(|s| s.result.is_none()) {
@@ -107,7 +112,7 @@ pub fn find(truth: &str, result: &str) -> Result<Vec<Sequence>> {
             ErrorKind::NotFound,
             format!("has no table for any of the sequences {} ..", names.join(", ")),
         )
-        .at(result)
+        .at(result.display())
         .hint("expected SEQ.txt in it, or a path with {seq}"));
     }
     Ok(out)

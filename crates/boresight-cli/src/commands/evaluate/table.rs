@@ -1,6 +1,7 @@
 //! The scores as tables: for the terminal and as CSV.
 
 use super::judged::Judged;
+use boresight::io::LengthUnit;
 use boresight::metrics::consistency::Consistency;
 use boresight::metrics::evaluation::{
     Comparison, Evaluation, NeesOverRuns, ResultEvaluation, StateMeasures, Value, nees_over_runs,
@@ -68,6 +69,9 @@ pub fn sequences(e: &ResultEvaluation) -> String {
     for part in e.optional_values().chunks(12) {
         out.push_str(&block(e, Evaluation::optional_values, part));
         out.push('\n');
+    }
+    if e.sequences.iter().any(|s| s.unit == LengthUnit::Metre) {
+        out.push_str("Distances are in m, speeds in m/s: the tables are in metres.\n");
     }
     for sequence in &e.sequences {
         for line in state(sequence).into_iter().flat_map(sentences) {

@@ -138,7 +138,7 @@ pub fn tracker_of(scans: &[Scan], rate_hz: f64, turn: Option<(f64, LengthUnit)>,
         let (mut config, mut reasons) = (Config::default(), Vec::new());
         match turn {
             Some((turn_s, unit)) => boresight::auto::for_radar(scans, turn_s, unit, &mut config, &mut reasons),
-            None => boresight::auto::for_detections(scans, rate_hz, None, &mut config, &mut reasons),
+            None => boresight::auto::for_detections(scans, rate_hz, LengthUnit::Pixel, None, &mut config, &mut reasons),
         }
         reasons.iter().for_each(|r| say!("  {r}"));
         config

@@ -33,15 +33,16 @@ const SPEED_RESERVE: f64 = 1.5;
 pub fn for_detections(
     scans: &[Scan],
     rate_hz: f64,
+    unit: LengthUnit,
     false_tracks_per_hour: Option<f64>,
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) {
-    let of_boxes = assumed(scans, rate_hz, config, reasons);
+    let of_boxes = assumed(scans, rate_hz, unit, config, reasons);
     config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
-    let _ = noise::learn(scans, area_px2, LengthUnit::Pixel, config, reasons);
+    let _ = noise::learn(scans, area_px2, unit, config, reasons);
     if of_boxes {
         if false_tracks_per_hour.is_some() {
             reasons.push(RATE_WITHOUT_EFFECT.to_string());
@@ -62,7 +63,8 @@ pub(super) fn area_px2(scans: &[Scan]) -> f64 {
 }
 
 /// What is assumed before a tracker has run; whether it is what boxes of an object detector showed.
-fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) -> bool {
+fn assumed(scans: &[Scan], rate_hz: f64, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) -> bool {
+    let px = unit.sign();
     let rate = if rate_hz.is_finite() && rate_hz > 0.0 { rate_hz } else { crate::ASSUMED_RATE_HZ };
     let mut sides: Vec<f64> = scans
         .iter()
@@ -81,7 +83,7 @@ fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<
     if let Some(motion) = links.and_then(|l| l.motion(high_score)) {
         for_boxes(tracker, &motion);
         reasons.push(format!(
-            "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration of density {:.3} heights²/s³, speeds to {:.0} px/s, {:.0} % go on.",
+            "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration of density {:.3} heights²/s³, speeds to {:.0} {px}/s, {:.0} % go on.",
             motion.n_steps,
             motion.extra_noise,
             motion.density_per_s3,
@@ -104,7 +106,7 @@ fn assumed(scans: &[Scan], rate_hz: f64, config: &mut Config, reasons: &mut Vec<
     tracker.acceleration_density_px2_per_s3 = round((0.005 * side).max(0.03).powi(2) * rate.powi(3));
     tracker.max_speed_px_per_s = round((0.3 * side).max(5.0) * rate);
     reasons.push(format!(
-        "Median shorter side {side:.1} px: noise {} px, acceleration of density {} px²/s³, at most {} px/s.",
+        "Median shorter side {side:.1} {px}: noise {} {px}, acceleration of density {} {px}²/s³, at most {} {px}/s.",
         tracker.extra_noise_px, tracker.acceleration_density_px2_per_s3, tracker.max_speed_px_per_s
     ));
     false

@@ -24,6 +24,7 @@ use crate::report::{ContactSheet, SheetMark, SheetPicture, SheetRow};
 use crate::vision::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Error, ErrorKind, Frame, FrameSource, Result, Scan, Similarity, SourceInfo, Timestamp};
+use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -42,10 +43,11 @@ struct Candidate {
 /// `base` says how the input is read.
 /// # Errors
 /// A stream, which cannot be looked at twice; an input that cannot be read.
-pub fn preview(input: &str, base: &Config, request: &Request, command: &str) -> Result<ContactSheet> {
+pub fn preview(input: impl AsRef<OsStr>, base: &Config, request: &Request, command: &str) -> Result<ContactSheet> {
+    let input = input.as_ref();
     if !second_look::can_be_opened_twice(input) {
         return Err(Error::new(ErrorKind::Unsupported, "a preview looks over a whole file, and a stream has none")
-            .at(input)
+            .at(input.display())
             .hint("give a file or a folder, or record some seconds first: ffmpeg -i ADDRESS -t 20 -c copy some.mp4"));
     }
     // Decoding is one thread's work: the frames to show are read while the first ones are looked at.
@@ -67,7 +69,7 @@ pub fn preview(input: &str, base: &Config, request: &Request, command: &str) -> 
         coloured = read_runs(input, base, Colour::Rgb, &grey.moments.runs)?;
     }
     let ground = if camera == Camera::Fixed { Vec::new() } else { grounds(&grey.runs) };
-    let mut sheet = ContactSheet::new(input, &info);
+    let mut sheet = ContactSheet::new(&input.to_string_lossy(), &info);
     sheet.note = reach(&grey, &info);
     let with_colours = !coloured.is_empty() && coloured.len() == grey.runs.len();
     for (k, run) in grey.runs.iter().enumerate() {
@@ -83,7 +85,7 @@ pub fn preview(input: &str, base: &Config, request: &Request, command: &str) -> 
 }
 
 /// The source's facts, the candidates, and whether the camera stands.
-fn candidates(input: &str, base: &Config, request: &Request) -> Result<(SourceInfo, Vec<Candidate>, Camera)> {
+fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(SourceInfo, Vec<Candidate>, Camera)> {
     let source = base.input.mend(crate::io::open(input, &base.input.open_options())?)?;
     let n = frames_ahead(source.info(), PROBE_FRAMES, MOST_BYTES).min(PROBE_FRAMES);
     let mut first = Replay::new(source, n);
@@ -141,7 +143,7 @@ struct Read {
 }
 
 /// The runs of an input.
-fn read(input: &str, base: &Config, colour: Colour) -> Result<Read> {
+fn read(input: &OsStr, base: &Config, colour: Colour) -> Result<Read> {
     let mut source = open(input, base, colour)?;
     let info = source.info().clone();
     let px = (info.width * info.height).max(1) as u64;
@@ -166,7 +168,7 @@ fn read(input: &str, base: &Config, colour: Colour) -> Result<Read> {
     Ok(Read { moments, runs })
 }
 
-fn open(input: &str, base: &Config, colour: Colour) -> Result<Box<dyn FrameSource>> {
+fn open(input: &OsStr, base: &Config, colour: Colour) -> Result<Box<dyn FrameSource>> {
     let options = crate::io::OpenOptions { colour, ..base.input.open_options() };
     let source = crate::io::open(input, &options)?;
     if source.info().kind == crate::PixelKind::Rgb8 { Ok(source) } else { base.input.mend(source) }
@@ -178,7 +180,7 @@ fn firsts(moments: &Moments) -> Vec<Vec<u64>> {
 }
 
 /// Reads runs of frames; what is lost of the input is lost of its run.
-fn read_runs(input: &str, base: &Config, colour: Colour, runs: &[Vec<u64>]) -> Result<Vec<Vec<Frame>>> {
+fn read_runs(input: &OsStr, base: &Config, colour: Colour, runs: &[Vec<u64>]) -> Result<Vec<Vec<Frame>>> {
     let mut source = open(input, base, colour)?;
     let wanted: std::collections::BTreeSet<u64> = runs.iter().flatten().copied().collect();
     let last = wanted.last().copied().unwrap_or(0);
@@ -198,7 +200,7 @@ fn read_runs(input: &str, base: &Config, colour: Colour, runs: &[Vec<u64>]) -> R
     }
     out.retain(|run| !run.is_empty());
     if out.is_empty() {
-        return Err(Error::new(ErrorKind::Damaged, "no frame of it can be read").at(input));
+        return Err(Error::new(ErrorKind::Damaged, "no frame of it can be read").at(input.display()));
     }
     Ok(out)
 }

@@ -24,6 +24,11 @@ pub(super) fn decode(bytes: &[u8], colour: Colour, max_pixels: u64) -> Result<Pi
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let mut reader = decoder.read_info().map_err(|e| damaged("not a whole PNG", e))?;
+    // The decoder takes a palette in threes, and panics where it ends within one.
+    let palette = reader.info().palette.as_ref().map_or(0, |p| p.len());
+    if palette % 3 != 0 {
+        return Err(damaged("not a whole PNG", format_args!("a palette of {palette} bytes, no multiple of 3")));
+    }
     let (width, height) = check_size(reader.info().width.into(), reader.info().height.into(), max_pixels)?;
     let (kind, depth) = reader.output_color_type();
     let raw = (reader.info().raw_row_length() as u64).saturating_mul(height as u64);

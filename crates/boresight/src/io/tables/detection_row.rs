@@ -36,7 +36,7 @@ impl<'o> RowReader<'o> {
         let edge_shift_px = match form.kind {
             Kind::Named => named::edge_shift_px(&form.header, &form.layout),
             Kind::Mot => -PixelOrigin::Pixel1.edge_shift_px(),
-            Kind::Kitti => -PixelOrigin::Pixel0.edge_shift_px(),
+            Kind::Kitti | Kind::Ab3dmot => -PixelOrigin::Pixel0.edge_shift_px(),
         };
         let has_centre = form.layout.has(&[Field::X, Field::Y]);
         let first_frame = options.first_frame.unwrap_or(first_frame);
@@ -48,6 +48,7 @@ impl<'o> RowReader<'o> {
         match form.kind {
             Kind::Mot => return "MOTChallenge".to_string(),
             Kind::Kitti => return "KITTI".to_string(),
+            Kind::Ab3dmot => return "AB3DMOT's detections on KITTI".to_string(),
             Kind::Named if form.header.join(",").starts_with(DETECTIONS_HEADER) => {
                 return "boresight detections".to_string();
             }

@@ -2,6 +2,7 @@
 
 use super::radar::picture::RadarPicture;
 use crate::Scan;
+use crate::length_unit::LengthUnit;
 
 /// Detections read from a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +13,8 @@ pub struct DetectionTable {
     pub rate_hz: f64,
     /// The number that the table gives to its first frame, which is frame 0 here: 1 in MOTChallenge text.
     pub first_frame: u64,
+    /// What positions and sizes are counted in.
+    pub unit: LengthUnit,
     /// What kind of table it was, for the summary: `boresight detections`, `MOTChallenge`, `CSV (frame, x, y)`.
     pub format: String,
     /// Names of the classes, by [`crate::ClassId`], if the table has names instead of numbers.

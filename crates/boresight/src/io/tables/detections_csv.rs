@@ -6,8 +6,8 @@
 //! variances a degree of freedom, and the chance of as much. Numbers are the shortest that read back to the same bits.
 
 use super::number::{push_f32, push_f64, push_seconds};
-use super::unit::LengthUnit;
 use crate::io::atomic::Output;
+use crate::length_unit::LengthUnit;
 use crate::{PositionFit, Result, Sink, View};
 use std::fmt::Write;
 use std::path::PathBuf;

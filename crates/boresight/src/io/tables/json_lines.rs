@@ -6,8 +6,8 @@
 
 use super::number::{push_f32, push_f64, push_seconds};
 use super::tracks_csv::status_word;
-use super::unit::LengthUnit;
 use crate::io::atomic::Output;
+use crate::length_unit::LengthUnit;
 use crate::{Detection, Result, Sink, TrackState, View};
 use std::fmt::Write;
 use std::path::PathBuf;

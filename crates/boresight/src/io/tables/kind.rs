@@ -9,4 +9,6 @@ pub(crate) enum Kind {
     Mot,
     /// KITTI tracking labels: no header, counted from 0.
     Kitti,
+    /// AB3DMOT's detections on KITTI: no header, counted from 0.
+    Ab3dmot,
 }

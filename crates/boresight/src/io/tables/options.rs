@@ -2,6 +2,7 @@
 
 use super::columns::Columns;
 use super::radar::options::RadarOptions;
+use crate::length_unit::LengthUnit;
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,12 @@ pub struct TableOptions {
     /// Number that the table gives to its first frame; absent: 1 in MOTChallenge text, else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_frame: Option<u64>,
+    /// Unit of positions and sizes, `px` or `m`; absent: what the names of the columns say (`x_m`), else `px`. Keys that end in `-px` are in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<LengthUnit>,
+    /// Least score of a detection; rows below it are left out. Absent: all are kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_score: Option<f32>,
     /// Whether rows that cannot be read are counted and left out instead of ending the run.
     pub skip_bad_rows: bool,
     /// How a radar's table of range and azimuth is read.
@@ -47,6 +54,8 @@ impl Default for TableOptions {
             box_px: 5.0,
             first_pixel: 0.0,
             first_frame: None,
+            unit: None,
+            min_score: None,
             skip_bad_rows: false,
             radar: RadarOptions::default(),
         }
@@ -77,6 +86,9 @@ impl TableOptions {
         }
         if !(self.box_px.is_finite() && self.box_px >= 0.0) {
             return config("box-px", self.box_px, "a size in pixels");
+        }
+        if let Some(score) = self.min_score.filter(|s| !s.is_finite()) {
+            return config("min-score", score.into(), "a number");
         }
         if !self.first_pixel.is_finite() {
             return config("first-pixel", self.first_pixel, "0 or 1");

@@ -6,11 +6,12 @@
 use super::columns::Field;
 use super::detection_row::RowReader;
 use super::detection_table::DetectionTable;
+use super::dialect::named;
 use super::options::TableOptions;
 use super::radar::read::{radar_columns, read_radar};
 use super::scan_times::{Grouped, scans_of, set_times};
 use super::table::Table;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, shown_rate};
 use std::path::Path;
 
 /// Reads detections from a table.
@@ -47,6 +48,7 @@ pub(crate) fn identified_of(
         scans: Vec::new(),
         rate_hz: 0.0,
         first_frame: options.first_frame.unwrap_or_else(|| table.first_frame()),
+        unit: options.unit.or(named::unit(&table.form.header, &table.form.layout)).unwrap_or_default(),
         format: RowReader::format(&table.form),
         class_names: Vec::new(),
         n_rows: 0,
@@ -56,7 +58,8 @@ pub(crate) fn identified_of(
         radar: None,
     };
     let mut seen = Vec::new();
-    let mut n_loose = 0;
+    let (mut n_loose, mut n_weak) = (0, 0);
+    let least_score = options.min_score.unwrap_or(f32::NEG_INFINITY);
     while let Some(row) = table.next_row()? {
         out.n_rows += 1;
         if identified && row.id().is_ok_and(|id| id.is_none_or(|id| id < 0)) {
@@ -64,6 +67,7 @@ pub(crate) fn identified_of(
             continue;
         }
         match reader.read(&row, identified, &mut out.class_names) {
+            Ok(Some(one)) if one.detection.score < least_score => n_weak += 1,
             Ok(one) => seen.extend(one),
             Err(_) if options.skip_bad_rows => out.n_skipped += 1,
             // A run that was cut off leaves a last line without an end.
@@ -78,10 +82,16 @@ pub(crate) fn identified_of(
     if out.n_skipped > 0 && options.skip_bad_rows {
         out.lost.push(format!("{label}: {} of {} rows were bad and left out.", out.n_skipped, out.n_rows));
     }
+    if n_weak > 0 {
+        out.warnings.push(format!(
+            "{label}: {n_weak} of {} rows have a score below {least_score} and were left out.",
+            out.n_rows
+        ));
+    }
     if seen.is_empty() && out.n_skipped > 0 {
         return Err(Error::new(ErrorKind::Damaged, format!("none of its {} rows can be read", out.n_rows)).at(label));
     }
-    if let Some(unit) = &table.unit {
+    if let Some(unit) = table.unit.as_ref().filter(|_| options.unit.is_none()) {
         out.warnings.push(format!(
             "{}: positions are in {unit}, and were taken as pixels: export them in pixels, or read all results in {unit}.",
             label
@@ -98,12 +108,14 @@ pub(crate) fn identified_of(
     let rate = set_times(&mut scans, &times, label, options, rate_beside)?;
     (out.scans, out.rate_hz) = (scans, rate.rate_hz);
     if rate.is_assumed {
-        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", label, rate.rate_hz));
+        out.warnings.push(format!("{} says nothing of time: {} frames/s were taken.", label, shown_rate(rate.rate_hz)));
     }
     if !layout.has(&[Field::VarX]) && !layout.has(&[Field::StdX]) && !out.scans.is_empty() {
         out.warnings.push(format!(
-            "{} has no position errors: a standard deviation of {} px was taken.",
-            label, options.std_px
+            "{} has no position errors: a standard deviation of {} {} was taken.",
+            label,
+            options.std_px,
+            out.unit.sign()
         ));
     }
     Ok((out, ids))
@@ -156,6 +168,26 @@ mod tests {
         };
         assert!(plain(&of("micron")).warnings.iter().any(|w| w.contains("in micron")));
         assert!(!plain(&of("pixel")).warnings.iter().any(|w| w.contains("positions are")));
+    }
+
+    #[test]
+    fn kitti_labels_and_detections_as_ab3dmot_has_them_are_boxes_from_frame_0() {
+        // The same box: corners (10, 20) and (30, 60), whose first pixel is 10, 20.
+        let labels = "0 0 Car 0 0 1.5 10 20 30 60 1.5 1.6 3.7 1 2 30 0.1\n2 0 Car 0 0 1.5 10 20 30 60 1.5 1.6 3.7 1 2 30 0.1\n\
+2 -1 DontCare -1 -1 -10 5 6 15 26 -1000 -1000 -1000 -10 -1 -1 -1\n";
+        let results = labels.replace(" 0.1\n", " 0.1 7.5\n");
+        let detections =
+            "0,2,10,20,30,60,7.5,1.5,1.6,3.7,1,2,30,0.1,1.5\n2,2,10,20,30,60,7.5,1.5,1.6,3.7,1,2,30,0.1,1.5\n";
+        for (text, score) in [(labels, 1.0), (&results, 7.5), (detections, 7.5)] {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), text).unwrap();
+            let table = read_detections(file.path(), &TableOptions::default()).unwrap();
+            assert_eq!((table.scans.len(), table.first_frame), (3, 0), "{text}");
+            let [one] = &table.scans[2].detections[..] else { panic!("{text}") };
+            let e = one.extent;
+            assert_eq!([e.left_px, e.top_px, e.width_px, e.height_px], [9.5, 19.5, 20.0, 40.0], "{text}");
+            assert_eq!(one.score, score, "{text}");
+        }
     }
 
     #[test]

@@ -280,7 +280,7 @@ impl<'t> Row<'t> {
     fn at_column(&self, at: usize, what: String) -> Error {
         let name = match self.form.kind {
             Kind::Named => self.form.header.get(at).cloned().unwrap_or_default(),
-            Kind::Mot | Kind::Kitti => (at + 1).to_string(),
+            Kind::Mot | Kind::Kitti | Kind::Ab3dmot => (at + 1).to_string(),
         };
         self.bad(format!("column {name}: {what}"))
     }

@@ -2,7 +2,7 @@
 
 use super::coco;
 use super::columns::{Columns, Field, Layout};
-use super::dialect::{kitti, mot, named};
+use super::dialect::{ab3dmot, kitti, mot, named};
 use super::kind::Kind;
 use super::lexer::{Lines, Separator, split};
 use super::number::parse_f64;
@@ -156,6 +156,7 @@ fn fixed_layout(kind: Kind) -> Layout {
         Kind::Named => Layout::default(),
         Kind::Mot => mot::layout(),
         Kind::Kitti => kitti::layout(),
+        Kind::Ab3dmot => ab3dmot::layout(),
     }
 }
 
@@ -168,6 +169,10 @@ fn look_of(line: &[u8], separator: Separator, fields: &[String], columns: &Colum
         return Ok((Kind::Named, !numbers));
     }
     if numbers {
+        let values: Vec<Option<f64>> = fields.iter().map(|f| parse_f64(f.as_bytes(), comma)).collect();
+        if ab3dmot::looks_like(&values) {
+            return Ok((Kind::Ab3dmot, false));
+        }
         if fields.len() >= mot::LEAST_COLUMNS {
             return Ok((Kind::Mot, false));
         }
@@ -266,6 +271,7 @@ mod tests {
         assert_eq!(look("1,2,3,4,5,6,1,-1,-1,-1\n"), Ok(Kind::Mot));
         assert_eq!(look("1;-1;5;6,5;7;8\n"), Ok(Kind::Mot));
         assert_eq!(look("0 1 Car 0 0 0 1 2 3 4\n"), Ok(Kind::Kitti));
+        assert_eq!(look("0,2,10,20,30,40,5,1,1,4,-4,1,30,0,0\n"), Ok(Kind::Ab3dmot));
         assert_eq!(look("frame,particle,x,y\n"), Ok(Kind::Named));
         assert_eq!(look(",frame,particle,x,y\n"), Ok(Kind::Named), "the index of a data frame has no name");
         assert_eq!(look("\u{feff}# by hand\nframe;particle;x;y\n"), Ok(Kind::Named));

@@ -6,8 +6,8 @@
 //! to the same bits. In metres the columns say so: `x_m`, `vx_m_per_s`.
 
 use super::number::{push_f64, push_seconds};
-use super::unit::LengthUnit;
 use crate::io::atomic::Output;
+use crate::length_unit::LengthUnit;
 use crate::{Result, Sink, TrackStatus, View};
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -76,7 +76,7 @@ impl CtcFolder {
     /// An image that cannot be read or is no grey image of whole numbers.
     pub fn labels(&self, frame: u32) -> Result<Option<Image<u16>>> {
         let Some(path) = self.images.get(&frame) else { return Ok(None) };
-        let mut source = open(&path.to_string_lossy(), &OpenOptions::default())?;
+        let mut source = open(path, &OpenOptions::default())?;
         match source.next_frame()?.map(|f| f.pixels) {
             Some(Pixels::Gray16(image)) => Ok(Some(image)),
             Some(Pixels::Gray8(image)) => {

@@ -9,8 +9,8 @@ pub struct ReadOptions {
     pub skip_bad_rows: bool,
     /// Keep columns that have no place in a [`crate::TrackTable`] as text (for conversion).
     pub keep_extra: bool,
-    /// MOTChallenge tables: frames in the file count from 0 instead of 1.
-    pub frames_from_zero: bool,
+    /// What the file calls the first frame; `None`: 1 in MOTChallenge tables, 0 in all others.
+    pub first_frame: Option<u64>,
 }
 
 /// Rows that were left out.

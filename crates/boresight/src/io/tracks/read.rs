@@ -40,14 +40,18 @@ pub fn sniff(path: &Path) -> Result<Format> {
                 .hint("name the table itself, or write {seq} where the names of the sequences stand"))
         };
     }
-    Ok(format_of(Table::open(path, &Columns::default())?.form.kind))
+    format_of(Table::open(path, &Columns::default())?.form.kind).map_err(|e| e.at(path.display()))
 }
 
-fn format_of(kind: Kind) -> Format {
+fn format_of(kind: Kind) -> Result<Format> {
     match kind {
-        Kind::Named => Format::Named(Dialect::Plain),
-        Kind::Mot => Format::Mot,
-        Kind::Kitti => Format::Kitti,
+        Kind::Named => Ok(Format::Named(Dialect::Plain)),
+        Kind::Mot => Ok(Format::Mot),
+        Kind::Kitti => Ok(Format::Kitti),
+        Kind::Ab3dmot => {
+            Err(Error::new(ErrorKind::Unsupported, "holds AB3DMOT's detections, which belong to no tracks yet")
+                .hint("track them first: boresight track FILE"))
+        }
     }
 }
 
@@ -74,7 +78,10 @@ pub fn read(path: &Path, format: Option<Format>, options: ReadOptions, tentative
         Some(_) => Table::open_as(path, Kind::Named)?,
         None => Table::open(path, &Columns::default())?,
     };
-    let format = format.unwrap_or(format_of(source.form.kind));
+    let format = match format {
+        Some(format) => format,
+        None => format_of(source.form.kind).map_err(|e| e.at(path.display()))?,
+    };
     let n_bytes = std::fs::metadata(path).map_or(0, |meta| meta.len());
     let (table, bad) = read_rows(source, options, tentative, n_bytes)?;
     Ok(TrackFile { table, format, bad })
@@ -86,7 +93,7 @@ fn read_rows(mut source: Table, options: ReadOptions, tentative: bool, n_bytes: 
     let origin = match kind {
         Kind::Named => PixelOrigin::Centre0,
         Kind::Mot => PixelOrigin::Pixel1,
-        Kind::Kitti => PixelOrigin::Pixel0,
+        Kind::Kitti | Kind::Ab3dmot => PixelOrigin::Pixel0,
     };
     let mut table = TrackTableBuilder::new(label.as_str(), origin);
     let (mut boxes, mut kept) = (true, Vec::new());
@@ -97,6 +104,7 @@ fn read_rows(mut source: Table, options: ReadOptions, tentative: bool, n_bytes: 
             }
             source.check_place()?;
             source.check_track()?;
+            table.unit(named::unit(&source.form.header, layout).unwrap_or_default());
             boxes = layout.has(&[Field::Width, Field::Height])
                 || layout.has(&[Field::Left, Field::Top, Field::Right, Field::Bottom]);
             let header = source.form.header.iter().enumerate();
@@ -109,11 +117,13 @@ fn read_rows(mut source: Table, options: ReadOptions, tentative: bool, n_bytes: 
             mot::WORLD.iter().filter(|_| options.keep_extra).for_each(|n| table.add_extra(*n));
         }
         Kind::Kitti => kitti::EXTRA.iter().filter(|_| options.keep_extra).for_each(|e| table.add_extra(e.0)),
+        // It has no tracks and is refused above.
+        Kind::Ab3dmot => source.check_track()?,
     }
     let reader = Rows {
         tentative,
         keep_extra: options.keep_extra,
-        first_frame: if options.frames_from_zero { 0 } else { source.first_frame() },
+        first_frame: options.first_frame.unwrap_or(source.first_frame()),
         edge_shift_px: named::edge_shift_px(&source.form.header, layout),
         has_state: [Field::TimeS, Field::Status, Field::Detection, Field::Vx, Field::VarX]
             .into_iter()
@@ -125,7 +135,7 @@ fn read_rows(mut source: Table, options: ReadOptions, tentative: bool, n_bytes: 
         let pushed = match kind {
             Kind::Named => reader.named(&row, &mut table, &mut bad),
             Kind::Mot => reader.mot(&row, &mut table),
-            Kind::Kitti => reader.kitti(&row, &mut table),
+            Kind::Kitti | Kind::Ab3dmot => reader.kitti(&row, &mut table),
         };
         pushed.or_else(|e| bad.note(options, e))?;
     }
@@ -138,7 +148,7 @@ fn read_rows(mut source: Table, options: ReadOptions, tentative: bool, n_bytes: 
     }
     // Columns that say "unknown" throughout are no loss to another format; the writers put them back.
     let unknown = |name: &str| match kind {
-        Kind::Named => None,
+        Kind::Named | Kind::Ab3dmot => None,
         Kind::Mot => Some("-1"),
         Kind::Kitti => kitti::EXTRA.iter().position(|e| e.0 == name).map(|k| kitti::UNKNOWN[k]),
     };
@@ -337,5 +347,16 @@ Label,Spot ID,Track ID,Quality,X,Y,Frame\n,,,(quality),(pixel),(pixel),\nID1,1,3
         assert_eq!(state.time.map(|t| t.ns), Some(500_000_000));
         assert_eq!(t.position_cov(0).map(|p| p[(0, 1)]), Some(0.5));
         assert_eq!((t.is_measured(0), t.is_measured(1), t.state(1).detection), (Some(false), Some(true), Some(5)));
+    }
+
+    #[test]
+    fn results_in_kitti_labels_have_boxes_ids_and_scores_and_detections_are_no_tracks() {
+        let text = "0 3 Car 0 0 1.5 10 20 30 60 1.5 1.6 3.7 1 2 30 0.1 7.5\n1 3 Car 0 0 1.5 11 20 31 60 1.5 1.6 3.7 1 2 30 0.1 7.25\n";
+        let read = read_text(text, ReadOptions::default()).unwrap().0;
+        assert_eq!((read.boxes[1], read.ids[0], read.score.get(1)), ([11.0, 20.0, 20.0, 40.0], 3, 7.25));
+        assert_eq!(read.n_frames(), 2, "frames count from 0");
+        let detections = "0,2,10,20,30,60,7.5,1.5,1.6,3.7,1,2,30,0.1,1.5\n";
+        let error = read_text(detections, ReadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("no tracks yet") && error.contains("boresight track"), "{error}");
     }
 }

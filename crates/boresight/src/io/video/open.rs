@@ -16,7 +16,7 @@ const FFMPEG: &str = "ffmpeg";
 pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     match mp4::open(path, options)? {
         mp4::Opened::Source(source) => Ok(source),
-        mp4::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), &path.to_string_lossy(), options) {
+        mp4::Opened::Other(why) => match ffmpeg::open(OsStr::new(FFMPEG), path.as_os_str(), options) {
             Err(e) if e.kind() == ErrorKind::MissingTool => Err(Error::new(e.kind(), why.to_string()).hint(format!(
                 "such a video is read through the program ffmpeg, which is not installed; {}",
                 ffmpeg::INSTALL
@@ -29,8 +29,8 @@ pub fn open_mp4(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSourc
 /// Opens anything that the program `ffmpeg` reads: a file, an address (`rtsp://`, `http://`), a camera (`/dev/video0`).
 /// # Errors
 /// [`ErrorKind::MissingTool`] if there is no `ffmpeg` on the PATH, else what it says of the input.
-pub fn open_ffmpeg(input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    ffmpeg::open(OsStr::new(FFMPEG), input, options)
+pub fn open_ffmpeg(input: impl AsRef<OsStr>, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    ffmpeg::open(OsStr::new(FFMPEG), input.as_ref(), options)
 }
 
 #[cfg(test)]
@@ -41,7 +41,7 @@ mod tests {
     fn a_missing_ffmpeg_is_named_with_the_way_to_install_it() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
         let name = OsStr::new("no-such-program-as-ffmpeg");
-        let err = ffmpeg::open(name, &here.to_string_lossy(), &OpenOptions::default()).err().unwrap();
+        let err = ffmpeg::open(name, here.as_os_str(), &OpenOptions::default()).err().unwrap();
         assert_eq!(err.kind(), ErrorKind::MissingTool);
         let text = err.to_string();
         assert!(

@@ -7,6 +7,7 @@ use super::note::Note;
 use super::optional::OptionalMeasures;
 use super::options::{ClearConvention, EvaluateOptions, MeasureSet};
 use super::sequence::Sequence;
+use crate::length_unit::LengthUnit;
 use crate::metrics::clear_classic::{ClearClassic, clear_classic};
 use crate::metrics::multi_object::{MatchOptions, MotScores, mot_scores};
 use crate::metrics::preprocess::preprocess;
@@ -24,6 +25,8 @@ const MIN_PIECE_FRAMES: usize = 10;
 pub struct Evaluation {
     /// Name of the sequence.
     pub name: String,
+    /// What distances are counted in; fields that end in `_px` are in it.
+    pub unit: LengthUnit,
     /// CLEAR, identity and HOTA.
     pub scores: MotScores,
     /// CLEAR in the convention of py-motmetrics, if asked for.
@@ -75,6 +78,7 @@ impl Sequence<'_> {
         let warnings = sanity_checks(&truth, &result, matching.similarity, self.size_px)?;
         let mut out = Evaluation {
             name: self.name.to_string(),
+            unit: self.unit(),
             scores: mot_scores(&truth, &result, &matching)?,
             rate_hz: self.rate_hz,
             size_px: self.size_px,
@@ -92,6 +96,12 @@ impl Sequence<'_> {
             out.optional = Some(OptionalMeasures::of(&counted, options, &matching, &mut out.notes)?);
         }
         Ok(out)
+    }
+
+    /// Metres where one of the tables says so.
+    fn unit(&self) -> LengthUnit {
+        let metres = [self.truth, self.result].iter().any(|t| t.unit == LengthUnit::Metre);
+        if metres { LengthUnit::Metre } else { LengthUnit::Pixel }
     }
 
     /// The rows that count, in one frame of reference.

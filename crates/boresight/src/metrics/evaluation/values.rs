@@ -135,6 +135,7 @@ impl Evaluation {
         if let Some(c) = &f.cells {
             parts.extend([Value::higher("DET", c.det()), Value::higher("TRA", c.tra())].map(by_frames));
         }
+        parts.iter_mut().for_each(|p| p.value.unit = self.unit.of_pixels(p.value.unit));
         parts
     }
 }

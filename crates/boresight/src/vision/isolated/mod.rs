@@ -1,13 +1,18 @@
 //! Isolated targets of any size: closed contours that stand clear of the ring around them.
 
+mod bars;
+mod blob;
+mod cells;
 mod config;
 mod detect;
-mod highest;
+mod grow;
 mod levels;
+mod measure;
 mod near;
+mod nested;
+mod peaks;
 mod ring;
-mod sums;
-mod sweep;
+mod steps;
 
 pub use config::IsolatedConfig;
 pub use detect::IsolatedDetector;

@@ -2,7 +2,7 @@
 //!
 //! Limits: a box of the longest side covers some tens of cells.
 
-use super::sweep::Blob;
+use super::blob::Blob;
 
 /// Side of a cell as a power of two: 32 px, some small targets wide.
 const SHIFT: u32 = 5;
@@ -66,27 +66,20 @@ fn cells(columns: usize, b: &Blob, mut each: impl FnMut(usize)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::Sweep;
     use super::*;
-    use crate::Image;
-    use crate::vision::isolated::highest::Highest;
-    use crate::vision::threshold::Side;
-    use crate::vision::threshold::band::words;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn no_box_that_overlaps_is_missed() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
-        let image = Image::from_vec(150, 90, (0..150 * 90).map(|_| rng.random::<u8>()).collect()).unwrap();
-        let (mut sweep, mut bits) = (Sweep::default(), vec![0; words(150)]);
-        let mut highest = Highest::default();
-        highest.read(&image, 1.0);
-        let mut boxes = Vec::new();
-        for level in [120.0, 150.0, 200.0] {
-            sweep.run(&image, &highest, Side::Bright, level, &mut bits);
-            boxes.extend(sweep.blobs());
-        }
+        let boxes: Vec<Blob> = (0..400)
+            .map(|i| {
+                let (left, top) = (rng.random_range(0..120u32), rng.random_range(0..60u32));
+                let (w, h) = if i % 9 == 0 { (29, 25) } else { (rng.random_range(0..5), rng.random_range(0..5)) };
+                Blob::of_box([left, top, left + w, top + h])
+            })
+            .collect();
         let mut near = Near::default();
         near.fill(150, 90, boxes.iter());
         let mut pairs = 0;

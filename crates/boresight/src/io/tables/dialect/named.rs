@@ -5,6 +5,7 @@
 //! spots outside of tracks.
 
 use crate::io::tables::columns::{Field, Layout};
+use crate::length_unit::LengthUnit;
 
 /// The programs whose tables of points are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +34,17 @@ pub(crate) fn is_trackmate(header: &[String]) -> bool {
 pub(crate) fn trackmate_unit(cell: &str) -> Option<String> {
     let unit = cell.strip_prefix('(')?.strip_suffix(')')?;
     (!["pixel", "pixels", "px"].contains(&unit)).then(|| unit.to_string())
+}
+
+/// The unit that the column of positions names: `x_px`, `x_m`, `X (m)`; `None` where it names none of these.
+pub(crate) fn unit(header: &[String], layout: &Layout) -> Option<LengthUnit> {
+    let name = [Field::X, Field::Left].into_iter().find_map(|f| header.get(layout.column(f)?))?;
+    let word = name.rsplit(|c: char| !c.is_ascii_alphanumeric()).find(|w| !w.is_empty())?;
+    match word {
+        "px" => Some(LengthUnit::Pixel),
+        "m" => Some(LengthUnit::Metre),
+        _ => None,
+    }
 }
 
 /// From a left or top of a table to the box's edge, px.

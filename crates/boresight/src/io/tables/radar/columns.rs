@@ -3,7 +3,7 @@
 //! A name is a row of words parted by what is neither letter nor digit: `range_m`, `azimuth_deg`, `range_std_nm`, `var_az`. Every word must be known, or
 //! the column is none of these. A deviation without a unit has that of its quantity.
 
-use crate::io::tables::unit::LengthUnit;
+use crate::length_unit::LengthUnit;
 use crate::{Error, ErrorKind, Result};
 
 /// A column and the factor to m (px), rad, m² or rad².

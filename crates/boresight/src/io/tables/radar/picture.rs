@@ -1,6 +1,6 @@
 //! What a radar's table says beside its plots: where the radar was, how far it looks, how fast its antenna turns.
 
-use crate::io::tables::unit::LengthUnit;
+use crate::length_unit::LengthUnit;
 
 /// Where a radar was and how it looks.
 #[derive(Clone, Debug, PartialEq)]

@@ -98,6 +98,7 @@ pub(crate) fn read_radar(
         scans,
         rate_hz: 1.0 / turn_s,
         first_frame: 0,
+        unit: columns.unit,
         format: "a radar's plots of range and azimuth".to_string(),
         class_names: Vec::new(),
         n_rows,

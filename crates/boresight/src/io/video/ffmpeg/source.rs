@@ -51,14 +51,20 @@ impl Drop for FfmpegSource {
 }
 
 /// Opens `input` with the program `ffmpeg`.
-pub(in crate::io::video) fn open(program: &OsStr, input: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+pub(in crate::io::video) fn open(
+    program: &OsStr,
+    input: &OsStr,
+    options: &OpenOptions,
+) -> Result<Box<dyn FrameSource>> {
     let source = match start(program, input, options, "-fps_mode")? {
         Started::Source(source) => source,
         // Programs before 5.1 know the same choice by an older name.
         Started::OldProgram => match start(program, input, options, "-vsync")? {
             Started::Source(source) => source,
             Started::OldProgram => {
-                return Err(Error::new(ErrorKind::MissingTool, "the ffmpeg found is too old").at(input).hint(INSTALL));
+                return Err(Error::new(ErrorKind::MissingTool, "the ffmpeg found is too old")
+                    .at(input.display())
+                    .hint(INSTALL));
             }
         },
     };
@@ -75,7 +81,7 @@ enum Started {
     OldProgram,
 }
 
-fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str) -> Result<Started> {
+fn start(program: &OsStr, input: &OsStr, options: &OpenOptions, sync_option: &str) -> Result<Started> {
     let live = is_live(input);
     let mut child = command(program, input, options, sync_option)?.spawn().map_err(|e| {
         let missing = e.kind() == std::io::ErrorKind::NotFound;
@@ -84,11 +90,11 @@ fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str)
         } else {
             "is read through the program ffmpeg, which cannot be started"
         };
-        let error = Error::new(ErrorKind::MissingTool, what).at(input).hint(INSTALL);
+        let error = Error::new(ErrorKind::MissingTool, what).at(input.display()).hint(INSTALL);
         if missing { error } else { error.because(e) }
     })?;
     let (Some(stdout), Some(stderr)) = (child.stdout.take(), child.stderr.take()) else {
-        return Err(Error::new(ErrorKind::MissingTool, "ffmpeg gave no pipe").at(input));
+        return Err(Error::new(ErrorKind::MissingTool, "ffmpeg gave no pipe").at(input.display()));
     };
     let log = Log::drain(stderr);
     let (send, messages) = sync_channel(AHEAD);
@@ -98,7 +104,7 @@ fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str)
         .name("boresight-ffmpeg".into())
         .spawn(move || read_all(stdout, colour, max_pixels, &send, &spare_out));
     let info = SourceInfo {
-        label: input.to_string(),
+        label: input.to_string_lossy().into_owned(),
         reader: "ffmpeg pipe".into(),
         width: 0,
         height: 0,
@@ -150,16 +156,17 @@ fn start(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str)
 }
 
 /// Whether an input never ends by itself.
-fn is_live(input: &str) -> bool {
-    input.starts_with("/dev/") || input.contains("://")
+fn is_live(input: &OsStr) -> bool {
+    input.to_str().is_some_and(|t| t.starts_with("/dev/") || t.contains("://"))
 }
 
-fn command(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &str) -> Result<Command> {
+fn command(program: &OsStr, input: &OsStr, options: &OpenOptions, sync_option: &str) -> Result<Command> {
     let mut c = Command::new(program);
     c.args(["-hide_banner", "-nostdin", "-nostats", "-loglevel", "repeat+level+info"]);
-    if input.starts_with("/dev/video") {
+    let starts = |with: &str| input.to_str().is_some_and(|t| t.starts_with(with));
+    if starts("/dev/video") {
         c.args(["-f", "v4l2"]);
-    } else if input.starts_with("rtsp://") || input.starts_with("rtsps://") {
+    } else if starts("rtsp://") || starts("rtsps://") {
         // Over UDP lost packets become broken pictures.
         c.args(["-rtsp_transport", "tcp"]);
     }
@@ -173,7 +180,7 @@ fn command(program: &OsStr, input: &str, options: &OpenOptions, sync_option: &st
     } else {
         let path = Path::new(input);
         if !path.exists() {
-            return Err(Error::new(ErrorKind::NotFound, "no such file").at(input));
+            return Err(Error::new(ErrorKind::NotFound, "no such file").at(input.display()));
         }
         // The prefix keeps names with ':', '%' or a leading '-' from being read as something else.
         let mut name = std::ffi::OsString::from("file:");
@@ -307,7 +314,8 @@ mod tests {
         let stop = StopFlag::default();
         let options = OpenOptions { stop: Some(stop.clone()), ..OpenOptions::default() };
         let began = Instant::now();
-        let waits = std::thread::spawn(move || open(program.as_os_str(), "udp://127.0.0.1:9", &options).is_err());
+        let waits =
+            std::thread::spawn(move || open(program.as_os_str(), OsStr::new("udp://127.0.0.1:9"), &options).is_err());
         let written = || std::fs::read_to_string(&pid).is_ok_and(|text| text.ends_with('\n'));
         while !written() && began.elapsed() < SILENCE {
             std::thread::sleep(Duration::from_millis(5));

@@ -1,12 +1,14 @@
 //! The unit of length of a table: pixels of a picture, or metres of a map.
 
 /// What positions and sizes are counted in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub enum LengthUnit {
     /// Pixels; x to the right, y down.
     #[default]
+    #[serde(rename = "px")]
     Pixel,
     /// Metres; x to the east, y to the north.
+    #[serde(rename = "m")]
     Metre,
 }
 
@@ -16,6 +18,16 @@ impl LengthUnit {
         match self {
             Self::Pixel => "px",
             Self::Metre => "m",
+        }
+    }
+
+    /// A unit that is written for pixels, in this one: `px/s` becomes `m/s`.
+    pub fn of_pixels(self, unit: &'static str) -> &'static str {
+        match (self, unit) {
+            (Self::Metre, "px") => "m",
+            (Self::Metre, "px^p") => "m^p",
+            (Self::Metre, "px/s") => "m/s",
+            (_, unit) => unit,
         }
     }
 

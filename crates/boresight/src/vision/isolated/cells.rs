@@ -1,0 +1,259 @@
+//! What cells of 8 x 8 px say of a frame: their extremes, and the ground and the noise in square rings of cells around any place.
+//!
+//! A cell's variance is taken about its own plane, so that shading is no noise: what is left is a lower bound of the spread that a ring through the cell shows. Sums over
+//! rectangles of cells come from summed-area tables (F. C. Crow, SIGGRAPH 1984), in f64.
+//! Units: counts, counts²; places in cells.
+//! Limits: cells at the right and lower border are smaller and keep their shading. Pixels that are not finite count for nothing.
+
+use crate::Image;
+use crate::vision::pixel::Pixel;
+
+/// Side of a cell, px.
+pub const CELL: usize = 8;
+
+/// Σ x² over a cell of places about its middle: 8 Σ (±0.5, ±1.5, ±2.5, ±3.5)².
+const PLACES2: f32 = 336.0;
+
+/// The cells of one frame; keeps its memory.
+#[derive(Debug, Default)]
+pub struct Cells {
+    columns: usize,
+    rows: usize,
+    lowest: Vec<f32>,
+    highest: Vec<f32>,
+    means: Vec<f32>,
+    spreads: Vec<f32>,
+    /// Summed-area table with a row and a column of zeros before it: pixels, values, squared deviations about each cell's plane.
+    sums: Vec<[f64; 3]>,
+    lanes: Lanes,
+}
+
+/// Sums of the columns of one row of cells.
+#[derive(Debug, Default)]
+struct Lanes {
+    base: Vec<f32>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+    sum: Vec<f32>,
+    /// Weighted with the row's place about the middle.
+    slope: Vec<f32>,
+    square: Vec<f32>,
+}
+
+/// What one cell holds.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    low: f32,
+    high: f32,
+    pixels: f64,
+    values: f64,
+    squares: f64,
+}
+
+impl Cells {
+    /// Reads a frame.
+    pub fn read<T: Pixel>(&mut self, image: &Image<T>) {
+        self.columns = image.width().div_ceil(CELL);
+        self.rows = image.height().div_ceil(CELL);
+        let stride = self.columns + 1;
+        for v in [&mut self.lowest, &mut self.highest, &mut self.means, &mut self.spreads] {
+            v.clear();
+            v.resize(self.columns * self.rows, 0.0);
+        }
+        self.sums.clear();
+        self.sums.resize(stride * (self.rows + 1), [0.0; 3]);
+        let mut lanes = std::mem::take(&mut self.lanes);
+        for r in 0..self.rows {
+            let tall = CELL.min(image.height() - r * CELL);
+            lanes.start(image.row(r * CELL));
+            for y in 0..tall {
+                lanes.add(image.row(r * CELL + y), y as f32 - 3.5);
+            }
+            let mut before = [0.0; 3];
+            for c in 0..self.columns {
+                let wide = CELL.min(image.width() - c * CELL);
+                let cell = lanes.cell(c * CELL, wide, tall).unwrap_or_else(|| slow(image, c, r));
+                self.lowest[r * self.columns + c] = cell.low;
+                self.highest[r * self.columns + c] = cell.high;
+                // NaN where no pixel is finite.
+                self.means[r * self.columns + c] = (cell.values / cell.pixels) as f32;
+                self.spreads[r * self.columns + c] = (cell.squares / cell.pixels).sqrt() as f32;
+                before[0] += cell.pixels;
+                before[1] += cell.values;
+                before[2] += cell.squares;
+                let (above, at) = (r * stride + c + 1, (r + 1) * stride + c + 1);
+                let above = self.sums[above];
+                self.sums[at] = [above[0] + before[0], above[1] + before[1], above[2] + before[2]];
+            }
+        }
+        self.lanes = lanes;
+    }
+
+    /// Columns and rows of cells.
+    pub fn size(&self) -> (usize, usize) {
+        (self.columns, self.rows)
+    }
+
+    /// The highest value of each cell, or the lowest ones negated if `dark`; minus infinity where no pixel is finite.
+    pub fn highest(&self, dark: bool) -> impl Iterator<Item = f32> {
+        let (of, sign) = if dark { (&self.lowest, -1.0) } else { (&self.highest, 1.0) };
+        of.iter().map(move |v| sign * v)
+    }
+
+    /// Mean and spread of each cell; NaN where no pixel is finite.
+    pub fn each(&self) -> (&[f32], &[f32]) {
+        (&self.means, &self.spreads)
+    }
+
+    /// Mean and spread within the ring of cells around a cell, `(column, row)`: all within `outer` cells of it, but not those within `inner`; `None` for it to hold no pixel.
+    pub fn ring(&self, place: (usize, usize), inner: usize, outer: usize) -> Option<(f64, f64)> {
+        let (all, middle) = (self.rectangle(place, outer), self.rectangle(place, inner));
+        let (n, sum, squares) = (all[0] - middle[0], all[1] - middle[1], all[2] - middle[2]);
+        (n > 0.5).then(|| (sum / n, (squares / n).max(0.0).sqrt()))
+    }
+
+    /// Pixels, values and squared deviations of the cells within `reach` of a place.
+    fn rectangle(&self, (column, row): (usize, usize), reach: usize) -> [f64; 3] {
+        let (x0, x1) = (column.saturating_sub(reach), (column + reach + 1).min(self.columns));
+        let (y0, y1) = (row.saturating_sub(reach), (row + reach + 1).min(self.rows));
+        let stride = self.columns + 1;
+        let at = |x: usize, y: usize| self.sums[y * stride + x];
+        let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
+        [d[0] - b[0] - c[0] + a[0], d[1] - b[1] - c[1] + a[1], d[2] - b[2] - c[2] + a[2]]
+    }
+}
+
+impl Lanes {
+    /// Begins a row of cells; differences are taken from each cell's first pixel, so that f32 holds their squares.
+    fn start<T: Pixel>(&mut self, row: &[T]) {
+        self.base.clear();
+        self.base.extend(row.iter().map(|p| p.value_f32()));
+        for cell in self.base.chunks_mut(CELL) {
+            let first = cell[0];
+            cell.fill(first);
+        }
+        for (v, with) in [
+            (&mut self.low, f32::INFINITY),
+            (&mut self.high, f32::NEG_INFINITY),
+            (&mut self.sum, 0.0),
+            (&mut self.slope, 0.0),
+            (&mut self.square, 0.0),
+        ] {
+            v.clear();
+            v.resize(row.len(), with);
+        }
+    }
+
+    fn add<T: Pixel>(&mut self, row: &[T], place: f32) {
+        add(row, place, &self.base, [&mut self.low, &mut self.high, &mut self.sum, &mut self.slope, &mut self.square]);
+    }
+
+    /// The cell of the columns from `x` on; `None` if a pixel of it is not finite.
+    fn cell(&self, x: usize, wide: usize, tall: usize) -> Option<Cell> {
+        let part = |v: &[f32]| -> [f32; CELL] { std::array::from_fn(|i| if i < wide { v[x + i] } else { 0.0 }) };
+        let sums = part(&self.sum);
+        let sum: f32 = sums.iter().sum();
+        let mut squares: f32 = part(&self.square).iter().sum();
+        if !squares.is_finite() {
+            return None;
+        }
+        let n = (wide * tall) as f32;
+        squares -= sum * sum / n;
+        if wide == CELL && tall == CELL {
+            let along: f32 = sums.iter().enumerate().map(|(i, s)| (i as f32 - 3.5) * s).sum();
+            let down: f32 = part(&self.slope).iter().sum();
+            squares -= (along * along + down * down) / PLACES2;
+        }
+        let columns = x..x + wide;
+        Some(Cell {
+            low: self.low[columns.clone()].iter().copied().fold(f32::INFINITY, f32::min),
+            high: self.high[columns].iter().copied().fold(f32::NEG_INFINITY, f32::max),
+            pixels: f64::from(n),
+            values: f64::from(sum) + f64::from(n) * f64::from(self.base[x]),
+            squares: f64::from(squares.max(0.0)),
+        })
+    }
+}
+
+widest! {
+    fn add<T: Pixel>(row: &[T], place: f32, base: &[f32], lanes: [&mut [f32]; 5]) {
+        let n = row.len();
+        let [low, high, sum, slope, square] = lanes.map(|l| &mut l[..n]);
+        let base = &base[..n];
+        for x in 0..n {
+            let v = row[x].value_f32();
+            let d = v - base[x];
+            low[x] = if v < low[x] { v } else { low[x] };
+            high[x] = if v > high[x] { v } else { high[x] };
+            sum[x] += d;
+            slope[x] += place * d;
+            square[x] += d * d;
+        }
+    }
+}
+
+/// A cell of which some pixels are not finite, from those that are.
+#[cold]
+fn slow<T: Pixel>(image: &Image<T>, column: usize, row: usize) -> Cell {
+    let rows = row * CELL..((row + 1) * CELL).min(image.height());
+    let columns = column * CELL..((column + 1) * CELL).min(image.width());
+    let pixels = rows.flat_map(|y| image.row(y)[columns.clone()].iter().map(|p| p.value()));
+    let mut cell = Cell { low: f32::INFINITY, high: f32::NEG_INFINITY, pixels: 0.0, values: 0.0, squares: 0.0 };
+    for v in pixels.filter(|v| v.is_finite()) {
+        cell.low = cell.low.min(v as f32);
+        cell.high = cell.high.max(v as f32);
+        cell.pixels += 1.0;
+        cell.values += v;
+    }
+    cell
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_ring_tells_ground_and_noise_whatever_the_shading_and_the_offset() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for (offset, gain) in [(0.0, 1.0), (60_000.0, 1.0), (1e6, 30.0)] {
+            let pixels: Vec<f32> = (0..200 * 160)
+                .map(|i| {
+                    let noise: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                    (offset + gain * (noise + 0.5 * (i % 200) as f64 + 0.2 * (i / 200) as f64)) as f32
+                })
+                .collect();
+            let mut cells = Cells::default();
+            cells.read(&Image::from_vec(200, 160, pixels).unwrap());
+            assert_eq!(cells.size(), (25, 20));
+            let (mean, spread) = cells.ring((12, 9), 1, 3).unwrap();
+            // The plane in the middle of the cell: column 99.5, row 75.5.
+            let plane = offset + gain * (0.5 * 99.5 + 0.2 * 75.5);
+            assert!((mean - plane).abs() < 0.1 * gain + 1e-7 * offset, "{mean} {plane}");
+            // 61 of 64 degrees of freedom of a cell are left.
+            assert!((spread / gain / (61f64 / 64.0).sqrt() - 1.0).abs() < 0.04, "{spread}");
+        }
+    }
+
+    #[test]
+    fn extremes_are_those_of_finite_pixels_and_cells_at_the_border_are_whole() {
+        let mut image = Image::filled(21, 11, 5.0f32);
+        image.row_mut(10)[20] = 9.0;
+        image.row_mut(9)[20] = f32::NAN;
+        image.row_mut(0)[0] = f32::INFINITY;
+        image.row_mut(1)[1] = -3.0;
+        let mut cells = Cells::default();
+        cells.read(&image);
+        assert_eq!(cells.highest(false).collect::<Vec<_>>(), [5.0, 5.0, 5.0, 5.0, 5.0, 9.0]);
+        assert_eq!(cells.highest(true).next(), Some(3.0));
+        let (mean, spread) = cells.ring((1, 0), 0, 1).unwrap();
+        // 231 - 64 pixels without the middle cell, less two that are not finite; their sum is 5 each, but for -3 and 9.
+        assert!((mean - (5.0 * 165.0 - 8.0 + 4.0) / 165.0).abs() < 1e-6, "{mean}");
+        assert_eq!(spread, 0.0);
+        cells.read(&Image::filled(0, 0, 1u8));
+        assert_eq!((cells.size(), cells.highest(true).count()), ((0, 0), 0));
+        cells.read(&Image::filled(5, 5, 7u16));
+        assert_eq!(cells.ring((0, 0), 0, 1), None);
+    }
+}
