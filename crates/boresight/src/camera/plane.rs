@@ -1,11 +1,12 @@
 //! The motion of a plane from matches of its points: a translation, similarity, affine or projective correction of a prediction, chosen by evidence.
 //!
 //! Source: Gauss-Newton on the first-order basis of each group about the prediction, with Tukey's biweight; the choice by the Bayesian information
-//! criterion (G. Schwarz, *Annals of Statistics* 6, 1978), as P. Torr has it for image motions (*IJCV* 50, 2002).
+//! criterion (G. Schwarz, *Annals of Statistics* 6, 1978) with a robust loss at one scale for all groups, as P. Torr has it for image motions (*IJCV* 50, 2002).
 //! How: residuals are small beforehand (a patch is looked for within a pixel), so that no sampling is needed: the weights' reach falls from three times
 //! the median residual's deviation on. The larger groups contain the smaller ones; each is fitted from the same prediction.
 //! Symbols: u = (p - middle) / half width, in (-1, 1); d displacement (px) = Σ θ_i b_i(u), b = (1, 0), (0, 1) | u, (-v, u) | (u, -v), (v, u) | u u, v u;
-//! k parameters; BIC = 2 n ln(s²) + k ln(2 n), s the robust deviation of the residuals of an axis.
+//! k parameters; criterion = Σ ρ(r / s) + k ln(2 m), s the least of the groups' robust deviations of an axis, ρ Tukey's loss (r²/s² for small r), m the
+//! matches within its reach. A median's deviation of each group in the place of ρ would scatter more than the few numbers that it is to decide about.
 //! Limits: one plane; what lies off it is a residual (parallax), of which [`Plane::spread_px`] knows.
 
 use super::fit::Match;
@@ -101,24 +102,41 @@ fn settle(matches: &[Match], predicted: &Homography, middle: Vector2<f64>, k: us
     Some(at)
 }
 
+/// Tukey's loss of all matches from a fit, at that deviation, and how many lie within its reach.
+fn loss(matches: &[Match], at: &Homography, spread_px: f64) -> (f64, usize) {
+    let (mut sum, mut n) = (0.0, 0);
+    for m in matches {
+        let q = ((m.to - at.apply(m.from)).norm() / (REACH * spread_px)).powi(2);
+        // A distance that is no number lies beyond the reach.
+        let inside = q < 1.0;
+        let left = if inside { (1.0 - q).powi(3) } else { 0.0 };
+        sum += REACH * REACH / 3.0 * (1.0 - left);
+        n += usize::from(inside);
+    }
+    (sum, n)
+}
+
 /// The motion that most matches agree with, close to the predicted one; `middle` is the image's, px.
 pub(super) fn fit(matches: &[Match], predicted: &Homography, middle: Vector2<f64>) -> Option<Plane> {
     let matches = &matches[..matches.len().min(MOST_MATCHES)];
     if matches.len() < LEAST_MATCHES {
         return None;
     }
-    let mut best: Option<(f64, Plane)> = None;
-    for k in GROUPS {
+    let mut fits = [None; GROUPS.len()];
+    for (fit, k) in fits.iter_mut().zip(GROUPS) {
         if matches.len() < MATCHES_A_NUMBER * k {
             break;
         }
-        let Some(to_from) = settle(matches, predicted, middle, k) else { continue };
-        let spread_px = spread(matches, &to_from);
-        // The same matches for every group: the median square stands for the mean of those that belong.
-        let n = matches.len() as f64;
-        let bic = 4.0 * n * spread_px.ln() + k as f64 * (2.0 * n).ln();
-        if best.as_ref().is_none_or(|(b, _)| bic < *b) {
-            best = Some((bic, Plane { to_from, spread_px, n_numbers: k }));
+        *fit = settle(matches, predicted, middle, k).map(|at| (at, spread(matches, &at)));
+    }
+    let least = fits.iter().flatten().map(|f| f.1).fold(f64::INFINITY, f64::min);
+    let mut best: Option<(f64, Plane)> = None;
+    for (fit, k) in fits.into_iter().zip(GROUPS) {
+        let Some((to_from, spread_px)) = fit else { continue };
+        let (loss, n) = loss(matches, &to_from, least);
+        let criterion = loss + k as f64 * (2.0 * n.max(1) as f64).ln();
+        if best.as_ref().is_none_or(|(b, _)| criterion < *b) {
+            best = Some((criterion, Plane { to_from, spread_px, n_numbers: k }));
         }
     }
     best.map(|(_, plane)| plane)

@@ -18,7 +18,7 @@ const CELLS: (usize, usize) = (14, 8);
 /// Texture below this share of the median patch's is not looked for.
 const LEAST_SHARE: f32 = 0.1;
 /// Steps in which a cell is looked through, px.
-const STEP: usize = 4;
+const STEP: usize = 6;
 
 /// Share of patches found, and their deviation, px, from which on a registration is clear.
 const CLEAR_FOUND: f64 = 0.8;

@@ -159,7 +159,7 @@ const CAMERAS: [(&str, Camera); 4] = [
 #[test]
 fn patches_of_texture_are_found_over_texture_whatever_the_camera_does() {
     for (name, camera) in CAMERAS {
-        for seed in 1..3 {
+        for seed in 1..6 {
             let (frames, truth) = scene(seed, camera, &[0.5, 1.0, 1.5, 2.5]);
             let (seen, n_false) = measured(&frames, &truth);
             println!("{name}, seed {seed}: {:.1} % seen, {n_false:.2} false regions a frame", 100.0 * seen);
@@ -191,7 +191,7 @@ fn the_choice_without_options_takes_it_where_it_is_needed_and_nowhere_else() {
 }
 
 #[test]
-fn a_cut_is_blind_until_two_frames_are_a_lag_old() {
+fn a_cut_is_blind_until_a_frame_is_three_lags_old() {
     let (mut frames, _) = scene(1, CAMERAS[0].1, &[]);
     let (other, _) = scene(50, CAMERAS[0].1, &[]);
     frames[30..].clone_from_slice(&other[30..]);
@@ -205,7 +205,7 @@ fn a_cut_is_blind_until_two_frames_are_a_lag_old() {
         assert!(!scan.blind || scan.detections.is_empty());
         blind.push(scan.blind);
     }
-    // Two frames 7/8 of 0.32 s ago or more, kept every 0.08 s: the first two are 0.36 s and 0.28 s old after 9 frames; nothing was shown beforehand.
-    assert!(blind[..9].iter().all(|b| *b) && blind[9..30].iter().all(|b| !b), "{blind:?}");
-    assert!(blind[30..39].iter().all(|b| *b) && blind[39..].iter().all(|b| !b), "{blind:?}");
+    // Frames are kept every 0.08 s, and half of that is no matter: the first is 0.92 s old, three lags less 0.04 s, after 23 frames; nothing was shown beforehand.
+    assert!(blind[..23].iter().all(|b| *b) && blind[23..30].iter().all(|b| !b), "{blind:?}");
+    assert!(blind[30..53].iter().all(|b| *b) && blind[53..].iter().all(|b| !b), "{blind:?}");
 }

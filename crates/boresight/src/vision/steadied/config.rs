@@ -13,7 +13,7 @@ pub struct SteadiedConfig {
     /// Standard deviations of the ground's own difference that make a pixel moving, from both earlier frames, 1 to 50. Lower finds fainter and slower targets
     /// and more false ones.
     pub threshold_sd: f32,
-    /// Time to the first of the two earlier frames, s, 0.01 to 10; the second is twice as long ago. A target shows once it has moved by about its own
+    /// Time to the first of the two earlier frames, s, 0.01 to 10; the second is three times as long ago. A target shows once it has moved by about its own
     /// size; longer finds slower ones and more of what parallax moves.
     pub lag_s: f64,
     /// Smallest difference that counts, counts, 0... .

@@ -6,7 +6,7 @@
 //! the [`TAIL`] quantile of |D| / √(a + b G), over that of a normal deviate, is its own factor, and of the nine tiles around the [`RANK`]-th largest counts, so
 //! that a target in one or two of them does not hide itself. It never falls below 1.
 //! Symbols: D difference (counts); z = D / (factor √(a + b G)).
-//! Limits: a target that covers a tenth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side.
+//! Limits: a target that covers a fifth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side.
 
 use crate::Image;
 
@@ -17,8 +17,8 @@ const SAMPLES: usize = 6000;
 /// Deviation over the median of the magnitude of a normal deviate.
 const MAD: f32 = 1.4826;
 /// The quantile of a tile, and that of the magnitude of a normal deviate.
-const TAIL: f64 = 0.9;
-const TAIL_SD: f32 = 1.6449;
+const TAIL: f64 = 0.8;
+const TAIL_SD: f32 = 1.2816;
 /// Of nine tiles, counted from the largest.
 const RANK: usize = 2;
 /// Tiles along the longer side of the frame.

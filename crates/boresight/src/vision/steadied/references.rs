@@ -1,10 +1,10 @@
 //! The earlier frames that the present one is compared with, and where their ground lies in it.
 //!
-//! How: a frame is kept whenever a fourth of the lag has passed, until it is older than 2.5 lags. Where each one's ground lies is carried along with the
+//! How: a frame is kept whenever a fourth of the lag has passed, until it is older than 3.5 lags. Where each one's ground lies is carried along with the
 //! motion from frame to frame (room `camera`: a plane's, from patches looked for where the last motion goes on, or within 4 % of the frame); the two that are compared with are registered once more, directly,
 //! so that no error adds up. Of a recording, frames of its first seconds that were shown beforehand stand in at the start: for an object that moves, later is as good as earlier.
 //! Symbols: own, the present frame; other_from_own takes its points to those of a kept one (working px).
-//! Limits: where the motion is lost all is forgotten, and nothing is seen until two lags have passed.
+//! Limits: where the motion is lost all is forgotten, and nothing is seen until three lags have passed.
 
 use crate::camera::PlaneFollower;
 use crate::{Homography, Image};
@@ -12,7 +12,11 @@ use crate::{Homography, Image};
 /// Frames kept in one lag.
 const PER_LAG: f64 = 4.0;
 /// Lags after which a frame is forgotten.
-const OLDEST: f64 = 2.5;
+const OLDEST: f64 = 3.5;
+/// Lags to the second frame: what a target moved by in two lags it does not cover twice.
+const SECOND: f64 = 3.0;
+/// Lags that frames shown beforehand cover: enough to have one a lag and one three lags away at every time.
+const SHOWN: f64 = 3.75;
 
 /// A kept frame.
 #[derive(Clone, Debug)]
@@ -46,7 +50,7 @@ impl References {
 
     /// Time that frames shown beforehand should cover, s.
     pub fn prime_s(&self) -> f64 {
-        if self.has_started() || !self.kept.is_empty() { 0.0 } else { (OLDEST - 0.25) * self.lag_s }
+        if self.has_started() || !self.kept.is_empty() { 0.0 } else { SHOWN * self.lag_s }
     }
 
     /// Keeps frames of the first [`Self::prime_s`] seconds, evenly spread, the first among them.
@@ -94,22 +98,21 @@ impl References {
         Some(places.map(|place| (&self.kept[place].image, self.kept[place].other_from_own)))
     }
 
-    /// Places of the newest one that is a lag old and of the newest that is two; where there is none, of others that are a lag away.
+    /// Places of the newest one that is a lag old and of the newest that is three; where there is none, of others as far away, the later one of them if need
+    /// be a lag after the present frame: a target is then in three places all the same.
     fn places(&self) -> Option<[usize; 2]> {
         let away = |i: usize| (self.time_s - self.kept[i].time_s) / self.lag_s;
-        // Half of the time between two kept frames is no matter.
-        let reach = |lags: f64| lags - 0.5 / PER_LAG;
-        let nearest = |fits: &dyn Fn(usize) -> bool| {
-            let all = (0..self.kept.len()).filter(|i| fits(*i));
+        // Half of the time between two kept frames is no matter, nor are the digits of a sum of times.
+        let reach = |lags: f64| lags - 0.5 / PER_LAG - 1e-6;
+        let nearest = |fits: &dyn Fn(f64) -> bool| {
+            let all = (0..self.kept.len()).filter(|i| fits(away(*i)));
             all.min_by(|a, b| away(*a).abs().total_cmp(&away(*b).abs()))
         };
-        let first = nearest(&|i| away(i) >= reach(1.0)).or_else(|| nearest(&|i| -away(i) >= reach(1.0)))?;
-        let second = nearest(&|i| i != first && away(i) >= reach(2.0))
-            .or_else(|| nearest(&|i| i != first && -away(i) >= reach(1.0) && away(first) > 0.0))
-            .or_else(|| {
-                let others = (0..self.kept.len()).filter(|i| *i != first && away(*i).abs() >= reach(1.0));
-                others.max_by(|a, b| away(*a).abs().total_cmp(&away(*b).abs()))
-            })?;
+        let first = nearest(&|lags| lags >= reach(1.0)).or_else(|| nearest(&|lags| -lags >= reach(1.0)))?;
+        let is_old = away(first) > 0.0;
+        let second = nearest(&|lags| lags >= reach(SECOND))
+            .or_else(|| nearest(&|lags| is_old && -lags >= reach(1.0)))
+            .or_else(|| nearest(&|lags| -lags >= reach(SECOND)))?;
         Some([first, second])
     }
 

@@ -2,8 +2,8 @@
 //!
 //! Source: our own; the three-frame difference (Y. Kameda, M. Minoh, VSMM 1996) on frames brought to cover each other, as in M. Irani, P. Anandan, "A unified approach
 //! to moving object detection in 2D and 3D scenes", *IEEE PAMI* 20, 1998, with a noise of its own for every place ([`super::noise`]).
-//! How: z₁ and z₂, the deviations from the frames one and two lags ago; a pixel moves if both have one sign and exceed `threshold-sd`: so a place that a target has
-//! left, which differs from one of them only, does not count.
+//! How: z₁ and z₂, the deviations from the frames one and three lags ago; a pixel moves if both have one sign and exceed `threshold-sd`: so a place that a target has
+//! left, which differs from one of them only, does not count (unless it moves by less than half its size in a lag).
 //! Wider frames than 960 px are compared in means of 2 x 2 pixels (or more): targets of some 6 px across are the smallest there.
 //! Limits: what stands still is not seen, nor what moves less than a part of its own size in a lag; of an even target only the rims that cover and uncover; what
 //! sticks out of the plane moves by parallax, and is seen where little around it does so too.
