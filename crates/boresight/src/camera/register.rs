@@ -8,7 +8,7 @@
 
 use super::find_patch::find_near;
 use super::fit::Match;
-use super::key_frame::{PATCH, Patch, texture};
+use super::key_frame::{PATCH, Patch};
 use super::plane;
 use crate::{Homography, Image, Similarity};
 use nalgebra::Vector2;
@@ -19,6 +19,8 @@ const CELLS: (usize, usize) = (14, 8);
 const LEAST_SHARE: f32 = 0.1;
 /// Steps in which a cell is looked through, px.
 const STEP: usize = 6;
+/// Of a row of a cell so many are looked at, at most: cells of 960 px are 69 wide.
+const MOST_PLACES: usize = 32;
 
 /// Share of patches found, and their deviation, px, from which on a registration is clear.
 const CLEAR_FOUND: f64 = 0.8;
@@ -71,11 +73,14 @@ impl PlanePatches {
                 let (x0, x1) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
                 let (y0, y1) = (h * cy / CELLS.1, h * (cy + 1) / CELLS.1);
                 let mut top: Option<(f32, usize, usize)> = None;
+                let x1 = x1.min(w - PATCH - 1);
+                let mut row = [0.0f32; MOST_PLACES];
+                let n = x1.saturating_sub(x0).div_ceil(STEP).min(MOST_PLACES);
                 for y in (y0..y1).step_by(STEP).filter(|y| y + PATCH + 1 < h) {
-                    for x in (x0..x1).step_by(STEP).filter(|x| x + PATCH + 1 < w) {
-                        let t = texture(image, x, y);
-                        if t.is_finite() && top.is_none_or(|b| t > b.0) {
-                            top = Some((t, x, y));
+                    row_textures(image, x0, x1, y, &mut row[..n]);
+                    for (t, x) in row[..n].iter().zip((x0..x1).step_by(STEP)) {
+                        if t.is_finite() && top.is_none_or(|b| *t > b.0) {
+                            top = Some((*t, x, y));
                         }
                     }
                 }
@@ -132,6 +137,24 @@ impl PlanePatches {
             is_inside(other, to).then(found)
         };
         out.extend(self.patches.iter().map(|p| (p.middle(), far(p))));
+    }
+}
+
+widest! {
+    /// The smaller of the mean absolute gradients along x and y of the patches of a row that begin at each [`STEP`]-th pixel from `x0`, in front of `x1`.
+    fn row_textures(image: &Image<f32>, x0: usize, x1: usize, y: usize, out: &mut [f32]) {
+        for (t, x) in out.iter_mut().zip((x0..x1).step_by(STEP)) {
+            // One sum a column: they are added in vectors.
+            let (mut gx, mut gy) = ([0.0f32; PATCH], [0.0f32; PATCH]);
+            for r in y..y + PATCH {
+                let (row, below) = (&image.row(r)[x..x + PATCH + 1], &image.row(r + 1)[x..x + PATCH]);
+                for c in 0..PATCH {
+                    gx[c] += (row[c + 1] - row[c]).abs();
+                    gy[c] += (below[c] - row[c]).abs();
+                }
+            }
+            *t = gx.iter().sum::<f32>().min(gy.iter().sum()) / (PATCH * PATCH) as f32;
+        }
     }
 }
 

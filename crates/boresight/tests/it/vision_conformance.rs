@@ -250,7 +250,7 @@ fn finds_a_patch_over_moving_ground(config: &DetectorConfig) -> bool {
         let (x0, y0) = (40.0 + k as f64, 60.0);
         let value = |i: usize| {
             let (x, y) = ((i % 160) as f64, (i / 160) as f64);
-            if (x - x0).abs() <= 4.0 && (y - y0).abs() <= 4.0 {
+            if (x - x0).abs() <= 3.0 && (y - y0).abs() <= 3.0 {
                 return 240;
             }
             let g = x + k as f64;

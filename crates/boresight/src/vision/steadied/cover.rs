@@ -27,17 +27,7 @@ pub(super) fn working<T: Pixel>(image: &Image<T>, factor: usize, line: &mut Vec<
     for y in 0..h {
         let to = out.row_mut(y);
         for dy in 0..factor {
-            let row = &image.row(y * factor + dy)[..w * factor];
-            match factor {
-                1 => to.iter_mut().zip(row).for_each(|(t, v)| *t = v.value_f32()),
-                2 => {
-                    to.iter_mut().zip(row.chunks_exact(2)).for_each(|(t, v)| *t += v[0].value_f32() + v[1].value_f32())
-                }
-                n => to
-                    .iter_mut()
-                    .zip(row.chunks_exact(n))
-                    .for_each(|(t, v)| *t += v.iter().map(|v| v.value_f32()).sum::<f32>()),
-            }
+            add_blocks(&image.row(y * factor + dy)[..w * factor], factor, to);
         }
         let mut last = 0.0;
         for t in to {
@@ -46,6 +36,19 @@ pub(super) fn working<T: Pixel>(image: &Image<T>, factor: usize, line: &mut Vec<
         }
     }
     smooth(out, line);
+}
+
+widest! {
+    /// Adds the values of each so many pixels of a row.
+    fn add_blocks<T: Pixel>(row: &[T], factor: usize, to: &mut [f32]) {
+        match factor {
+            1 => to.iter_mut().zip(row).for_each(|(t, v)| *t += v.value_f32()),
+            2 => to.iter_mut().zip(row.chunks_exact(2)).for_each(|(t, v)| *t += v[0].value_f32() + v[1].value_f32()),
+            n => {
+                to.iter_mut().zip(row.chunks_exact(n)).for_each(|(t, v)| *t += v.iter().map(|v| v.value_f32()).sum::<f32>())
+            }
+        }
+    }
 }
 
 /// As [`working`] for frames of any kind, colours by their green; and the side of its blocks.
@@ -97,8 +100,6 @@ pub(super) fn cover(other: &Image<f32>, other_from_own: &Homography, out: &mut I
         out.as_mut_slice().fill(f32::NAN);
         return;
     }
-    let (most_x, most_y) = ((w - 1) as f32, (h - 1) as f32);
-    let pixels = other.as_slice();
     for y in 0..out.height() {
         let row = out.row_mut(y);
         let at = |x: usize| other_from_own.apply(Vector2::new(x as f64, y as f64));
@@ -106,26 +107,41 @@ pub(super) fn cover(other: &Image<f32>, other_from_own: &Homography, out: &mut I
         for (i, span) in row.chunks_mut(SPAN).enumerate() {
             let to = at((i + 1) * SPAN);
             let step = (to - from) / SPAN as f64;
-            let (mut px, mut py) = (from.x as f32, from.y as f32);
-            let (sx, sy) = (step.x as f32, step.y as f32);
-            for v in span {
-                *v = if px >= 0.0 && py >= 0.0 && px < most_x && py < most_y {
-                    let (x, y) = (px as usize, py as usize);
-                    let (u, t) = (px - x as f32, py - y as f32);
-                    let i = y * w + x;
-                    match (pixels.get(i..i + 2), pixels.get(i + w..i + w + 2)) {
-                        (Some(a), Some(b)) => {
-                            let (a, b) = (a[0] + u * (a[1] - a[0]), b[0] + u * (b[1] - b[0]));
-                            a + t * (b - a)
-                        }
-                        _ => f32::NAN,
-                    }
-                } else {
-                    f32::NAN
-                };
-                (px, py) = (px + sx, py + sy);
-            }
+            cover_span(other, [from.x as f32, from.y as f32], [step.x as f32, step.y as f32], span);
             from = to;
+        }
+    }
+}
+
+widest! {
+    /// Draws the pixels of a span that begin at `from` and lie `step` apart.
+    fn cover_span(other: &Image<f32>, from: [f32; 2], step: [f32; 2], span: &mut [f32]) {
+        let (w, h) = (other.width(), other.height());
+        let (most_x, most_y) = ((w - 1) as f32, (h - 1) as f32);
+        let pixels = other.as_slice();
+        let (mut px, mut py) = ([0.0f32; SPAN], [0.0f32; SPAN]);
+        for i in 0..SPAN {
+            (px[i], py[i]) = (from[0] + i as f32 * step[0], from[1] + i as f32 * step[1]);
+        }
+        let (mut first, mut inside) = ([0u32; SPAN], true);
+        let (mut u, mut t) = ([0.0f32; SPAN], [0.0f32; SPAN]);
+        for i in 0..SPAN {
+            inside &= (px[i] >= 0.0) & (py[i] >= 0.0) & (px[i] < most_x) & (py[i] < most_y);
+            // Of what is not inside no place is used.
+            let (x, y) = (px[i] as i32, py[i] as i32);
+            (u[i], t[i]) = (px[i] - x as f32, py[i] - y as f32);
+            first[i] = (y as u32).wrapping_mul(w as u32).wrapping_add(x as u32);
+        }
+        for (i, v) in span.iter_mut().enumerate().take(SPAN) {
+            let seen = inside || (px[i] >= 0.0 && py[i] >= 0.0 && px[i] < most_x && py[i] < most_y);
+            let first = first[i] as usize;
+            *v = match pixels.get(first..first + w + 2) {
+                Some(four) if seen => {
+                    let (a, b) = (four[0] + u[i] * (four[1] - four[0]), four[w] + u[i] * (four[w + 1] - four[w]));
+                    a + t[i] * (b - a)
+                }
+                _ => f32::NAN,
+            };
         }
     }
 }

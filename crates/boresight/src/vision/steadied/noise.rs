@@ -6,7 +6,7 @@
 //! the [`TAIL`] quantile of |D| / √(a + b G), over that of a normal deviate, is its own factor, and of the nine tiles around the [`RANK`]-th largest counts, so
 //! that a target in one or two of them does not hide itself. It never falls below 1.
 //! Symbols: D difference (counts); z = D / (factor √(a + b G)).
-//! Limits: a target that covers a fifth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side.
+//! Limits: a target that covers a fifth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side, and 20 px at least.
 
 use crate::Image;
 
@@ -23,6 +23,8 @@ const TAIL_SD: f32 = 1.2816;
 const RANK: usize = 2;
 /// Tiles along the longer side of the frame.
 const TILES: usize = 16;
+/// Smaller tiles have too few pixels of their own for a quantile beside a small target, px.
+const LEAST_TILE_PX: usize = 20;
 /// Pixels sampled of a tile, about.
 const TILE_SAMPLES: usize = 200;
 
@@ -131,7 +133,7 @@ impl GroundNoise {
 
     fn measure_tiles(&mut self, z: &Image<f32>) {
         let (w, h) = (z.width(), z.height());
-        self.tile_px = w.max(h).div_ceil(TILES).max(8);
+        self.tile_px = w.max(h).div_ceil(TILES).max(LEAST_TILE_PX);
         let t = self.tile_px;
         self.tiles_x = w.div_ceil(t);
         let tiles_y = h.div_ceil(t);
