@@ -95,7 +95,7 @@ mod tests {
                 .map(|_| {
                     let (a, angle) = (6.0 * rng.random::<f64>(), std::f64::consts::TAU * rng.random::<f64>());
                     let wave = 0.05 + 0.6 * rng.random::<f64>();
-                    [a, wave * angle.cos(), wave * angle.sin(), 6.28 * rng.random::<f64>()]
+                    [a, wave * angle.cos(), wave * angle.sin(), std::f64::consts::TAU * rng.random::<f64>()]
                 })
                 .collect();
             let mut any = |most: f64| most * (2.0 * rng.random::<f64>() - 1.0);
