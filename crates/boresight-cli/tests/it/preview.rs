@@ -17,7 +17,7 @@ fn the_page_shows_every_candidate_with_the_command_that_runs_it() {
     run_ok(["preview", named.to_str().unwrap(), "-q", "--threads", "1", "-o", b.to_str().unwrap()]);
     let page = text(&a);
     assert!(page == text(&b), "the page depends on the threads");
-    for word in ["isolated", "cfar", "integrate", "moving", "spot", "local", "colour"] {
+    for word in ["isolated", "cfar", "integrate", "moving", "steadied", "spot", "local", "colour"] {
         // The choice itself stands for its detector.
         let chosen = page.contains(&format!("chosen: {word}"));
         assert!(chosen || page.contains(&format!("one.mp4' --detector {word}</code>")), "{word}");

@@ -4,7 +4,7 @@
 
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
-use super::{cells, colour, faint, moving, particles, spots, summed};
+use super::{cells, colour, faint, moving, particles, spots, steadied, summed};
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
@@ -48,6 +48,7 @@ pub fn configure(
             let explained = scene.explained(if looked.is_empty() { frames } else { looked }, info, n_threads)?;
             moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
         }
+        DetectorKind::Steadied => steadied::configure_asked(frames, scene, info, config, reasons)?,
         DetectorKind::Spot => {
             let seen = particles::count(frames, info, n_threads)?.0;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
@@ -139,6 +140,7 @@ mod tests {
                     ThresholdConfig::Cfar(_) => DetectorKind::Cfar,
                     ThresholdConfig::Integrate(_) => DetectorKind::Integrate,
                     ThresholdConfig::Moving(_) => DetectorKind::Moving,
+                    ThresholdConfig::Steadied(_) => DetectorKind::Steadied,
                     ThresholdConfig::Spot(_) => DetectorKind::Spot,
                     ThresholdConfig::Local(_) => DetectorKind::Local,
                     other => panic!("{kind}: {other:?}"),

@@ -8,7 +8,7 @@ use super::interval::interval_s;
 use super::request::Request;
 use super::scene::{self, Scene};
 use super::spots::Seen;
-use super::{cells, colour, faint, moving, particles, spots};
+use super::{cells, colour, faint, moving, particles, spots, steadied};
 use crate::io::Colour;
 use crate::vision::threshold::Polarity;
 use crate::{Config, Frame, Result, SourceInfo, shown_rate};
@@ -101,6 +101,8 @@ pub(super) fn choose_looked(
         };
         if let Some(seen) = cells.filter(|_| evidence.polarity() != Polarity::Both) {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
+        } else if let Some(seen) = steadied::look_beside(&evidence, frames, scene, info, n_threads)? {
+            steadied::configure(&seen, info, &mut config, &mut reasons);
         } else {
             spots::configure(&evidence, info, &mut config, &mut reasons);
             if (evidence.is_poor() || !evidence.moves())

@@ -5,6 +5,7 @@
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
 use super::evidence::{Evidence, SURE_GAIN};
+use super::ground::Ground;
 use super::looks;
 use super::sightings::Sightings;
 use super::spots::{self, Seen};
@@ -12,7 +13,7 @@ use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, Similarity, SourceInfo};
+use crate::{Config, Frame, Result, SourceInfo};
 
 /// False alarms a frame that the tracker can bear: at 320 x 240 px and 5 px a frame, three within five frames and a gate of 50 px² meet by
 /// chance in some 3e-6 of the frames, twice in eight hours.
@@ -41,12 +42,7 @@ fn detector(polarity: Polarity) -> DetectorConfig {
 /// What is found at that rate in the frames, with bright targets and with dark ones, and the number of frames looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(
-    frames: &[Frame],
-    ground: &[Similarity],
-    info: &SourceInfo,
-    n_threads: usize,
-) -> Result<([Faint; 2], f64)> {
+pub fn count(frames: &[Frame], ground: &[Ground], info: &SourceInfo, n_threads: usize) -> Result<([Faint; 2], f64)> {
     let places = growing(frames.len());
     let side = |polarity| look_at(frames, &places, ground, polarity, info, n_threads);
     Ok(([side(Polarity::Bright)?, side(Polarity::Dark)?], places.len() as f64))
@@ -55,7 +51,7 @@ pub fn count(
 fn look_at(
     frames: &[Frame],
     places: &[usize],
-    ground: &[Similarity],
+    ground: &[Ground],
     polarity: Polarity,
     info: &SourceInfo,
     n_threads: usize,
@@ -88,7 +84,7 @@ pub fn better([bright, dark]: [Faint; 2]) -> Faint {
 /// Frames of more than one size or pixel type.
 pub fn look(
     frames: &[Frame],
-    ground: &[Similarity],
+    ground: &[Ground],
     isolated: &Seen,
     info: &SourceInfo,
     n_threads: usize,

@@ -17,6 +17,7 @@ mod faint;
 mod first_pass;
 mod first_scans;
 mod fixed_blocks;
+mod ground;
 mod initiation_score;
 mod interval;
 mod looks;
@@ -36,6 +37,7 @@ mod sightings;
 mod speed;
 mod spots;
 mod spread;
+mod steadied;
 mod summed;
 
 pub use crate::io::Replay;

@@ -15,6 +15,8 @@ pub enum DetectorKind {
     Integrate,
     /// What moves before a fixed camera.
     Moving,
+    /// What moves before a moving camera.
+    Steadied,
     /// Many small spots: particles, seeds, stars.
     Spot,
     /// Bright compact pieces on an even dark ground: cells, nuclei.
@@ -25,8 +27,16 @@ pub enum DetectorKind {
 
 impl DetectorKind {
     /// All of them, in the order in which they are listed.
-    pub const ALL: [Self; 7] =
-        [Self::Isolated, Self::Cfar, Self::Integrate, Self::Moving, Self::Spot, Self::Local, Self::Colour];
+    pub const ALL: [Self; 8] = [
+        Self::Isolated,
+        Self::Cfar,
+        Self::Integrate,
+        Self::Moving,
+        Self::Steadied,
+        Self::Spot,
+        Self::Local,
+        Self::Colour,
+    ];
 
     /// Its word: the key below `detector.threshold`.
     pub const fn name(self) -> &'static str {
@@ -35,6 +45,7 @@ impl DetectorKind {
             Self::Cfar => "cfar",
             Self::Integrate => "integrate",
             Self::Moving => "moving",
+            Self::Steadied => "steadied",
             Self::Spot => "spot",
             Self::Local => "local",
             Self::Colour => "colour",
@@ -48,6 +59,7 @@ impl DetectorKind {
             Self::Cfar => "small and faint targets at a stated rate of false alarms",
             Self::Integrate => "small moving targets that no single frame shows",
             Self::Moving => "what moves before a fixed camera",
+            Self::Steadied => "what moves before a moving camera",
             Self::Spot => "many small spots: particles, seeds, stars",
             Self::Local => "bright compact pieces on an even dark ground: cells",
             Self::Colour => "one moving thing of a colour of its own before a fixed camera",

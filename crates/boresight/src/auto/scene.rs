@@ -10,6 +10,7 @@
 //! Limits: a target that stands in the same place in half of the frames is background.
 
 use super::fixed_blocks;
+use super::ground::{self, Ground};
 use super::looks;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
@@ -71,7 +72,7 @@ pub struct Scene {
     /// The regions of each frame.
     moved: Vec<Vec<Moved>>,
     /// Where the first frame's ground lies in each frame, px; none before a fixed camera.
-    pub ground: Vec<Similarity>,
+    pub ground: Vec<Ground>,
 }
 
 /// A moving region, px of the frame.
@@ -170,13 +171,15 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
 
 /// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
 /// edges.
-fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Similarity>) {
+fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Ground>) {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
-    let (mut moved, mut ground) = (Similarity::identity(), Vec::with_capacity(frames.len()));
+    let (mut moved, mut steps) = (Similarity::identity(), Vec::with_capacity(frames.len()));
     let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     for frame in frames {
-        if let Some(step) = motion.step(&frame.pixels) {
+        let step = motion.step(&frame.pixels);
+        steps.push(step.map_or(Similarity::identity(), |s| s.now_from_before));
+        if let Some(step) = step {
             moved = moved.then(&step.now_from_before);
             if step.basis != MotionBasis::Held {
                 said += 1;
@@ -187,7 +190,6 @@ fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (
                 still += u32::from(corners.iter().all(|&far| far <= STILL_SHARE * w));
             }
         }
-        ground.push(moved);
     }
     // Strong edges would show the smallest shift.
     let edges_stand = edges_moved.is_some_and(|share| share <= 0.03);
@@ -197,14 +199,14 @@ fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (
     // Patches that are followed may be the targets' own; the ground is most of the frame.
     let stands = fixed_blocks::stands(grids);
     if 2 * said >= n_steps && !stands {
-        return (Camera::Moving, ground);
+        return (Camera::Moving, ground::follow(frames, &steps));
     }
     // Too little texture to follow: that targets cross the edges is no motion of the camera.
     let edges_stay = edges_moved.is_some_and(|share| share < 0.2);
     if edges_stay || stands {
         return (Camera::Fixed, Vec::new());
     }
-    (Camera::Unknown, ground)
+    (Camera::Unknown, ground::follow(frames, &steps))
 }
 
 fn median(values: &mut [f64]) -> f64 {

@@ -1,6 +1,7 @@
 //! Detections as chains see them: where on steady ground, and how sure.
 
-use crate::{Scan, Similarity};
+use super::ground::Ground;
+use crate::Scan;
 use nalgebra::Vector2;
 
 /// Detections of a scan that are looked at: the number of first steps grows with the square.
@@ -40,16 +41,16 @@ pub struct Sightings {
 }
 
 impl Sightings {
-    /// Those of a scan; `image_from_ground` tells where the steady ground lies in it, if the ground moves.
-    pub fn of(scan: &Scan, image_from_ground: Option<&Similarity>) -> Self {
-        let ground = image_from_ground.map(Similarity::inverse);
+    /// Those of a scan; `ground` tells where the steady ground lies in it, if the ground moves.
+    pub fn of(scan: &Scan, ground: Option<&Ground>) -> Self {
         let mut order: Vec<usize> = (0..scan.detections.len()).collect();
         order.sort_by(|a, b| scan.detections[*b].score.total_cmp(&scan.detections[*a].score).then(a.cmp(b)));
         let sighting = |i: usize| {
             let d = &scan.detections[i];
-            let at = ground.map_or(d.position, |g| g.apply(d.position));
-            let seen = Sighting::of_box(at, 0.5 * d.cov.trace(), d.extent.width_px.max(d.extent.height_px));
-            Sighting { score: f64::from(d.score), ..seen }
+            let at = ground.map_or(d.position, |g| g.of(d.position));
+            let of_ground = ground.map_or(0.0, |g| g.variance(at));
+            let side_px = d.extent.width_px.max(d.extent.height_px);
+            Sighting { score: f64::from(d.score), ..Sighting::of_box(at, 0.5 * d.cov.trace() + of_ground, side_px) }
         };
         Self { time_s: scan.time.ns as f64 * 1e-9, all: order.into_iter().take(MOST_A_SCAN).map(sighting).collect() }
     }
@@ -66,7 +67,8 @@ mod tests {
         let detection = |k: usize| Detection::point(k as f64, 0.0, 0.1).with_score(k as f32);
         let scan = Scan::at(FrameIndex(0), Timestamp::from_ns(0)).with_detections((0..400).map(detection).collect());
         // The image lies 3 px to the right of the ground.
-        let seen = Sightings::of(&scan, Some(&Similarity::shift(Vector2::new(3.0, 0.0))));
+        let ground = Ground::from(&crate::Similarity::shift(Vector2::new(3.0, 0.0)));
+        let seen = Sightings::of(&scan, Some(&ground));
         assert_eq!(seen.all.len(), MOST_A_SCAN);
         assert_eq!(seen.all[0].at, Vector2::new(396.0, 0.0));
         assert!((seen.all[0].variance - (0.01 + LEAST_STD_PX.powi(2))).abs() < 1e-12);

@@ -2,6 +2,7 @@
 
 use super::digits::round;
 use super::evidence::{Evidence, SURE_GAIN};
+use super::ground::Ground;
 use super::looks;
 use super::sightings::Sightings;
 use super::spread::growing;
@@ -10,7 +11,7 @@ use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, Similarity, SourceInfo};
+use crate::{Config, Frame, Result, SourceInfo};
 
 /// A score from which a blob is surely a thing and not noise.
 const SURE: f64 = 8.0;
@@ -85,7 +86,7 @@ impl Seen {
 }
 
 /// Looks for isolated blobs in the frames; `ground` is the first one's in each, none where it stands.
-pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo, n_threads: usize) -> Result<Seen> {
+pub fn look(frames: &[Frame], ground: &[Ground], info: &SourceInfo, n_threads: usize) -> Result<Seen> {
     let dark = look_for(Polarity::Dark, frames, ground, info, n_threads)?;
     look_beside(dark, frames, ground, info, n_threads)
 }
@@ -94,7 +95,7 @@ pub fn look(frames: &[Frame], ground: &[Similarity], info: &SourceInfo, n_thread
 pub fn look_beside(
     dark: Side,
     frames: &[Frame],
-    ground: &[Similarity],
+    ground: &[Ground],
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Seen> {
@@ -105,7 +106,7 @@ pub fn look_beside(
 pub fn look_for(
     polarity: Polarity,
     frames: &[Frame],
-    ground: &[Similarity],
+    ground: &[Ground],
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Side> {
@@ -116,7 +117,7 @@ pub fn look_for(
 pub fn look_at(
     frames: &[Frame],
     places: &[usize],
-    ground: &[Similarity],
+    ground: &[Ground],
     polarity: Polarity,
     info: &SourceInfo,
     n_threads: usize,

@@ -65,6 +65,26 @@ pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Sim
     Some(Vector2::new(x as f64 + half, y as f64 + half) + part)
 }
 
+/// As [`find`] without a search: where the middle of a key frame's patch lies now, if it lies within a pixel of the predicted place; `to_now` is the turn and
+/// zoom there.
+pub(super) fn find_near(
+    key: &Image<f32>,
+    now: &Image<f32>,
+    p: Patch,
+    predicted: Vector2<f64>,
+    to_now: &Similarity,
+) -> Option<Vector2<f64>> {
+    let template = template(key, p, to_now)?;
+    let half = Vector2::repeat(0.5 * (PATCH - 1) as f64);
+    let corner = predicted - half;
+    let (w, h) = (now.width() as f64, now.height() as f64);
+    if !(corner.x >= 0.0 && corner.y >= 0.0 && corner.x < w && corner.y < h) {
+        return None;
+    }
+    let at = (corner.x.round() as i64, corner.y.round() as i64);
+    Some(Vector2::new(at.0 as f64, at.1 as f64) + half + refine(&template, now, at)?)
+}
+
 /// The pixels in which a patch is looked for, from a first column and row on; infinite outside the image.
 fn window(now: &Image<f32>, (left, top): (i64, i64)) -> Window {
     let mut out = [[f32::INFINITY; WIDE]; TALL];

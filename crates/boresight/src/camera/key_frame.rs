@@ -152,7 +152,7 @@ impl KeyFrame {
 }
 
 /// The smaller of the mean absolute gradients along x and y.
-fn texture(image: &Image<f32>, x: usize, y: usize) -> f32 {
+pub(super) fn texture(image: &Image<f32>, x: usize, y: usize) -> f32 {
     let (mut gx, mut gy) = (0.0, 0.0);
     for r in y..y + PATCH {
         let (row, below) = (image.row(r), image.row(r + 1));

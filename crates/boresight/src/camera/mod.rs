@@ -8,11 +8,17 @@ mod course;
 mod estimate;
 mod find_patch;
 mod fit;
+mod follow_plane;
 mod key_frame;
 mod motion;
+mod plane;
 mod reduce;
+mod register;
 mod steady;
+mod wide_search;
 
 pub use estimate::{CameraConfig, CameraMotionEstimator};
+pub(crate) use follow_plane::PlaneFollower;
 pub use motion::CameraPath;
+pub(crate) use register::PlanePatches;
 pub use steady::SteadyGround;

@@ -23,7 +23,7 @@ pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>, sums: &mut Vec<f32>)
 }
 
 /// Mean over blocks of `factor` x `factor` pixels; `sums` is scratch memory.
-fn blocks<T: Copy>(
+pub(super) fn blocks<T: Copy>(
     image: &Image<T>,
     factor: usize,
     out: &mut Image<f32>,

@@ -203,6 +203,7 @@ impl DetectorConfig {
             | ThresholdConfig::Local(_)
             | ThresholdConfig::Moving(_)
             | ThresholdConfig::Difference(_)
+            | ThresholdConfig::Steadied(_)
             | ThresholdConfig::Colour(_) => Vec::new(),
             ThresholdConfig::Isolated(_) => [&joining[..], &[weight, shot_noise]].concat(),
             ThresholdConfig::Spot(_) => [&joining[..], &areas, &[method, weight]].concat(),

@@ -12,6 +12,7 @@ use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
 use super::region_finder::RegionFinder;
 use super::spatial::{SpatialConfig, SpatialFilter};
+use super::steadied::Steadied;
 use super::strongest::Strongest;
 use super::target_finder::{TargetFinder, TypedFrame};
 use super::threshold::ThresholdConfig;
@@ -46,6 +47,7 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
         ThresholdConfig::Local(c) => Box::new(RegionFinder::new(LocalThreshold::new(c), config)),
         ThresholdConfig::Moving(c) => Box::new(RegionFinder::new(Background::<T>::new(c.clone())?, config)),
         ThresholdConfig::Difference(c) => Box::new(RegionFinder::new(FrameDifference::<T>::new(c.clone())?, config)),
+        ThresholdConfig::Steadied(c) => Box::new(RegionFinder::new(Steadied::<T>::new(c)?, config)),
         ThresholdConfig::Colour(c) => Box::new(RegionFinder::new(ColourMask::new(*c)?, config)),
         ThresholdConfig::Isolated(c) => Box::new(IsolatedDetector::new(c)),
         ThresholdConfig::Spot(c) => Box::new(SpotDetector::new(c)),

@@ -25,6 +25,7 @@ mod region_finder;
 mod runs;
 mod segmenter;
 pub mod spatial;
+pub mod steadied;
 mod strongest;
 mod target_finder;
 pub(crate) mod tbd;

@@ -37,6 +37,10 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
         self.segmenter.remembers()
     }
 
+    fn is_blind(&self) -> bool {
+        self.segmenter.is_blind()
+    }
+
     fn prime_s(&self) -> f64 {
         self.segmenter.prime_s()
     }

@@ -52,6 +52,11 @@ pub(super) trait Segmenter<T: Pixel>: Send {
         false
     }
 
+    /// As [`super::target_finder::TargetFinder::is_blind`].
+    fn is_blind(&self) -> bool {
+        false
+    }
+
     /// As [`super::target_finder::TargetFinder::prime_s`].
     fn prime_s(&self) -> f64 {
         0.0

@@ -11,6 +11,7 @@ mod images;
 mod memory;
 mod metrics;
 mod rooms;
+mod steadied;
 mod track;
 mod unsafe_places;
 #[cfg(feature = "video")]

@@ -13,6 +13,7 @@ const LEAVES: &[&str] = &[
     "image",
     "frame",
     "similarity",
+    "homography",
     "camera_motion",
     "detection",
     "record",

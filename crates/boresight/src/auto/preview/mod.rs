@@ -13,6 +13,7 @@ mod moments;
 use self::moments::Moments;
 use super::choose::{Choice, choose_looked, looked_again};
 use super::evidence::{Evidence, SURE_GAIN};
+use super::ground::{self, Ground};
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::sightings::Sightings;
@@ -205,16 +206,12 @@ fn read_runs(input: &OsStr, base: &Config, colour: Colour, runs: &[Vec<u64>]) ->
 }
 
 /// Where the first frame's ground of each run lies in its frames.
-fn grounds(runs: &[Vec<Frame>]) -> Vec<Vec<Similarity>> {
+fn grounds(runs: &[Vec<Frame>]) -> Vec<Vec<Ground>> {
     let of = |run: &Vec<Frame>| {
-        let (mut motion, mut moved) = (CameraMotionEstimator::default(), Similarity::identity());
-        let step = |frame: &Frame| {
-            if let Some(step) = motion.step(&frame.pixels) {
-                moved = moved.then(&step.now_from_before);
-            }
-            moved
-        };
-        run.iter().map(step).collect()
+        let mut motion = CameraMotionEstimator::default();
+        let step = |f: &Frame| motion.step(&f.pixels).map_or(Similarity::identity(), |s| s.now_from_before);
+        let steps: Vec<Similarity> = run.iter().map(step).collect();
+        ground::follow(run, &steps)
     };
     runs.iter().map(of).collect()
 }
@@ -243,7 +240,7 @@ fn reach(read: &Read, info: &SourceInfo) -> String {
 fn row(
     candidate: &Candidate,
     runs: &[Vec<Frame>],
-    ground: &[Vec<Similarity>],
+    ground: &[Vec<Ground>],
     info: &SourceInfo,
     command: &str,
 ) -> SheetRow {
@@ -301,7 +298,7 @@ fn detect(config: &DetectorConfig, runs: &[Vec<Frame>], info: &SourceInfo) -> Re
 }
 
 /// Counts, evidence and marks.
-fn found(row: &mut SheetRow, runs: &[Vec<Frame>], scans: &[Scan], ground: &[Vec<Similarity>], area_px2: f64) {
+fn found(row: &mut SheetRow, runs: &[Vec<Frame>], scans: &[Scan], ground: &[Vec<Ground>], area_px2: f64) {
     let counts: Vec<usize> = scans.iter().map(|s| s.detections.len()).collect();
     row.per_frame = counts.iter().sum::<usize>() as f64 / counts.len().max(1) as f64;
     row.range = [counts.iter().min().copied().unwrap_or(0), counts.iter().max().copied().unwrap_or(0)];

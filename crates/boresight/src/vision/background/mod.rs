@@ -370,7 +370,7 @@ impl<T: BackgroundPixel> Background<T> {
     }
 }
 
-fn size_changed(w: usize, h: usize, found_w: usize, found_h: usize) -> Error {
+pub(crate) fn size_changed(w: usize, h: usize, found_w: usize, found_h: usize) -> Error {
     Error::new(ErrorKind::Damaged, format!("expected a frame of {w} x {h} px, as before"))
         .at(format!("{found_w} x {found_h} px"))
         .hint("frames of one sequence must have one size")

@@ -19,6 +19,7 @@ use super::colour::ColourMatchConfig;
 use super::integrate::config::IntegrateConfig;
 use super::isolated::IsolatedConfig;
 pub use super::polarity::{Polarity, Side};
+use super::steadied::SteadiedConfig;
 use crate::Result;
 use crate::validate::wrong;
 use schemars::JsonSchema;
@@ -40,6 +41,8 @@ pub enum ThresholdConfig {
     Moving(BackgroundConfig),
     /// Pixels that differ from the frames just before.
     Difference(DifferenceConfig),
+    /// Pixels that differ from frames some time ago, steadied by the camera's motion: what moves before a moving camera.
+    Steadied(SteadiedConfig),
     /// Pixels of one colour; needs colour frames (`input.colour = "rgb"` for video).
     Colour(ColourMatchConfig),
     /// Closed blobs of any size that stand clear of the ring around them.
@@ -174,6 +177,7 @@ impl ThresholdConfig {
             Self::Local(_) => "local",
             Self::Moving(_) => "moving",
             Self::Difference(_) => "difference",
+            Self::Steadied(_) => "steadied",
             Self::Colour(_) => "colour",
             Self::Isolated(_) => "isolated",
             Self::Spot(_) => "spot",
@@ -212,6 +216,7 @@ impl ThresholdConfig {
             Self::Otsu(_) => {}
             Self::Moving(c) => c.validate(&format!("{at}.moving"))?,
             Self::Difference(c) => c.validate(&format!("{at}.difference"))?,
+            Self::Steadied(c) => c.validate(&format!("{at}.steadied"))?,
             Self::Colour(c) => c.validate(&format!("{at}.colour"))?,
             Self::Isolated(c) => c.validate(&format!("{at}.isolated"))?,
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
