@@ -365,6 +365,7 @@ mod tests {
             class: None,
             velocity: None,
             fit: None,
+            age_ns: 0,
         }
     }
 
