@@ -112,7 +112,6 @@ impl FrameSource for Damaged {
         Ok(Some(Frame { index: FrameIndex(self.next - 1), time: Timestamp::default(), pixels }))
     }
 
-
     fn warnings(&self) -> &[String] {
         &[]
     }
