@@ -83,6 +83,58 @@ fn a_record_is_whole_after_a_kill() {
 }
 
 #[test]
+#[cfg(target_os = "linux")] // prlimit
+fn a_record_on_a_full_disk_keeps_whole_lines_and_the_run_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let text: String = (0..120).map(line).collect();
+    // No file may grow beyond `bytes`: a write across it is cut there, the next one fails.
+    let recorded = |bytes: u64| {
+        let kept = dir.path().join(bytes.to_string());
+        let script = format!(
+            "trap '' XFSZ; exec prlimit --fsize={bytes} \"$0\" live - --publish - --updates-hz 1000 --learn-s 0.2 --record \"$1\""
+        );
+        let mut command = Command::new("bash");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_boresight")]).arg(&kept);
+        let out =
+            fed(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap(), &text);
+        let mut files = std::collections::BTreeMap::new();
+        for entry in std::fs::read_dir(&kept).unwrap() {
+            let entry = entry.unwrap();
+            files.insert(entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap());
+        }
+        (out, files)
+    };
+    let is_whole = |name: &str, content: &[u8]| -> bool {
+        let text = std::str::from_utf8(content).unwrap();
+        let lines = text.is_empty() || text.ends_with('\n');
+        match name.split_once('.').map_or(name, |n| n.1) {
+            "jsonl" => lines && text.lines().all(|l| serde_json::from_str::<serde_json::Value>(l).is_ok()),
+            "json" => serde_json::from_str::<serde_json::Value>(text).is_ok(),
+            _ => lines,
+        }
+    };
+    let (out, whole) = recorded(1 << 30);
+    assert!(out.status.success() && whole.contains_key("000001.jsonl"), "{:?}", whole.keys());
+    let published = |out: &Output| String::from_utf8_lossy(&out.stdout).lines().filter(|l| l.contains("x_px")).count();
+    let n_published = published(&out);
+    let largest = whole.values().map(Vec::len).max().unwrap() as u64;
+    for bytes in [0, 1, 70, 140, 511, 1000, 1001, 1002, 1003, 2047, 4096, largest / 3, largest / 2, largest - 1] {
+        let (out, left) = recorded(bytes);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert!(said.contains("cannot be written") && !said.contains("panicked"), "{bytes}: {said}");
+        assert!(out.status.success() && published(&out) == n_published, "{bytes}: {:?} {said}", out.status);
+        for (name, content) in &left {
+            assert!(is_whole(name, content), "{bytes} bytes: {name} ends with {:?}", content.iter().rev().take(40));
+            assert!(!name.contains("part"), "{bytes} bytes: {name} is left");
+            // The first segment's tables are the beginnings of the whole ones.
+            if name.starts_with("000001") && !name.ends_with("jsonl") {
+                assert!(whole[name].starts_with(content), "{bytes} bytes: {name}");
+            }
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_is_said_with_its_mend_and_code() {
     let out = fed(boresight(&["live", "-"]).spawn().unwrap(), "{\"detections\":7}\n{}\n");
     let said = String::from_utf8_lossy(&out.stderr);

@@ -9,7 +9,7 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1100px;ma
 h1{font-size:1.6em}h2{font-size:1.15em;margin-top:2em;border-top:1px solid #ddd;padding-top:.8em}\
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}td,th{padding:.15em .7em;text-align:right;border-bottom:1px solid #eee}\
 td:first-child,th:first-child,td:nth-child(2),th:nth-child(2){text-align:left}.reading{color:#555}.out{color:#b00}\
-figure{display:inline-block;margin:1em 1em 0 0;vertical-align:top;width:500px}figcaption{font-size:.88em}svg{background:#fff;max-width:100%}";
+figure{display:inline-block;margin:1em 1em 0 0;vertical-align:top;width:min(500px,calc(100% - 1em))}.wide{overflow-x:auto}figcaption{font-size:.88em}svg{background:#fff;max-width:100%}";
 
 const COLOURS: [&str; 5] = ["#1f6fb2", "#d9542b", "#2f9e58", "#8a4fb0", "#555555"];
 
@@ -21,7 +21,7 @@ fn escape(text: &str) -> String {
 /// Writes the report of some items.
 pub fn page(outputs: &[Output], runs: u64, seed: u64) -> String {
     let mut h = format!(
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>boresight reproduce</title><style>{STYLE}</style>\
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>boresight reproduce</title><style>{STYLE}</style>\
          <h1>The papers' tables and figures</h1><p>{runs} Monte Carlo runs of each study, seed {seed}. \"Percentile\" is the share of our runs below the \
          paper's value: near 0 or 100 the print is not a typical run of this reading. \"Reference\" is an independent Monte Carlo of \
          the same reading and tuning (200 runs), \"off\" our distance from it in standard errors.</p>"
@@ -29,11 +29,11 @@ pub fn page(outputs: &[Output], runs: u64, seed: u64) -> String {
     for output in outputs {
         for s in &output.sections {
             let _ = write!(h, "<h2>{}</h2><p class=\"reading\">Reading {}</p>", escape(&s.title), escape(&s.reading));
-            h.push_str("<table><tr><th>case<th>measure<th>paper<th>our mean<th>our std<th>percentile<th>reference<th>off<th>runs lost</tr>");
+            h.push_str("<div class=\"wide\"><table><tr><th>case<th>measure<th>paper<th>our mean<th>our std<th>percentile<th>reference<th>off<th>runs lost</tr>");
             for r in &s.rows {
                 row(&mut h, r);
             }
-            let _ = write!(h, "</table><p>{}</p>", escape(&s.sentence));
+            let _ = write!(h, "</table></div><p>{}</p>", escape(&s.sentence));
         }
     }
     if outputs.iter().any(|o| !o.figures.is_empty()) {

@@ -77,6 +77,8 @@ pub struct Detection {
     pub velocity: Option<DetectedVelocity>,
     /// How the position came about, if a fit was asked for (`detector.centroid.fit`).
     pub fit: Option<PositionFit>,
+    /// How long before the scan's time it was seen, ns: of a radar whose antenna turns, each plot has its own. 0 where all of a frame is seen at once.
+    pub age_ns: u64,
 }
 
 impl Detection {
@@ -104,6 +106,7 @@ impl Detection {
             class: None,
             velocity: None,
             fit: None,
+            age_ns: 0,
         }
     }
 
@@ -145,6 +148,11 @@ impl Detection {
     /// With this velocity, or none.
     pub fn with_velocity(self, velocity: Option<DetectedVelocity>) -> Self {
         Self { velocity, ..self }
+    }
+
+    /// As seen so long before the scan's time, ns.
+    pub fn with_age_ns(self, age_ns: u64) -> Self {
+        Self { age_ns, ..self }
     }
 }
 

@@ -41,6 +41,16 @@ impl PixelKind {
 }
 
 impl Pixels {
+    /// A black image of a kind; width and height in px.
+    pub(crate) fn black(kind: PixelKind, width: usize, height: usize) -> Self {
+        match kind {
+            PixelKind::Gray8 => Self::Gray8(Image::filled(width, height, 0)),
+            PixelKind::Gray16 => Self::Gray16(Image::filled(width, height, 0)),
+            PixelKind::GrayF32 => Self::GrayF32(Image::filled(width, height, 0.0)),
+            PixelKind::Rgb8 => Self::Rgb8(Image::filled(width, height, [0; 3])),
+        }
+    }
+
     /// Width, px.
     pub fn width(&self) -> usize {
         match self {

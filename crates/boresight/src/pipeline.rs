@@ -26,7 +26,7 @@ use self::scans::Scans;
 pub use self::summary::{StageTimes, Summary};
 use crate::track::Tracking;
 use crate::vision::Detector;
-use crate::{Error, Frame, FrameSource, PositionFit, Result, Scan, Sink, Timestamp, View};
+use crate::{Error, Frame, FrameSource, Pixels, PositionFit, Result, Scan, Sink, SourceInfo, Timestamp, View};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -255,10 +255,14 @@ impl Run<'_, '_> {
         while let Some(held) = self.held.pop(all) {
             let started = Instant::now();
             let frame = loop {
-                match pictures.next_frame()? {
+                match pictures.next_frame() {
                     // Of a scan that the tracker refused.
-                    Some(frame) if frame.index < held.scan.index => pictures.recycle(frame),
-                    frame => break frame.filter(|f| f.index == held.scan.index),
+                    Ok(Some(frame)) if frame.index < held.scan.index => pictures.recycle(frame),
+                    Ok(frame) => break frame.filter(|f| f.index == held.scan.index),
+                    Err(e) => {
+                        self.give_on_black(held, pictures.info());
+                        return Err(e);
+                    }
                 }
             };
             self.summary.times.read += started.elapsed();
@@ -270,6 +274,19 @@ impl Run<'_, '_> {
             }
         }
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// Gives every sink all that is held, `first` before the rest, on black: the pictures have broken off, what is tracked is kept.
+    fn give_on_black(&mut self, first: Held, info: &SourceInfo) {
+        let mut next = Some(first);
+        while let Some(held) = next {
+            let pixels = Pixels::black(info.kind, info.width, info.height);
+            let frame = Frame { index: held.scan.index, time: held.scan.time, pixels };
+            if self.put(Some(&frame), &held).is_break() {
+                return;
+            }
+            next = self.held.pop(true);
+        }
     }
 
     /// Gives every sink the scans that need not wait any longer, or all of them; breaks when no sink is left.
@@ -293,97 +310,4 @@ impl Run<'_, '_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Detection, ErrorKind, FrameIndex};
-    use std::sync::{Arc, Mutex};
-
-    /// A sink that fails at its `fails_at`th view (at `finish`: one behind the last), and writes down what it is asked.
-    struct Faulty {
-        name: char,
-        fails_at: u64,
-        seen: u64,
-        log: Arc<Mutex<String>>,
-    }
-
-    impl Faulty {
-        fn outcome(&mut self) -> Result<()> {
-            self.seen += 1;
-            if self.seen > self.fails_at {
-                return Err(Error::new(ErrorKind::Output, "full").at(self.name));
-            }
-            Ok(())
-        }
-    }
-
-    impl Sink for Faulty {
-        fn put(&mut self, _: &View<'_>) -> Result<()> {
-            self.log.lock().unwrap().push(self.name);
-            self.outcome()
-        }
-        fn finish(mut self: Box<Self>) -> Result<()> {
-            self.log.lock().unwrap().push(self.name.to_ascii_uppercase());
-            self.outcome()
-        }
-    }
-
-    /// A run of `n` scans with sinks `a`, `b`, .. that fail as said; the outcome and what the sinks were asked.
-    fn run_with(n: u64, fails_at: &[u64]) -> (Outcome, String) {
-        let log = Arc::new(Mutex::new(String::new()));
-        let sinks = fails_at.iter().zip('a'..).map(|(&fails_at, name)| {
-            Box::new(Faulty { name, fails_at, seen: 0, log: Arc::clone(&log) }) as Box<dyn Sink>
-        });
-        let scans = (0..n).map(|k| Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64)));
-        let outcome = run(Input::Scans(scans.collect()), None, sinks.collect(), &mut |_| ControlFlow::Continue(()));
-        let asked = log.lock().unwrap().clone();
-        (outcome, asked)
-    }
-
-    #[test]
-    fn a_sink_that_fails_is_abandoned_and_the_others_are_finished() {
-        let (outcome, asked) = run_with(3, &[1, 9, 3]);
-        assert_eq!(asked, "abcabcbcBC", "a fails at its second view and is never finished; c fails at the end");
-        let said: Vec<String> = outcome.unwritten.iter().map(ToString::to_string).collect();
-        assert_eq!((said, outcome.summary.frames), (vec!["a: full".to_string(), "c: full".into()], 3));
-        assert!(outcome.all_written().is_err());
-    }
-
-    #[test]
-    fn a_run_ends_with_its_last_output() {
-        let (outcome, asked) = run_with(9, &[2, 1]);
-        assert_eq!(asked, "ababa", "nothing is computed for nobody");
-        assert!(!outcome.summary.interrupted && outcome.broken.is_none() && outcome.unwritten.len() == 2);
-    }
-
-    #[test]
-    fn a_run_without_frames_finishes_nothing() {
-        let (outcome, asked) = run_with(0, &[9, 9]);
-        assert!(asked.is_empty() && outcome.unwritten.is_empty() && outcome.summary.frames == 0);
-    }
-
-    #[test]
-    fn a_scan_that_the_tracker_refuses_costs_itself() {
-        let at = |x: f64| Detection::at(nalgebra::Vector2::new(x, 5.0), nalgebra::Matrix2::identity());
-        let run_with =
-            |wild: &[u64]| {
-                let scan = |k: u64| {
-                    let x = if wild.contains(&k) { 1e308 } else { k as f64 };
-                    Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64 * 40_000_000)).with_detections(vec![at(x)])
-                };
-                let tracking = crate::track::build(&crate::Config::default().tracker).unwrap();
-                run(Input::Scans((0..9).map(scan).collect()), Some(tracking), Vec::new(), &mut |_| {
-                    ControlFlow::Continue(())
-                })
-            };
-        let one = run_with(&[4]);
-        assert!(one.broken.is_none() && one.summary.frames == 8);
-        assert!(one.summary.warnings[0].starts_with("1 frames are left out"), "{:?}", one.summary.warnings);
-        let most = run_with(&[1, 2, 3, 5, 6]);
-        assert!(most.broken.is_some() && most.summary.frames == 4);
-    }
-
-    #[test]
-    fn a_run_without_sinks_runs_to_its_end() {
-        assert_eq!(run_with(4, &[]).0.summary.frames, 4);
-    }
-}
+mod tests;

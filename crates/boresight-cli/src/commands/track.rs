@@ -241,7 +241,12 @@ fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> bore
     let of_tracks = |sink: Box<dyn Sink>| if args.measured { Box::new(MeasuredOnly::new(sink)) } else { sink };
     let mut sinks: Vec<Box<dyn Sink>> = vec![
         of_tracks(Box::new(TracksCsv::create(folder.path("tracks.csv"))?.with_unit(unit))),
-        Box::new(DetectionsCsv::create(folder.path("detections.csv"))?.with_fits(with_fits).with_unit(unit)),
+        Box::new(
+            DetectionsCsv::create(folder.path("detections.csv"))?
+                .with_fits(with_fits)
+                .with_ages(plan.radar.is_some())
+                .with_unit(unit),
+        ),
     ];
     if folder.makes("mot.txt") {
         sinks.push(of_tracks(Box::new(MotWriter::create(folder.path("mot.txt"))?)));

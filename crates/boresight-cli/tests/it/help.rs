@@ -5,7 +5,9 @@ use super::{run_ok, stdout};
 fn subcommands() -> Vec<String> {
     let text = stdout(&run_ok(["--help"]));
     let list = text.split("Commands:").nth(1).and_then(|t| t.split("Options:").next()).expect("a list of commands");
-    list.lines().filter_map(|l| l.split_whitespace().next()).filter(|n| *n != "help").map(str::to_string).collect()
+    // A sentence that goes on in the next line is indented further.
+    let names = list.lines().filter(|l| !l.starts_with("   ")).filter_map(|l| l.split_whitespace().next());
+    names.filter(|n| *n != "help").map(str::to_string).collect()
 }
 
 #[test]

@@ -1,11 +1,12 @@
-//! One segment of a record: JSON lines, two tables and the configuration, each written line by line so that a kill loses nothing.
+//! One segment of a record: JSON lines, two tables and the configuration, each written line by line so that a kill loses nothing; what a full disk cuts off is taken
+//! back to the last whole line.
 //!
 //! `000001.jsonl` holds every scan with its detections and tracks, and can be given to `boresight live` again; `000001.detections.csv` and
 //! `000001.tracks.csv` are the tables of `boresight track`, `000001.config.toml` is the run's configuration.
 
 use crate::motion::MotionLine;
 use crate::output::Shown;
-use boresight::io::{DetectionsCsv, JsonLines, Output, TracksCsv};
+use boresight::io::{self, DetectionsCsv, JsonLines, Output, TracksCsv};
 use boresight::{Error, ErrorKind, Result, Sink};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
@@ -66,6 +67,8 @@ struct Part {
     sink: Box<dyn Sink>,
     memory: Memory,
     file: File,
+    /// Bytes of whole lines in it.
+    bytes: u64,
     path: PathBuf,
 }
 
@@ -82,9 +85,7 @@ impl Segment {
     /// [`ErrorKind::Output`] if they cannot be written.
     pub fn create(dir: &Path, number: u64, config: &str) -> Result<Self> {
         let config_path = path(dir, number, "config.toml");
-        let failed =
-            |e: std::io::Error| Error::new(ErrorKind::Output, "cannot be written").at(config_path.display()).because(e);
-        std::fs::write(&config_path, config).map_err(failed)?;
+        io::write_whole(config_path, config.as_bytes())?;
         let mut parts = Vec::new();
         for ending in &ENDINGS[..3] {
             let memory = Memory::default();
@@ -98,7 +99,7 @@ impl Segment {
             let opened = OpenOptions::new().append(true).create_new(true).open(&path);
             let file =
                 opened.map_err(|e| Error::new(ErrorKind::Output, "cannot be written").at(path.display()).because(e))?;
-            parts.push(Part { sink, memory, file, path });
+            parts.push(Part { sink, memory, file, bytes: 0, path });
         }
         let entry = Entry { number, open: true, bytes: config.len() as u64, ..Entry::default() };
         let mut segment = Self { parts, entry };
@@ -134,7 +135,14 @@ impl Segment {
                     memory.splice(..1, head.bytes());
                 }
                 let written = part.file.write_all(memory);
-                self.entry.bytes += memory.len() as u64;
+                match &written {
+                    Ok(()) => {
+                        part.bytes += memory.len() as u64;
+                        self.entry.bytes += memory.len() as u64;
+                    }
+                    // No half line: whoever reads on a full disk reads frames.
+                    Err(_) => drop(part.file.set_len(part.bytes)),
+                }
                 memory.clear();
                 let failed = |e| Error::new(ErrorKind::Output, "cannot be written").at(part.path.display()).because(e);
                 written.map_err(failed)

@@ -62,3 +62,55 @@ pub fn configure(reference: &Reference, info: &SourceInfo, config: &mut Config, 
     tracker.initiation = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameIndex, Image, PixelKind, Timestamp};
+
+    /// Pairs A, B of "A of B" in a text.
+    fn shares(text: &str) -> Vec<(u64, u64)> {
+        let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+        let pair = |w: &[&str]| Some((w[0].parse().ok()?, w.get(2)?.parse().ok()?)).filter(|_| w[1] == "of");
+        words.windows(3).filter_map(pair).collect()
+    }
+
+    #[test]
+    fn a_colour_that_is_seen_in_more_frames_than_move_is_not_said_to_be_in_three_of_two() {
+        // A ball as bright as the wall behind it: in grey it moves in no frame, its colour does in each.
+        let info = SourceInfo {
+            label: "ball".to_string(),
+            reader: "test".to_string(),
+            width: 160,
+            height: 120,
+            kind: PixelKind::Rgb8,
+            n_frames: Some(12),
+            rate_hz: None,
+            true_times: false,
+        };
+        let frame = |k: u64| {
+            let mut image = Image::filled(160, 120, [128u8; 3]);
+            for y in 0..120 {
+                for x in 0..160 {
+                    let (dx, dy) = (x as f64 - 30.0 - 8.0 * k as f64, y as f64 - 60.0);
+                    if dx.hypot(dy) < 8.0 {
+                        image.row_mut(y)[x] = [200, 94, 120];
+                    }
+                }
+            }
+            Frame { index: FrameIndex(k), time: Timestamp::from_ns(k as i64 * 40_000_000), pixels: Pixels::Rgb8(image) }
+        };
+        let frames: Vec<Frame> = (0..12).map(frame).collect();
+        let mut scene = Scene::default();
+        (scene.camera, scene.n_frames, scene.n_moving) = (Camera::Fixed, 12, 2);
+        let reference = look(&frames, &scene).unwrap();
+        assert!(reference.n_frames > scene.n_moving, "{reference:?}");
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        configure(&reference, &info, &mut config, &mut reasons);
+        assert!(reasons[0].contains(&format!("in {} of the frames looked at", reference.n_frames)), "{reasons:?}");
+        assert_eq!(shares("in 3 of 2 frames"), [(3, 2)]);
+        for reason in &reasons {
+            assert!(shares(reason).iter().all(|(n, of)| n <= of), "{reason}");
+        }
+    }
+}

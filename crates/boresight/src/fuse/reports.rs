@@ -63,7 +63,7 @@ pub fn plots_taken(
             for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 belief.cov[(2 * i, 2 * j)] = scale * d.cov[(i, j)];
             }
-            plots.points.push((*time_s, belief));
+            plots.points.push((*time_s - d.age_ns as f64 * 1e-9, belief));
         }
         plots
     };

@@ -11,9 +11,7 @@ use super::open::images_of;
 use super::open::open;
 use super::options::{Colour, OpenOptions};
 use super::tables::{DetectionTable, SequenceInfo};
-use crate::{
-    Error, ErrorKind, Frame, FrameIndex, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Timestamp,
-};
+use crate::{Error, ErrorKind, Frame, FrameIndex, FrameSource, Pixels, Result, SourceInfo, Timestamp};
 use std::ffi::OsStr;
 #[cfg(feature = "images")]
 use std::path::Path;
@@ -164,16 +162,6 @@ impl Pictures {
         Ok(Some((place, frame)))
     }
 
-    fn black(&self) -> Pixels {
-        let (w, h) = (self.info.width, self.info.height);
-        match self.info.kind {
-            PixelKind::Gray8 => Pixels::Gray8(Image::filled(w, h, 0)),
-            PixelKind::Gray16 => Pixels::Gray16(Image::filled(w, h, 0)),
-            PixelKind::GrayF32 => Pixels::GrayF32(Image::filled(w, h, 0.0)),
-            PixelKind::Rgb8 => Pixels::Rgb8(Image::filled(w, h, [0; 3])),
-        }
-    }
-
     /// Gathers the warnings at the end.
     fn end(&mut self) {
         self.warnings = self.source.warnings().to_vec();
@@ -242,7 +230,7 @@ impl FrameSource for Pictures {
         }
         self.n_missing += 1;
         self.first_missing.get_or_insert(index.0);
-        Ok(Some(Frame { index, time, pixels: self.black() }))
+        Ok(Some(Frame { index, time, pixels: Pixels::black(self.info.kind, self.info.width, self.info.height) }))
     }
 
     fn recycle(&mut self, frame: Frame) {

@@ -133,7 +133,7 @@ impl Backward {
             back: self,
             model,
             filter,
-            time: scan.time,
+            time: seen(scan, d),
             side_px: [d.extent.width_px, d.extent.height_px],
             log_score: self.log_score(d).map(|s| s.ln),
             misses: 0,
@@ -141,7 +141,7 @@ impl Backward {
             noise_px2: self.noise_trace(d),
         };
         for (ground, scan, d) in own {
-            walk.predict(scan.time)?;
+            walk.predict(seen(scan, d))?;
             walk.filter.correct(&self.measurement(ground, d)).ok()?;
             walk.follow(d);
         }
@@ -186,7 +186,7 @@ struct Likely {
 
 impl Walk<'_> {
     fn predict(&mut self, to: crate::Timestamp) -> Option<()> {
-        let dt_s = self.time.seconds_since(to);
+        let dt_s = self.time.seconds_since(to).max(0.0);
         self.time = to;
         self.filter.predict(dt_s).ok()
     }
@@ -266,7 +266,10 @@ impl Walk<'_> {
         let variance = belief.cov[(0, 0)].max(belief.cov[(2, 2)]) + self.noise_px2;
         let half = AROUND_PX.max((variance * config.gate()).sqrt() * past.ground.zoom());
         let is_around = |off: Vector2<f64>| off.x.abs() <= half && off.y.abs() <= half;
-        past.grid.near(place.x, place.y, half, half, |point| {
+        // What was seen before the scan's time lies where the target was then.
+        let oldest_s = past.scan.detections.iter().map(|d| d.age_ns).max().unwrap_or(0) as f64 * 1e-9;
+        let far = half + oldest_s * config.max_speed_px_per_s;
+        past.grid.near(place.x, place.y, far, far, |point| {
             let Some(d) = past.scan.detections.get(point.index as usize) else { return true };
             if past.taken.get(point.index as usize) == Some(&true) {
                 return true;
@@ -279,10 +282,10 @@ impl Walk<'_> {
             }
             // No variance in any direction exceeds the trace.
             let trace = belief.cov[(0, 0)] + belief.cov[(2, 2)] + self.back.noise_trace(d);
-            if !past.ground.has_moved() && off.norm_squared() > config.gate() * trace {
+            if !past.ground.has_moved() && d.age_ns == 0 && off.norm_squared() > config.gate() * trace {
                 return true;
             }
-            let measurement = self.back.measurement(past.ground, d);
+            let measurement = carried(self.back.measurement(past.ground, d), d.age_ns, belief);
             let nu = measurement.position - Vector2::new(belief.mean[0], belief.mean[2]);
             let mut cov = measurement.cov;
             for (i, a) in [0, 2].into_iter().enumerate() {
@@ -344,6 +347,25 @@ impl Walk<'_> {
         let [state] = state;
         state
     }
+}
+
+/// When a detection was seen.
+fn seen(scan: &Scan, d: &Detection) -> crate::Timestamp {
+    crate::Timestamp::from_ns(scan.time.ns.saturating_sub_unsigned(d.age_ns))
+}
+
+/// What was seen `age_ns` before the scan's time, carried there by a belief in reversed time.
+fn carried(mut m: Measurement, age_ns: u64, belief: &Gaussian<4>) -> Measurement {
+    if age_ns > 0 {
+        let age_s = age_ns as f64 * 1e-9;
+        m.position -= age_s * Vector2::new(belief.mean[1], belief.mean[3]);
+        for (i, a) in [1, 3].into_iter().enumerate() {
+            for (j, b) in [1, 3].into_iter().enumerate() {
+                m.cov[(i, j)] += age_s * age_s * belief.cov[(a, b)];
+            }
+        }
+    }
+    m
 }
 
 /// Likelihood ratio of a score.

@@ -50,6 +50,8 @@ pub struct Predicted {
 pub struct ScanTable {
     /// Measurement noise of each detection; one for all if they are equal, so that hot loops need not fetch it.
     noise: Vec<Cov2>,
+    /// Whether some detection was seen before the scan's time, and that counts.
+    timed: bool,
     /// Largest variances in the scan, px².
     max_xx: f64,
     max_yy: f64,
@@ -68,6 +70,7 @@ impl ScanTable {
     /// A detection with a position or covariance that is not finite, or a covariance that is not positive semi-definite.
     pub fn read(&mut self, scan: &Scan, scale: f64, extra_noise_px: f64, extra_per_height: f64) -> Result<()> {
         self.noise.clear();
+        self.timed = scan.detections.iter().any(|d| d.age_ns > 0);
         (self.max_xx, self.max_yy) = (0.0, 0.0);
         self.largest_half_px = [0.0; 2];
         for (i, d) in scan.detections.iter().enumerate() {
@@ -100,6 +103,17 @@ impl ScanTable {
         }
         self.camera.step(scan.camera_motion.as_ref());
         Ok(())
+    }
+
+    /// Takes all detections as seen at the scan's time: what counts frames, not seconds, knows no other.
+    pub fn forget_ages(&mut self) {
+        self.timed = false;
+    }
+
+    /// Whether detections have times of their own.
+    #[inline]
+    pub fn is_timed(&self) -> bool {
+        self.timed
     }
 
     /// Measurement noise of a detection.

@@ -5,9 +5,9 @@ use super::confirm::history::History;
 use super::confirm::motion_test::{MotionProgress, Report};
 use super::filter::TrackedFilter;
 use super::scan_table::Cov2;
-use crate::Detection;
 use crate::camera::CameraPath;
 use crate::record::TrackInnovation;
+use crate::{Detection, Timestamp};
 
 /// Tracks whose neighbourhoods are fetched together, so that the waits for memory overlap.
 pub(super) const BATCH: usize = 16;
@@ -23,6 +23,8 @@ pub(super) struct Track {
     pub duplicate_since_ns: Option<i64>,
     /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
     pub last_place: [f64; 3],
+    /// How long before its scan's time that detection was seen, ns.
+    pub last_age_ns: u64,
     /// Whether it was ever reported as confirmed.
     pub reported: bool,
     /// Whether it was asked whose it is since its rule confirmed it.
@@ -49,14 +51,27 @@ pub(super) struct Outcome {
 }
 
 impl Track {
+    /// When it was last seen.
+    #[inline]
+    pub(super) fn last_seen(&self) -> Timestamp {
+        Timestamp::from_ns(self.history.last_seen_ns.saturating_sub_unsigned(self.last_age_ns))
+    }
+
     /// Takes in the box, place and score of a detection that is (most likely) its own.
     #[inline]
-    pub(super) fn follow(&mut self, d: &Detection, noise: &Cov2, log_score: Option<f64>, appearance_gain: f64) {
+    pub(super) fn follow(
+        &mut self,
+        d: &Detection,
+        age_ns: u64,
+        noise: &Cov2,
+        log_score: Option<f64>,
+        appearance_gain: f64,
+    ) {
         self.appearance.follow(d, appearance_gain);
         if let Some(now) = log_score {
             self.log_score = Some(self.log_score.map_or(now, |mean| mean + appearance_gain * (now - mean)));
         }
-        self.last_place = place_of(d, noise);
+        (self.last_place, self.last_age_ns) = (place_of(d, noise), age_ns);
         self.motion.add_size([d.extent.width_px, d.extent.height_px]);
     }
 }

@@ -7,7 +7,8 @@
 //! anything changes. An id is given once; only reidentification hands it on.
 //! Time: every dt comes from the time stamps. A track whose coasting budget ended during a gap is gone before the scan
 //! behind the gap is looked at.
-//! Limits: detections of a scan share its time; `max_tracks` tracks.
+//! A detection may have a time of its own within the scan (a radar's turn): then the filters stay at the scan before until they are updated (`step/plot_time.rs`).
+//! Limits: `max_tracks` tracks.
 
 use super::association_cost::AssociationCost;
 use super::backward::Backward;
@@ -24,6 +25,7 @@ use super::step::associate::{Association, associate, gate_confirmed};
 use super::step::context::Context;
 use super::step::delete::{budget_is_over, coast_budget_s, expired_in_gap, is_lasting_duplicate, save_time_alone};
 use super::step::initiate::{NewTracks, Pending, from_initial_tracks, initiate};
+use super::step::plot_time::look_ahead;
 use super::step::predict::predict;
 use super::step::report::report;
 use super::step::update::update;
@@ -115,13 +117,17 @@ impl Tracker {
     /// Predicts every track, and gates the confirmed ones while they are at hand.
     fn predict_and_gate(&mut self, scan: &Scan, dt_s: f64) -> Result<()> {
         let Self { config, tracks, table, predicted, association, cost, gate, .. } = self;
-        let context = Context { scan, table, config, gate: *gate };
+        let context = Context { scan, table, config, gate: *gate, dt_s };
         let plain = config.two_stage.is_none() && config.score_likelihood.is_none() && !config.association_cost.any();
         let survival = config.confirmation.survival(dt_s);
         predicted.clear();
         for (batch, tracks) in tracks.chunks_mut(BATCH).enumerate() {
             let first = batch * BATCH;
-            predict(tracks, scan.time, dt_s, survival, config, predicted)?;
+            if table.is_timed() {
+                look_ahead(&context, tracks, survival, predicted)?;
+            } else {
+                predict(tracks, scan.time, dt_s, survival, config, predicted)?;
+            }
             table.touch(&predicted[first..], *gate);
             gate_confirmed(&context, first, tracks, &predicted[first..], cost, plain, association);
         }
@@ -140,7 +146,7 @@ impl Tracker {
     }
 
     /// Updates every track, confirms or deletes it, and reports it; the order stays.
-    fn update_confirm_delete(&mut self, scan: &Scan) {
+    fn update_confirm_delete(&mut self, scan: &Scan, dt_s: f64) {
         let Self {
             config,
             tracks,
@@ -156,7 +162,7 @@ impl Tracker {
             new,
             ..
         } = self;
-        let context = Context { scan, table, config, gate: self.gate };
+        let context = Context { scan, table, config, gate: self.gate, dt_s };
         let now = scan.time;
         let coast_s = coast_budget_s(config, &self.clock.interval);
         let secondary_s = config.merged_measurements.max_secondary_s;
@@ -255,6 +261,9 @@ impl Tracking for Tracker {
         }
         let c = &self.config;
         self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
+        if !c.filter.form.takes_any_time() {
+            self.table.forget_ages();
+        }
         self.table.scores.read(c.score_likelihood.as_ref(), &scan.detections);
 
         match step_s {
@@ -270,12 +279,12 @@ impl Tracking for Tracker {
         self.table.sort(scan);
         self.association.begin(scan, &self.clutter, &self.table.scores);
         self.predict_and_gate(scan, dt_s)?;
-        let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate };
+        let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate, dt_s };
         let (association, merged) = (&mut self.association, &mut self.merged);
         associate(&context, &self.tracks, &self.predicted, &self.cost, association, merged);
         self.clutter.learn(scan, &self.association.taken_by_confirmed, dt_s);
-        self.update_confirm_delete(scan);
-        let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate };
+        self.update_confirm_delete(scan, dt_s);
+        let context = Context { scan, table: &self.table, config: &self.config, gate: self.gate, dt_s };
         let mut new = NewTracks { tracks: &mut self.tracks, states: &mut self.states, next_id: &mut self.next_id };
         let first_begun = new.states.len();
         initiate(&context, &self.clutter, &mut self.association.used, &mut self.pending, &mut new);

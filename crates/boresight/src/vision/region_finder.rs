@@ -116,5 +116,6 @@ fn detection<T: Pixel>(
         class: None,
         velocity: None,
         fit: None,
+        age_ns: 0,
     }
 }

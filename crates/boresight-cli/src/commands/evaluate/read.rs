@@ -109,7 +109,7 @@ fn sentence(note: &Note, detections: &str) -> String {
     match note {
         Note::TrajectoryGospaLeftOut(_) => format!("{note}; --max-unknowns allows more"),
         Note::NisRowsLeftOut(n) => format!(
-            "NIS leaves out {n} rows: no such detection in {detections}, or a state no better known than its detection"
+            "NIS leaves out {n} rows: no such detection in {detections}, one seen before its frame's time, or a state no better known than its detection"
         ),
         note => note.to_string(),
     }

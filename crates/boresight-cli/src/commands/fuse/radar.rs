@@ -62,8 +62,9 @@ pub fn register(
     b.tracks = b.tracks.iter().map(|t| found.timeline(t, own)).collect();
     let turn: Matrix2<f64> = *Rotation2::new(-found.azimuth_rad).matrix();
     for scan in b.scans.iter_mut().flatten() {
-        let at = Vector2::from(own(scan.time.as_secs_f64()));
+        let time_s = scan.time.as_secs_f64();
         for d in &mut scan.detections {
+            let at = Vector2::from(own(time_s - d.age_ns as f64 * 1e-9));
             let moved = found.position(d.position, at) - d.position;
             d.position += moved;
             d.extent.left_px += moved.x;

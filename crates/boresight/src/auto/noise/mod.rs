@@ -68,8 +68,9 @@ pub fn learn(
                 continue;
             }
             let d = &on_ground.detections[j as usize];
-            let dt_s = if of.steps.is_empty() { 0.0 } else { (scan.time.ns - of.last_ns) as f64 * 1e-9 };
-            of.last_ns = scan.time.ns;
+            let seen_ns = scan.time.ns.saturating_sub_unsigned(d.age_ns);
+            let dt_s = if of.steps.is_empty() { 0.0 } else { (seen_ns - of.last_ns).max(0) as f64 * 1e-9 };
+            of.last_ns = seen_ns;
             of.sizes[0].push(d.extent.width_px);
             of.sizes[1].push(d.extent.height_px);
             let [position, variance] = [[d.position.x, d.position.y], [d.cov[(0, 0)], d.cov[(1, 1)]]];

@@ -35,6 +35,7 @@ pub(crate) enum Field {
     Occlusion,
     Status,
     Detection,
+    Age,
     Vx,
     Vy,
     CovXVx,
@@ -70,7 +71,7 @@ impl Field {
     pub fn expected(self) -> &'static str {
         match self {
             Self::Frame => "a frame number",
-            Self::TimeS => "a time in seconds",
+            Self::TimeS | Self::Age => "a time in seconds",
             Self::Id => "a track id",
             Self::X => "a position x",
             Self::Y => "a position y",
@@ -201,6 +202,7 @@ const KNOWN: [(Field, &str, &[&str]); N_FIELDS] = [
     (Field::Occlusion, "", &["occlusion"]),
     (Field::Status, "", &["status"]),
     (Field::Detection, "", &["detection"]),
+    (Field::Age, "", &["ages"]),
     (Field::Vx, "", &["vxpxpers", "vxmpers"]),
     (Field::Vy, "", &["vypxpers", "vympers"]),
     (Field::CovXVx, "", &["covxvxpx2pers", "covxvxm2pers"]),

@@ -107,6 +107,7 @@ impl<'o> RowReader<'o> {
             class: row.word(Field::Class).and_then(|word| class_of(&word, class_names)),
             velocity: None,
             fit: None,
+            age_ns: age_ns(row)?,
         };
         Ok(Some(Seen { frame, id, time, detection }))
     }
@@ -141,6 +142,15 @@ impl<'o> RowReader<'o> {
         let x = row.maybe(Field::StdX)?.filter(|s| *s > 0.0).unwrap_or(side(extent.width_px));
         let y = row.maybe(Field::StdY)?.filter(|s| *s > 0.0).unwrap_or(side(extent.height_px));
         Ok(Matrix2::new(x * x, 0.0, 0.0, y * y))
+    }
+}
+
+/// How long before its scan's time a row was seen, ns, if it says.
+fn age_ns(row: &Row<'_>) -> Result<u64> {
+    match row.maybe(Field::Age)? {
+        None => Ok(0),
+        Some(s) if (0.0..=1e9).contains(&s) => Ok((s * 1e9).round() as u64),
+        Some(s) => Err(row.wrong(Field::Age, &s.to_string(), "a time in seconds from 0 on, before that of the frame")),
     }
 }
 

@@ -3,12 +3,13 @@
 //! Columns: frame (from 0), time_s, centroid (px, the centre of the top-left pixel is (0, 0)), its covariance (px²), the
 //! box in pixel-edge coordinates (a single pixel at x has left = x - 0.5), number of pixels, strongest value, sum of
 //! weights (counts), score. Where spots were fitted, also how: `fit` (spot, or centroid where the fit was poor), squared residuals over their
-//! variances a degree of freedom, and the chance of as much. Numbers are the shortest that read back to the same bits.
+//! variances a degree of freedom, and the chance of as much. Where each has a time of its own (a radar's plots), `age_s`: how long before the scan's time it was seen.
+//! Numbers are the shortest that read back to the same bits.
 
 use super::number::{push_f32, push_f64, push_seconds};
 use crate::io::atomic::Output;
 use crate::length_unit::LengthUnit;
-use crate::{PositionFit, Result, Sink, View};
+use crate::{PositionFit, Result, Sink, Timestamp, View};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -19,11 +20,15 @@ left_px,top_px,width_px,height_px,area_px,peak,sum,score";
 /// What it adds where spots were fitted.
 const FIT_COLUMNS: &str = ",fit,chi2_per_dof,fit_p";
 
+/// What it adds where each detection has its own time.
+const AGE_COLUMN: &str = ",age_s";
+
 /// Writes `detections.csv`.
 pub struct DetectionsCsv {
     output: Output,
     lines: String,
     with_fits: bool,
+    with_ages: bool,
 }
 
 opaque_debug!(DetectionsCsv);
@@ -40,7 +45,7 @@ impl DetectionsCsv {
     /// # Errors
     /// [`crate::ErrorKind::Output`] if it cannot be written.
     pub fn to(output: Output) -> Result<Self> {
-        Ok(Self { output, lines: format!("{DETECTIONS_HEADER}\n"), with_fits: false })
+        Ok(Self { output, lines: format!("{DETECTIONS_HEADER}\n"), with_fits: false, with_ages: false })
     }
 
     /// With columns that name this unit of length.
@@ -52,8 +57,21 @@ impl DetectionsCsv {
     /// With columns that say how each position was fitted, or without.
     pub fn with_fits(mut self, with_fits: bool) -> Self {
         self.with_fits = with_fits;
-        self.lines = format!("{DETECTIONS_HEADER}{}\n", if with_fits { FIT_COLUMNS } else { "" });
+        self.lines = self.header();
         self
+    }
+
+    /// With a column that says how long before its scan's time each detection was seen, or without.
+    pub fn with_ages(mut self, with_ages: bool) -> Self {
+        self.with_ages = with_ages;
+        self.lines = self.header();
+        self
+    }
+
+    fn header(&self) -> String {
+        let fits = if self.with_fits { FIT_COLUMNS } else { "" };
+        let ages = if self.with_ages { AGE_COLUMN } else { "" };
+        format!("{DETECTIONS_HEADER}{fits}{ages}\n")
     }
 }
 
@@ -100,6 +118,10 @@ impl Sink for DetectionsCsv {
                     Some(PositionFit::Centroid) => out.push_str(",centroid,,"),
                     None => out.push_str(",,,"),
                 }
+            }
+            if self.with_ages {
+                out.push(',');
+                push_seconds(out, Timestamp::from_ns(i64::try_from(d.age_ns).unwrap_or(i64::MAX)));
             }
             out.push('\n');
         }

@@ -319,18 +319,18 @@ mod tests {
 
     fn detection() -> impl Strategy<Value = Detection> {
         let n = || -1e6..1e6f64;
-        (n(), n(), 1e-9..1e3f64, 1e-9..1e3f64, -0.99..0.99f64, 0.0..1e4f64, 1u32..100, any::<f32>(), n()).prop_map(
-            |(x, y, vx, vy, rho, size, area_px, peak, sum)| {
-                let xy = rho * (vx * vy).sqrt();
-                let peak = if peak.is_finite() { peak } else { 0.0 };
-                Detection::at(Vector2::new(x, y), Matrix2::new(vx, xy, xy, vy))
-                    .with_extent(Extent { left_px: x - 0.3, top_px: y - 0.7, width_px: size, height_px: size / 3.0 })
-                    .with_area_px(area_px)
-                    .with_peak(peak)
-                    .with_sum(sum)
-                    .with_score(peak)
-            },
-        )
+        let one = (n(), n(), 1e-9..1e3f64, 1e-9..1e3f64, -0.99..0.99f64, 0.0..1e4f64, 1u32..100, any::<f32>(), n());
+        (one, 0..10_000_000_000u64).prop_map(|((x, y, vx, vy, rho, size, area_px, peak, sum), age_ns)| {
+            let xy = rho * (vx * vy).sqrt();
+            let peak = if peak.is_finite() { peak } else { 0.0 };
+            Detection::at(Vector2::new(x, y), Matrix2::new(vx, xy, xy, vy))
+                .with_extent(Extent { left_px: x - 0.3, top_px: y - 0.7, width_px: size, height_px: size / 3.0 })
+                .with_area_px(area_px)
+                .with_peak(peak)
+                .with_sum(sum)
+                .with_score(peak)
+                .with_age_ns(age_ns)
+        })
     }
 
     proptest! {
@@ -341,7 +341,7 @@ mod tests {
         ) {
             let dir = tempfile::tempdir().unwrap();
             let path = dir.path().join("detections.csv");
-            let mut sink = Box::new(DetectionsCsv::to(Output::file(&path).unwrap()).unwrap());
+            let mut sink = Box::new(DetectionsCsv::to(Output::file(&path).unwrap()).unwrap().with_ages(true));
             let scans: Vec<Scan> = scans
                 .into_iter()
                 .enumerate()

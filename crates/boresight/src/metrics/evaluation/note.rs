@@ -24,7 +24,10 @@ impl fmt::Display for Note {
             Self::TrajectoryGospaLeftOut(reason) => write!(f, "TGOSPA is left out: {reason}"),
             Self::NoDetectionColumn => write!(f, "NIS needs the column detection of boresight's tracks.csv"),
             Self::NisRowsLeftOut(n) => {
-                write!(f, "NIS leaves out {n} rows: no such detection, or a state no better known than its detection")
+                write!(
+                    f,
+                    "NIS leaves out {n} rows: no such detection, one seen before its frame's time, or a state no better known than its detection"
+                )
             }
         }
     }

@@ -12,7 +12,7 @@ use crate::metrics::multi_object::MatchOptions;
 use crate::metrics::near::centre;
 use crate::metrics::pcrlb::{LinearModel, pcrlb};
 use crate::metrics::state::{BoundedError, StateErrors, bounded_errors, root_sum_square, state_errors};
-use crate::{Result, Scan, TrackTable};
+use crate::{Detection, Result, Scan, TrackTable};
 use nalgebra::{Matrix1, Matrix1x2, Matrix2, Vector2, Vector4};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -175,7 +175,7 @@ fn mean_by_frame(values: impl Iterator<Item = (u32, f64)>) -> impl Iterator<Item
     sums.into_iter().map(|(frame, (sum, n))| (frame, sum / n))
 }
 
-/// NIS of the rows that name the detection which updated them.
+/// NIS of the rows that name the detection which updated them, at their own time (of one seen before it the row does not tell the residual).
 fn nis(
     r: &TrackTable,
     scans: &[Scan],
@@ -191,7 +191,7 @@ fn nis(
     for frame in 0..r.n_frames() {
         for (row, taken) in r.rows(frame).filter_map(|row| Some((row, r.states.detection.get(row)?))) {
             let detection = scans.get(&(frame as u64)).and_then(|s| s.detections.get(taken as usize));
-            let (Some(d), Some(p)) = (detection, r.position_cov(row)) else {
+            let (Some(d @ Detection { age_ns: 0, .. }), Some(p)) = (detection, r.position_cov(row)) else {
                 n_left_out += 1;
                 continue;
             };
@@ -258,7 +258,7 @@ mod tests {
     use super::*;
     use crate::metrics::evaluation::{Evaluation, Matching};
     use crate::metrics::pcrlb::rmspe_without_prior;
-    use crate::{Detection, FrameIndex, PixelOrigin, RowState, TrackRow, TrackTableBuilder};
+    use crate::{FrameIndex, PixelOrigin, RowState, TrackRow, TrackTableBuilder};
 
     /// Points of one track: frame, x, y, and what they say of the state.
     fn table(rows: &[(u32, f64, f64, RowState)]) -> TrackTable {
@@ -344,6 +344,10 @@ mod tests {
         let e = by_centres(&truth, &result, Some(&scans), &mut o);
         assert!((state(&e).nis.unwrap().average - 1.0).abs() < 1e-12);
         assert!(e.notes.contains(&Note::NisRowsLeftOut(1)), "{:?}", e.notes);
+        let mut seen_before = scans.clone();
+        seen_before[0].detections[0].age_ns = 1;
+        let e = by_centres(&truth, &result, Some(&seen_before), &mut o);
+        assert!(state(&e).nis.is_none() && e.notes.contains(&Note::NisRowsLeftOut(2)), "{:?}", e.notes);
         // The same noise told as 0.84 of the detection and 0.4 px of the tracker.
         o.extra_noise_px = 0.4;
         let scans = [scan(0, Matrix2::identity() * 0.84)];
@@ -354,18 +358,7 @@ mod tests {
     }
 
     fn detection() -> Detection {
-        Detection {
-            position: Vector2::zeros(),
-            cov: Matrix2::identity(),
-            extent: crate::Extent::default(),
-            area_px: 1,
-            peak: 1.0,
-            sum: 1.0,
-            score: 1.0,
-            class: None,
-            velocity: None,
-            fit: None,
-        }
+        Detection::point(0.0, 0.0, 1.0)
     }
 
     #[test]

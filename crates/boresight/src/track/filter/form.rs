@@ -59,6 +59,11 @@ impl FormConfig {
         }
     }
 
+    /// Whether a step over some time may be cut into two; the others count frames.
+    pub fn takes_any_time(&self) -> bool {
+        self.takes_a_model() || matches!(self, Self::Imm(_))
+    }
+
     pub(super) fn validate(&self, at: &str) -> Checked<()> {
         match self {
             Self::Imm(c) => c.validate(&format!("{at}.imm")),

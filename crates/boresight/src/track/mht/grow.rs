@@ -8,12 +8,14 @@ use super::super::association_cost::AssociationCost;
 use super::super::clutter::Clutter;
 use super::super::config::TrackerConfig;
 use super::super::confirm::history::{Decision, Evidence};
+use super::super::filter::TrackedFilter;
 use super::super::initiation::{from_one_point, from_velocity};
 use super::super::scan_table::Predicted;
 use super::super::single_track::{Outcome, Track, motion_of, place_of};
 use super::super::step::context::Context;
 use super::super::step::delete::budget_is_over;
 use super::super::step::gate::{gate_row, innovation_cov};
+use super::super::step::plot_time::{Carried, gate_row_by_time, seconds};
 use super::super::step::predict::predicted_of;
 use super::super::step::update::innovation_of;
 use super::config::MhtConfig;
@@ -33,11 +35,11 @@ pub(super) struct Growth<'a> {
     pub coast_budget_s: f64,
 }
 
-/// Grows every leaf over `dt_s`; the trees then hold the leaves of this scan, the best first. `gates` is scratch memory.
+/// Grows every leaf over the time since the scan before; the trees then hold the leaves of this scan, the best first. `gates` is scratch memory.
 /// # Errors
 /// A filter that cannot predict over that time.
-pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates: &mut Gates) -> Result<()> {
-    let (config, mht) = (growth.context.config, growth.mht);
+pub(super) fn grow(growth: &Growth<'_>, trees: &mut Vec<Tree>, gates: &mut Gates) -> Result<()> {
+    let (config, mht, dt_s) = (growth.context.config, growth.mht, growth.context.dt_s);
     let survival = config.confirmation.survival(dt_s);
     // All that one tree grows lies here first: what is kept of it takes no more memory than it needs.
     let mut grown: Vec<Hypothesis> = Vec::new();
@@ -45,11 +47,11 @@ pub(super) fn grow(growth: &Growth<'_>, dt_s: f64, trees: &mut Vec<Tree>, gates:
         let parents = std::mem::take(&mut tree.leaves);
         for mut leaf in parents {
             let t = &mut leaf.track;
+            let before = growth.context.table.is_timed().then(|| t.filter.clone());
             t.filter.predict(dt_s)?;
             config.confirmation.predict_existence(&mut t.history, survival);
-            let now = growth.context.now();
-            leaf.predicted = predicted_of(&t.filter, t.history.last_seen_ns, t.last_place, now, config);
-            children(growth, &leaf, gates, &mut grown);
+            leaf.predicted = predicted_of(&t.filter, t.last_seen(), t.last_place, growth.context.now(), config);
+            children(growth, &mut leaf, before, gates, &mut grown);
         }
         grown.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.path.cmp(&b.path)));
         grown.dedup_by(|b, a| a.path == b.path);
@@ -84,9 +86,15 @@ pub(super) fn coast(trees: &mut [Tree], dt_s: f64, config: &TrackerConfig) -> Re
     Ok(())
 }
 
-/// The children of a predicted leaf: a miss, and one for each gated detection.
-fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut Vec<Hypothesis>) {
-    let Context { scan, table, config, gate } = growth.context;
+/// The children of a predicted leaf: a miss, and one for each gated detection; `before` is its filter at the scan before, where detections have times of their own.
+fn children(
+    growth: &Growth<'_>,
+    leaf: &mut Hypothesis,
+    before: Option<TrackedFilter>,
+    gates: &mut Gates,
+    out: &mut Vec<Hypothesis>,
+) {
+    let Context { scan, table, config, gate, .. } = growth.context;
     let mut path = [NONE; WINDOW];
     path[1..].copy_from_slice(&leaf.path[..WINDOW - 1]);
     let miss = 1.0 - config.p_detection(leaf.track.history.misses) * config.gate_probability;
@@ -102,14 +110,21 @@ fn children(growth: &Growth<'_>, leaf: &Hypothesis, gates: &mut Gates, out: &mut
     }
 
     gates.reset(scan.detections.len(), 1.0);
-    let p = &leaf.predicted;
-    let look = &leaf.track.appearance;
-    let cost = |j: u32| {
-        growth.cost.cost(p.x, p.y, look, &scan.detections[j as usize]) + growth.context.score_cost(&leaf.track, j)
+    let is_timed = before.is_some();
+    if let Some(before) = before {
+        leaf.track.filter = before;
+    }
+    let (p, t) = (&leaf.predicted, &leaf.track);
+    let cost = |p: &Predicted, j: u32| {
+        growth.cost.cost(p.x, p.y, &t.appearance, &scan.detections[j as usize]) + growth.context.score_cost(t, j)
     };
     let low = config.two_stage.as_ref().map_or(f32::NEG_INFINITY, |t| t.low_score);
     let free = |j: u32| scan.detections[j as usize].score >= low;
-    gate_row(table, p, gate, config.max_gated as usize, true, free, cost, gates);
+    if is_timed {
+        gate_row_by_time(&growth.context, t, p, true, free, cost, gates);
+    } else {
+        gate_row(table, p, gate, config.max_gated as usize, true, free, cost, gates);
+    }
     gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: gate });
     for pair in gates.row(0) {
         if let Some(mut child) = hit(growth, leaf, pair) {
@@ -126,8 +141,13 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
     let d = &scan.detections[pair.detection as usize];
     let noise = table.noise(pair.detection);
     let mut child = leaf.clone();
+    let carried = table.is_timed().then(|| Carried::sure(&growth.context, &mut child.track, pair.detection));
+    let predicted = carried.as_ref().map_or(&leaf.predicted, |c| &c.predicted);
     let measurement = Measurement { position: d.position, cov: noise.matrix() };
     child.track.filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
+    if let Some(carried) = &carried {
+        carried.to_scan(&mut child.track);
+    }
     let log_ratio = config.p_detection(leaf.track.history.misses).ln() + pair.log_likelihood
         - (growth.clutter.at(d.position.x, d.position.y) * table.scores.clutter(pair.detection)).max(1e-200).ln();
     child.score += log_ratio;
@@ -136,12 +156,13 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
     if config.confirmation.decide(&mut child.track.history, evidence, scan.time.ns) == Decision::Delete {
         return None;
     }
-    child.track.follow(d, &noise, table.scores.log_score(pair.detection), config.appearance_gain);
+    let (age_ns, log_score) = (growth.context.age_ns(pair.detection), table.scores.log_score(pair.detection));
+    child.track.follow(d, age_ns, &noise, log_score, config.appearance_gain);
     child.outcome = Outcome {
         hit: true,
         detection: Some(pair.detection),
         likelihood_ratio,
-        innovation: Some(innovation_of(&d.position, &leaf.predicted, &innovation_cov(&leaf.predicted, &noise))),
+        innovation: Some(innovation_of(&d.position, predicted, &innovation_cov(predicted, &noise))),
         ..Outcome::default()
     };
     Some(child)
@@ -163,7 +184,11 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
             Some(v) => from_velocity(&d.position, &noise.matrix(), v, config.detection_covariance_scale),
             None => from_one_point(&d.position, &noise.matrix(), velocity, variance),
         };
-        let Ok(filter) = config.start_filter(&start, d.extent.height_px) else { continue };
+        let Ok(mut filter) = config.start_filter(&start, d.extent.height_px) else { continue };
+        let age_ns = growth.context.age_ns(j as u32);
+        if age_ns > 0 && filter.predict(seconds(age_ns)).is_err() {
+            continue;
+        }
         let score_ratio = growth.context.new_target_score_ratio(None, j as u32);
         let density = (growth.clutter.at(d.position.x, d.position.y) / score_ratio).max(1e-200);
         let mut path = [NONE; WINDOW];
@@ -176,6 +201,7 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
                 appearance: Appearance::of(d),
                 duplicate_since_ns: None,
                 last_place: place_of(d, &noise),
+                last_age_ns: age_ns,
                 reported: false,
                 identified: false,
                 log_score: table.scores.log_score(j as u32),

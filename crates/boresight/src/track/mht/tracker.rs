@@ -126,6 +126,9 @@ impl Tracking for Mht {
         let step_s = self.clock.step_s(scan)?;
         let c = &self.config;
         self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
+        if !c.filter.form.takes_any_time() {
+            self.table.forget_ages();
+        }
         self.table.scores.read(c.score_likelihood.as_ref(), &scan.detections);
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
@@ -140,13 +143,13 @@ impl Tracking for Mht {
         self.afford(scan.detections.len())?;
         self.table.sort(scan);
         let growth = Growth {
-            context: Context { scan, table: &self.table, config: &self.config, gate: self.gate },
+            context: Context { scan, table: &self.table, config: &self.config, gate: self.gate, dt_s },
             mht: &self.mht,
             cost: &self.cost,
             clutter: &self.clutter,
             coast_budget_s: coast_budget_s(&self.config, &self.clock.interval),
         };
-        grow(&growth, dt_s, &mut self.trees, &mut self.gates)?;
+        grow(&growth, &mut self.trees, &mut self.gates)?;
         initiate(&growth, &mut self.trees);
         self.select.choose(&mut self.trees, self.mht.max_steps);
         prune(&mut self.trees, self.mht.n_scan as usize);

@@ -92,16 +92,16 @@ pub(in crate::track) fn gate_confirmed(
             continue;
         }
         let p = &predicted[k];
-        let existence = context.config.confirmation.existence(&t.history);
-        let p_detection = context.config.p_detection(t.history.misses);
         let stage = &mut association.stages[CONFIRMED];
         if plain {
-            stage.add(first + k, p, existence, p_detection, context, |_| true, |_| 0.0);
+            stage.add(first + k, t, p, context, |_| true, |_, _| 0.0);
         } else {
             let detections = &context.scan.detections;
             let strong = |j: u32| detections[j as usize].score >= high;
-            let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
-            stage.add(first + k, p, existence, p_detection, context, strong, extra);
+            let extra = |p: &Predicted, j: u32| {
+                cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j)
+            };
+            stage.add(first + k, t, p, context, strong, extra);
         }
     }
 }
@@ -120,7 +120,9 @@ pub(in crate::track) fn associate(
     stages[CONFIRMED].solve(used);
     missed.clear();
     taker.clear();
-    let may_merge = config.merged_measurements.enabled && context.table.largest_half_px != [0.0; 2];
+    // Members of a merged measurement are compared in one moment.
+    let may_merge =
+        config.merged_measurements.enabled && context.table.largest_half_px != [0.0; 2] && !context.table.is_timed();
     if may_merge || config.two_stage.is_some() {
         taker.resize(scan.detections.len(), NONE);
         for (i, shares) in stages[CONFIRMED].rows() {
@@ -179,8 +181,7 @@ fn add_later(
 ) {
     let (t, p, detections) = (&tracks[i], &predicted[i], &context.scan.detections);
     let free = |j: u32| !used[j as usize] && detections[j as usize].score >= min_score;
-    let extra = |j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
-    let existence = context.config.confirmation.existence(&t.history);
-    let p_detection = context.config.p_detection(t.history.misses);
-    stage.add(i, p, existence, p_detection, context, free, extra);
+    let extra =
+        |p: &Predicted, j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
+    stage.add(i, t, p, context, free, extra);
 }

@@ -14,12 +14,20 @@ pub(in crate::track) struct Context<'a> {
     pub config: &'a TrackerConfig,
     /// Gate threshold γ on d² (no unit).
     pub gate: f64,
+    /// Time since the scan before, s.
+    pub dt_s: f64,
 }
 
 impl Context<'_> {
     /// Time of the scan.
     pub fn now(&self) -> Timestamp {
         self.scan.time
+    }
+
+    /// How long before the scan's time detection `j` was seen, ns.
+    #[inline]
+    pub fn age_ns(&self, j: u32) -> u64 {
+        if self.table.is_timed() { self.scan.detections[j as usize].age_ns } else { 0 }
     }
 
     /// −2 ln of the density of detection `j`'s score for a track; 0 where scores say nothing.

@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Vector2};
 const LN_2PI: f64 = 1.837_877_066_409_345_5;
 
 /// Adds the pairs of one track to the open row of `gates`: those with d² ≤ `gate` that `free` lets pass.
-/// `extra_cost` returns what a pair costs beside position (0 if nothing).
+/// `extra_cost` returns what a pair of the predicted track and a detection costs beside position (0 if nothing).
 #[inline]
 pub fn gate_row(
     table: &ScanTable,
@@ -23,10 +23,9 @@ pub fn gate_row(
     max_gated: usize,
     likelihood: bool,
     free: impl Fn(u32) -> bool,
-    extra_cost: impl Fn(u32) -> f64,
+    extra_cost: impl Fn(&Predicted, u32) -> f64,
     gates: &mut Gates,
 ) {
-    let reach2 = track.reach * track.reach;
     let (half_x, half_y) = table.half_sides(track, gate);
     let mut looked_at = 0;
     let mut gated = 0;
@@ -35,21 +34,43 @@ pub fn gate_row(
         let (dx, dy) = (p.x - track.x, p.y - track.y);
         if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
             let r = table.noise(p.index);
-            let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
-            let det = sxx * syy - sxy * sxy;
-            let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
-            if distance2 <= gate && dx * dx + dy * dy <= reach2 {
-                let cost = distance2 + extra_cost(p.index);
-                if cost.is_infinite() {
-                    return looked_at < MOST_LOOKED_AT;
-                }
-                let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
-                gates.push(Pair { detection: p.index, cost, log_likelihood });
+            if let Some(pair) = pair(track, [dx, dy], &r, p.index, gate, likelihood, &extra_cost) {
+                gates.push(pair);
                 gated += 1;
             }
         }
         looked_at < MOST_LOOKED_AT
     });
+    keep_nearest(gates, gated, max_gated);
+}
+
+/// The pair of a track and a detection that lies `[dx, dy]` from it, if it is in the gate.
+#[inline(always)]
+pub(super) fn pair(
+    track: &Predicted,
+    [dx, dy]: [f64; 2],
+    r: &Cov2,
+    detection: u32,
+    gate: f64,
+    likelihood: bool,
+    extra_cost: &impl Fn(&Predicted, u32) -> f64,
+) -> Option<Pair> {
+    let (sxx, sxy, syy) = (track.cov.xx + r.xx, track.cov.xy + r.xy, track.cov.yy + r.yy);
+    let det = sxx * syy - sxy * sxy;
+    let distance2 = (dx * (syy * dx - sxy * dy) + dy * (sxx * dy - sxy * dx)) / det;
+    if distance2 <= gate && dx * dx + dy * dy <= track.reach * track.reach {
+        let cost = distance2 + extra_cost(track, detection);
+        if cost.is_infinite() {
+            return None;
+        }
+        let log_likelihood = if likelihood { -0.5 * (cost + det.ln()) - LN_2PI } else { 0.0 };
+        return Some(Pair { detection, cost, log_likelihood });
+    }
+    None
+}
+
+/// Ends the open row of `gated` pairs: the `max_gated` nearest in the order of the scan.
+pub(super) fn keep_nearest(gates: &mut Gates, gated: usize, max_gated: usize) {
     if gated > 1 {
         let row = gates.open_row();
         if gated > max_gated {
@@ -116,7 +137,7 @@ mod tests {
             let gates_to = |threshold: f64| {
                 let mut gates = Gates::new();
                 gates.reset(scan.detections.len(), 1.0);
-                gate_row(&table, &track, threshold, 64, true, |_| true, |_| 0.0, &mut gates);
+                gate_row(&table, &track, threshold, 64, true, |_| true, |_, _| 0.0, &mut gates);
                 gates.end_row(Prior { p_detection: 0.9, p_gate: 0.99, existence: 1.0, miss_cost: threshold });
                 gates
             };
@@ -148,7 +169,7 @@ mod tests {
             asked.set(asked.get() + 1);
             true
         };
-        gate_row(&table, &track, gate, max_gated, true, free, |_| 0.0, &mut gates);
+        gate_row(&table, &track, gate, max_gated, true, free, |_, _| 0.0, &mut gates);
         gates.end_row(Prior { p_detection: 1.0, p_gate: 1.0, existence: 1.0, miss_cost: gate });
         (gates.row(0).to_vec(), asked.get())
     }

@@ -17,6 +17,7 @@ use super::super::score_likelihood::LogScore;
 use super::super::single_track::{BATCH, Outcome, Track, motion_of, place_of};
 use super::context::Context;
 use super::gate::normalised_square;
+use super::plot_time::seconds;
 use super::report::report;
 use crate::{Detection, Result, Timestamp, TrackState};
 use boresight_filters::{Filter, Measurement, Weighted};
@@ -28,6 +29,8 @@ struct Unassociated {
     position: Vector2<f64>,
     noise: Cov2,
     score: Option<LogScore>,
+    /// How long before its scan's time it was seen, s.
+    age_s: f64,
 }
 
 /// What waits for a second point.
@@ -82,7 +85,7 @@ pub(in crate::track) fn initiate(
                 let grid = table.grid();
                 std::hint::black_box(batch.fold(0, |sum, p| sum ^ grid.touch(p.x, p.y, far, far)));
             }
-            if let Some(j) = second_point(context, used, first, dt_s) {
+            if let Some((j, dt_s)) = second_point(context, used, first, dt_s) {
                 used[j] = true;
                 begin(context, clutter, j, Some(first), prior, dt_s, out);
             }
@@ -95,6 +98,7 @@ pub(in crate::track) fn initiate(
                 position: d.position,
                 noise: table.noise(j as u32),
                 score: table.scores.of(j as u32),
+                age_s: seconds(context.age_ns(j as u32)),
             });
         }
     }
@@ -125,6 +129,7 @@ pub(in crate::track) fn from_initial_tracks(
             appearance: Appearance { size: initial.size_px, sum: 0.0, class: None },
             duplicate_since_ns: None,
             last_place: [k.mean[0], k.mean[2], spread],
+            last_age_ns: 0,
             reported: true,
             identified: true,
             log_score: None,
@@ -148,7 +153,13 @@ fn begin(
     let Context { scan, table, config, .. } = *context;
     let d = &scan.detections[detection];
     let noise = table.noise(detection as u32);
-    let Some((filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else { return };
+    let Some((mut filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else {
+        return;
+    };
+    let age_ns = context.age_ns(detection as u32);
+    if age_ns > 0 && filter.predict(seconds(age_ns)).is_err() {
+        return;
+    }
     let likelihood_ratio =
         likelihood_ratio * context.new_target_score_ratio(first.and_then(|f| f.score), detection as u32);
     let n_points = if first.is_some() { 2 } else { 1 };
@@ -160,6 +171,7 @@ fn begin(
         appearance: Appearance::of(d),
         duplicate_since_ns: None,
         last_place: place_of(d, &noise),
+        last_age_ns: age_ns,
         reported: false,
         identified: false,
         log_score: table.scores.log_score(detection as u32),
@@ -219,30 +231,35 @@ fn uniform_ratio(config: &TrackerConfig, dt_s: f64, clutter: f64) -> f64 {
     config.detection_probability / (area_px2 * clutter).max(1e-200)
 }
 
-/// The nearest unassociated detection that a target at `first` can have reached.
-fn second_point(context: &Context<'_>, used: &[bool], first: &Unassociated, dt_s: f64) -> Option<usize> {
+/// The nearest unassociated detection that a target at `first` can have reached, and the time between the two, s, where the scans lie `dt_s` apart.
+fn second_point(context: &Context<'_>, used: &[bool], first: &Unassociated, dt_s: f64) -> Option<(usize, f64)> {
     let config = context.config;
-    let far = config.max_speed_px_per_s * dt_s;
-    let mut best: Option<(f64, u32)> = None;
+    let longest = config.max_speed_px_per_s * (dt_s + first.age_s);
+    let mut best: Option<(f64, u32, f64)> = None;
     let mut looked_at = 0;
-    context.table.grid().near(first.position.x, first.position.y, far, far, |p| {
+    context.table.grid().near(first.position.x, first.position.y, longest, longest, |p| {
         looked_at += 1;
+        let between_s = dt_s + first.age_s - seconds(context.age_ns(p.index));
+        let far = config.max_speed_px_per_s * between_s;
         let (dx, dy) = (p.x - first.position.x, p.y - first.position.y);
         let distance2 = dx * dx + dy * dy;
-        let nearer = best.is_none_or(|(d, i)| distance2 < d || (distance2 == d && p.index < i));
+        let nearer = best.is_none_or(|(d, i, _)| distance2 < d || (distance2 == d && p.index < i));
         let possible = match &config.initiation {
-            InitiationConfig::VelocityBounds(b) => {
-                [dx, dy].iter().enumerate().all(|(a, d)| (b.min_px_per_s[a]..=b.max_px_per_s[a]).contains(&(d / dt_s)))
-            }
+            InitiationConfig::VelocityBounds(b) => [dx, dy]
+                .iter()
+                .enumerate()
+                .all(|(a, d)| (b.min_px_per_s[a]..=b.max_px_per_s[a]).contains(&(d / between_s))),
             _ => true,
         };
-        if distance2 <= far * far && nearer && possible && !used[p.index as usize] {
-            best = Some((distance2, p.index));
+        // What is seen twice in a moment, at the border of two turns, tells no velocity.
+        let apart = between_s >= 0.5 * dt_s;
+        if apart && distance2 <= far * far && nearer && possible && !used[p.index as usize] {
+            best = Some((distance2, p.index, between_s));
         }
         looked_at < MOST_LOOKED_AT
     });
-    debug_assert!(best.is_none_or(|(_, i)| (i as usize) < context.scan.detections.len()));
-    best.map(|(_, i)| i as usize)
+    debug_assert!(best.is_none_or(|(_, i, _)| (i as usize) < context.scan.detections.len()));
+    best.map(|(_, i, between_s)| (i as usize, between_s))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub(super) mod context;
 pub(super) mod delete;
 pub mod gate;
 pub(super) mod initiate;
+pub(super) mod plot_time;
 pub(super) mod predict;
 pub(super) mod report;
 mod stage;

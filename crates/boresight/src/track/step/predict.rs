@@ -27,7 +27,7 @@ pub(in crate::track) fn predict(
     for t in tracks {
         t.filter.predict(dt_s)?;
         config.confirmation.predict_existence(&mut t.history, survival);
-        predicted.push(predicted_of(&t.filter, t.history.last_seen_ns, t.last_place, now, config));
+        predicted.push(predicted_of(&t.filter, t.last_seen(), t.last_place, now, config));
     }
     Ok(())
 }
@@ -36,13 +36,13 @@ pub(in crate::track) fn predict(
 #[inline]
 pub(in crate::track) fn predicted_of(
     filter: &TrackedFilter,
-    last_seen_ns: i64,
+    last_seen: Timestamp,
     last_place: [f64; 3],
     now: Timestamp,
     config: &TrackerConfig,
 ) -> Predicted {
     let p = filter.predicted();
-    let elapsed_s = now.seconds_since(Timestamp::from_ns(last_seen_ns));
+    let elapsed_s = now.seconds_since(last_seen);
     // From where it was last seen the target came at most this far; the prediction may already lie off it.
     let [x, y, std] = last_place;
     let far = config.max_speed_px_per_s * elapsed_s + 3.0 * std;

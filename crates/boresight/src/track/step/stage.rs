@@ -6,8 +6,10 @@
 use super::super::clutter::Clutter;
 use super::super::scan_table::Predicted;
 use super::super::score_likelihood::ScanScores;
+use super::super::single_track::Track;
 use super::context::Context;
 use super::gate::gate_row;
+use super::plot_time::gate_row_by_time;
 use crate::Scan;
 use crate::associate::{Assignment, Associator, AssociatorConfig, Gates, Prior, Share};
 
@@ -69,27 +71,30 @@ impl Stage {
         self.cursor = 0;
     }
 
-    /// Adds a track with the detections that `free` lets pass.
+    /// Adds a track, `predicted` to the scan, with the detections that `free` lets pass.
     #[inline]
     pub fn add(
         &mut self,
         i: usize,
-        track: &Predicted,
-        existence: f64,
-        p_detection: f64,
+        track: &Track,
+        predicted: &Predicted,
         context: &Context<'_>,
         free: impl Fn(u32) -> bool,
-        extra_cost: impl Fn(u32) -> f64,
+        extra_cost: impl Fn(&Predicted, u32) -> f64,
     ) {
         let (config, gate) = (context.config, context.gate);
         self.rows.push(i as u32);
-        let max_gated = config.max_gated as usize;
-        gate_row(context.table, track, gate, max_gated, self.likelihood, free, extra_cost, &mut self.gates);
+        let (max_gated, likelihood) = (config.max_gated as usize, self.likelihood);
+        if context.table.is_timed() {
+            gate_row_by_time(context, track, predicted, likelihood, free, extra_cost, &mut self.gates);
+        } else {
+            gate_row(context.table, predicted, gate, max_gated, likelihood, free, extra_cost, &mut self.gates);
+        }
         self.gates.end_row(Prior {
-            p_detection,
+            p_detection: config.p_detection(track.history.misses),
             p_gate: config.gate_probability,
             // A hard choice is what the target would have chosen if it exists; whether it does is what its likelihood then tells.
-            existence: if self.soft { existence } else { 1.0 },
+            existence: if self.soft { config.confirmation.existence(&track.history) } else { 1.0 },
             miss_cost: gate + self.cost_budget,
         });
     }

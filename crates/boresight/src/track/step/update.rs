@@ -7,11 +7,12 @@
 
 use super::super::confirm::rule::ConfirmationConfig;
 use super::super::merged_measurements::Part;
-use super::super::scan_table::Predicted;
+use super::super::scan_table::{Cov2, Predicted};
 use super::super::single_track::{Outcome, Track};
 use super::associate::Association;
 use super::context::Context;
 use super::gate::{innovation_cov, normalised_square};
+use super::plot_time::{Carried, advance};
 use crate::associate::{Gates, Share};
 use crate::record::TrackInnovation;
 use boresight_filters::{Filter, Measurement, Weighted};
@@ -33,19 +34,50 @@ pub(in crate::track) fn update(
     if let Some(part) = part {
         outcome = merged(track, predicted, part);
     }
+    // With times of their own, the filter stands still where the scan before left it.
+    let mut is_at_scan = !context.table.is_timed();
     for stage in &mut association.stages {
         if let Some(row) = stage.next_row(i)
             && part.is_none()
         {
             let (gates, shares) = (&stage.gates, stage.answer.row(row));
-            outcome = if stage.soft {
-                soft(context, track, predicted, gates, row, shares, weighted)
+            if !is_at_scan && let Some(best) = best_share(shares) {
+                is_at_scan = true;
+                let carried = Carried::new(context, track, shares, best.detection);
+                let place = |j: u32| carried.place(context, j);
+                outcome =
+                    by_shares(context, track, &carried.predicted, gates, row, shares, stage.soft, place, weighted);
+                carried.to_scan(track);
             } else {
-                hard(context, track, predicted, gates, row, shares)
-            };
+                let place = |j: u32| (context.scan.detections[j as usize].position, context.table.noise(j));
+                outcome = by_shares(context, track, predicted, gates, row, shares, stage.soft, place, weighted);
+            }
         }
     }
+    if !is_at_scan {
+        advance(track, context.dt_s);
+    }
     outcome
+}
+
+/// Updates a track by what a stage gave it; `place` says where a detection counts, and with which noise.
+#[inline]
+fn by_shares(
+    context: &Context<'_>,
+    track: &mut Track,
+    predicted: &Predicted,
+    gates: &Gates,
+    row: usize,
+    shares: &[Share],
+    is_soft: bool,
+    place: impl Fn(u32) -> (Vector2<f64>, Cov2),
+    weighted: &mut Vec<Weighted>,
+) -> Outcome {
+    if is_soft {
+        soft(context, track, predicted, gates, row, shares, place, weighted)
+    } else {
+        hard(context, track, predicted, gates, row, shares)
+    }
 }
 
 /// Updates a track by at most one detection.
@@ -72,7 +104,7 @@ fn hard(
     let score = (-0.5 * context.score_cost(track, share.detection)).exp();
     let density = score * (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());
     let log_score = context.table.scores.log_score(share.detection);
-    track.follow(detection, &noise, log_score, context.config.appearance_gain);
+    track.follow(detection, context.age_ns(share.detection), &noise, log_score, context.config.appearance_gain);
     Outcome {
         hit: true,
         detection: Some(share.detection),
@@ -90,6 +122,7 @@ fn soft(
     gates: &Gates,
     row: usize,
     shares: &[Share],
+    place: impl Fn(u32) -> (Vector2<f64>, Cov2),
     weighted: &mut Vec<Weighted>,
 ) -> Outcome {
     let p = gates.prior(row);
@@ -111,8 +144,7 @@ fn soft(
     weighted.clear();
     let mut innovation = TrackInnovation { innovation: Vector2::zeros(), cov: Matrix2::zeros(), nis: 0.0 };
     for share in shares {
-        let noise = context.table.noise(share.detection);
-        let position = context.scan.detections[share.detection as usize].position;
+        let (position, noise) = place(share.detection);
         let weight = (share.weight / exists).min(1.0);
         weighted.push(Weighted { measurement: Measurement { position, cov: noise.matrix() }, weight });
         // Means over the detections, given that one of them is the target's: that of νᵀ S⁻¹ ν is χ² as of a sure one,
@@ -131,7 +163,7 @@ fn soft(
     if hit {
         let (d, noise) = (&context.scan.detections[best.detection as usize], context.table.noise(best.detection));
         let log_score = context.table.scores.log_score(best.detection);
-        track.follow(d, &noise, log_score, context.config.appearance_gain);
+        track.follow(d, context.age_ns(best.detection), &noise, log_score, context.config.appearance_gain);
     }
     Outcome {
         hit,
@@ -151,7 +183,7 @@ fn merged(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
         return Outcome { likelihood_ratio: 1.0, ..Outcome::default() };
     }
     let [x, y] = part.position;
-    track.last_place = [x, y, part.noise.xx.max(part.noise.yy).sqrt()];
+    (track.last_place, track.last_age_ns) = ([x, y, part.noise.xx.max(part.noise.yy).sqrt()], 0);
     Outcome {
         hit: true,
         merged: true,

@@ -267,6 +267,7 @@ impl CfarDetector {
             class: None,
             velocity: None,
             fit: None,
+            age_ns: 0,
         };
         self.found.push(Found { detection, cells: first..self.cells.len() });
     }

@@ -40,6 +40,7 @@ pub fn detection<T: Pixel>(
         class: None,
         velocity: None,
         fit: None,
+        age_ns: 0,
     })
 }
 

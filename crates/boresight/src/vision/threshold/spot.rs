@@ -308,6 +308,7 @@ impl SpotDetector {
             class: None,
             velocity: None,
             fit: None,
+            age_ns: 0,
         }
     }
 }

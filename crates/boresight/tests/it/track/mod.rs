@@ -4,6 +4,7 @@ mod associators;
 mod blind;
 mod extremes;
 mod merged;
+mod plot_times;
 mod random_scans;
 mod units;
 

@@ -29,7 +29,7 @@ pub(crate) struct Turns {
     pub turn_of: Vec<u64>,
     /// Time of a turn, s.
     pub turn_s: f64,
-    /// Middle of each turn, s; as many as there are turns.
+    /// End of each turn, s, no plot of it is later; as many as there are turns.
     pub times_s: Vec<f64>,
 }
 
@@ -112,19 +112,21 @@ pub(crate) fn turns(plots: &[(f64, f64)], given_s: Option<f64>) -> Result<Turns>
         )
         .hint("are the times really seconds?"));
     }
-    // The middle of a turn by its own plots; of one without plots between its neighbours.
-    let mut sums = vec![(0.0, 0usize); n];
+    // The end of a turn by its own plots, as they would place it; of one without plots a turn after the one before.
+    let mut sums = vec![(0.0, 0usize, f64::NEG_INFINITY); n];
     for (((t, _), u), k) in plots.iter().zip(&phases).zip(&numbers) {
         let of = &mut sums[(k - first) as usize];
-        of.0 += t + (*k as f64 + border + 0.5 - u) / rate;
+        of.0 += t + (*k as f64 + border + 1.0 - u) / rate;
         of.1 += 1;
+        of.2 = of.2.max(*t);
     }
     let mut times_s: Vec<f64> = Vec::with_capacity(n);
     let begun = plots.first().map_or(0.0, |p| p.0);
     for k in 0..n {
         let seen = sums[k].1 > 0;
         let before = times_s.last().copied();
-        let time = if seen { sums[k].0 / sums[k].1 as f64 } else { before.unwrap_or(begun) + 1.0 / rate };
+        let time =
+            if seen { (sums[k].0 / sums[k].1 as f64).max(sums[k].2) } else { before.unwrap_or(begun) + 1.0 / rate };
         // A turn is never shorter than a tenth of itself.
         times_s.push(before.map_or(time, |b| time.max(b + 0.1 / rate)));
     }

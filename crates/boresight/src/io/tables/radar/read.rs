@@ -2,8 +2,8 @@
 //!
 //! Source: positions by the unbiased conversion of [`boresight_filters::converted`] (Longbin, Xiaoquan, Yiyu, Kang, Bar-Shalom 1998), from where own ship is at the plot's own time.
 //! x is east, y is north (m). Scans: by the table's own number of the turn, else plots of one time, else by turns of the antenna ([`super::antenna`]); turns without a plot are
-//! empty scans. A scan's time is the middle of its turn.
-//! A plot has no size: its box is empty. Limits: within a turn a target keeps the lag between its plot and the middle of the turn, at most half a turn of its way.
+//! empty scans. A scan's time is the end of its turn, or its last plot where turns are numbered; each detection keeps how long before that it was seen.
+//! A plot has no size: its box is empty.
 
 use super::columns::{RadarColumns, Scaled, Spread};
 use super::options::{AzimuthFrom, RadarOptions};
@@ -238,8 +238,11 @@ fn scans(plots: &[Plot], detections: Vec<Detection>, options: &TableOptions) -> 
         }
         scans.push(Scan::at(FrameIndex(of.first + k as u64), time));
     }
-    for (k, d) in of.turn_of.iter().zip(detections) {
-        scans[*k as usize].detections.push(d);
+    for ((k, d), plot) in of.turn_of.iter().zip(detections).zip(plots) {
+        let scan = &mut scans[*k as usize];
+        let seen = timestamp_of_seconds(plot.time_s).unwrap_or(scan.time);
+        let age_ns = scan.time.ns.saturating_sub(seen.ns).max(0).unsigned_abs();
+        scan.detections.push(d.with_age_ns(age_ns));
     }
     Ok((scans, of.turn_s))
 }
@@ -308,6 +311,29 @@ mod tests {
         assert!((bow.scans[0].detections[0].position - Vector2::new(100.0, 0.0)).norm() < 0.1);
         assert!((bow.scans[1].detections[0].position - Vector2::new(50.0, -100.0)).norm() < 0.1);
         assert_eq!(bow.radar.unwrap().own_at(5.0), [25.0, 0.0]);
+    }
+
+    #[test]
+    fn a_scan_ends_with_its_last_plot_and_each_plot_keeps_how_long_before_it_was_seen() {
+        let t = plain("scan,t,range_m,az_deg\n3,10.5,100,10\n3,11.25,200,120\n4,12.75,100,20\n6,18,100,30\n");
+        let of = |s: &Scan| (s.time.ns, s.detections.iter().map(|d| d.age_ns).collect::<Vec<_>>());
+        let want = [(11_250_000_000, vec![750_000_000, 0]), (12_750_000_000, vec![0]), (15_375_000_000, vec![])];
+        assert_eq!(t.scans[..3].iter().map(of).collect::<Vec<_>>(), want);
+        // An antenna of 2.5 s that begins its turns at 0 s: turns end at whole multiples, plots are an azimuth's part of a turn before that.
+        let rows = (0..400u32).map(|k| (0.31 * f64::from(k), 100.0 + f64::from(k % 7)));
+        let rows = rows.filter(|(t, _)| (0.1..2.4).contains(&t.rem_euclid(2.5)));
+        let text: String = rows.map(|(t, r)| format!("{t},{r},{}\n", 360.0 * t.rem_euclid(2.5) / 2.5)).collect();
+        let t = plain(&format!("time_s,range_m,azimuth_deg\n{text}"));
+        assert!(t.scans.len() == 50, "{}", t.scans.len());
+        for s in &t.scans {
+            for d in &s.detections {
+                let azimuth =
+                    d.position.x.atan2(d.position.y).rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
+                let seen_s = s.time.as_secs_f64() - d.age_ns as f64 * 1e-9;
+                assert!((seen_s.rem_euclid(2.5) / 2.5 - azimuth).abs() < 1e-6, "{seen_s} s at {azimuth}");
+                assert!(d.age_ns < 2_600_000_000);
+            }
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub(super) struct Plot {
     pub std: [f64; 2],
 }
 
-/// The scans of plots: their times, which plot is in which, the number of the first.
+/// The scans of plots: their times, no earlier than any of their plots; which plot is in which, the number of the first.
 pub(super) struct Numbered {
     pub first: u64,
     pub turn_of: Vec<u64>,
@@ -59,7 +59,7 @@ fn median_step(times: &[f64]) -> f64 {
     steps.get(steps.len().saturating_sub(1) / 2).copied().unwrap_or(1.0)
 }
 
-/// Scans by their numbers; the time of one is the middle of its plots', of one without plots evenly between its neighbours'.
+/// Scans by their numbers; the time of one is that of its last plot, of one without plots evenly between its neighbours'.
 fn by_number(plots: &[Plot], numbers: &[u64], turn_s: Option<f64>) -> Result<Numbered> {
     let (first, last) = (numbers.iter().copied().min().unwrap_or(0), numbers.iter().copied().max().unwrap_or(0));
     if last - first >= MOST_SCANS || last - first > 1_000_000 + 100 * plots.len() as u64 {
@@ -70,13 +70,12 @@ fn by_number(plots: &[Plot], numbers: &[u64], turn_s: Option<f64>) -> Result<Num
         .hint("is it really the number of the scan, are the times really seconds?"));
     }
     let n = (last - first + 1) as usize;
-    let mut span = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
+    let mut latest = vec![f64::NEG_INFINITY; n];
     for (p, k) in plots.iter().zip(numbers) {
-        let s = &mut span[(k - first) as usize];
-        *s = [s[0].min(p.time_s), s[1].max(p.time_s)];
+        let of = &mut latest[(k - first) as usize];
+        *of = of.max(p.time_s);
     }
-    let seen: Vec<(usize, f64)> =
-        span.iter().enumerate().filter(|(_, s)| s[0] <= s[1]).map(|(k, s)| (k, (s[0] + s[1]) / 2.0)).collect();
+    let seen: Vec<(usize, f64)> = latest.iter().copied().enumerate().filter(|(_, t)| t.is_finite()).collect();
     let mut times_s = vec![0.0; n];
     if let [(k, t)] = seen[..] {
         times_s[k] = t;
