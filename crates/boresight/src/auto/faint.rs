@@ -79,7 +79,7 @@ pub fn better([bright, dark]: [Faint; 2]) -> Faint {
     Faint { polarity, ..most }
 }
 
-/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if nothing moves and there are more detections than false alarms.
+/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if there are more detections than false alarms and nothing moves surely.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(
@@ -94,7 +94,13 @@ pub fn look(
     let (polarity, chains) = isolated.most();
     if !seen.chains.is_sure() && !chains.is_sure() {
         let expected: f64 = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * looks;
-        return Ok((seen.per_frame * looks > expected + SURE_STDS * expected.sqrt()).then_some(seen));
+        if seen.per_frame * looks > expected + SURE_STDS * expected.sqrt() {
+            return Ok(Some(seen));
+        }
+        // One or two that move among as many false alarms show in their chains alone, and these need all frames.
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let longer = look_at(frames, &all, ground, seen.polarity, info, n_threads)?;
+        return Ok(longer.chains.is_sure().then_some(longer));
     }
     let mut more = seen.chains.is_surely_more_than(chains);
     if !more && !chains.is_surely_more_than(&seen.chains) {
