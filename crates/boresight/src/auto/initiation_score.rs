@@ -59,7 +59,6 @@ fn faintest(chain: &Chain) -> f64 {
 mod tests {
     use super::*;
     use crate::{Detection, FrameIndex, Scan, Timestamp};
-    use nalgebra::Vector2;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
