@@ -2,9 +2,8 @@
 //!
 //! Source: our own. Of a scene that nobody knows a target is assumed to stand out clearly; what moves and does not would never start a track. Whether it moves is told by the
 //! chains of the first pass ([`super::evidence`]), which know of no such score: those count of which each gains surely more than any in another order of the scans.
-//! How: the score is lowered to what three of four detections of every such chain reach. Where the surest of them is clear, another one counts only if in most of its
-//! time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target. Of several those count that gain a tenth
-//! of what the surest gains.
+//! How: the score is lowered to what three of four detections of every such chain reach, of those that gain a tenth of what the surest gains. Where one of them is clear, a
+//! faint one counts only if in most of its time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target.
 //! Limits: lowers the score only; a faint target beside a clear one is not looked for.
 
 use super::chains::Chain;
@@ -25,11 +24,10 @@ pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, rea
         let beside = |t: f64| clear_s.iter().any(|s| (s[0]..=s[1]).contains(&t));
         2 * c.hits.iter().filter(|h| beside(time(h))).count() < c.hits.len()
     };
-    let surest = evidence.sure().max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let all_faint = surest.is_some_and(|c| faintest(c) < assumed);
-    let sure = || evidence.sure().filter(|c| all_faint || alone(c));
-    let most = sure().map(|c| c.gain).fold(0.0, f64::max);
-    let counting = || sure().filter(|c| c.gain >= GAIN_SHARE * most);
+    let most = evidence.sure().map(|c| c.gain).fold(0.0, f64::max);
+    let sure = || evidence.sure().filter(|c| c.gain >= GAIN_SHARE * most);
+    let none_clear = sure().all(|c| faintest(c) < assumed);
+    let counting = || sure().filter(|c| none_clear || alone(c));
     let score = round(counting().map(faintest).fold(f64::INFINITY, f64::min));
     // A detector without scores says nothing.
     if !(score > 0.0 && score < assumed) {

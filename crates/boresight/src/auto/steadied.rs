@@ -1,4 +1,4 @@
-//! Things that move before a moving camera: a candidate where isolated targets leave most of what stands clear unexplained, weighed by the evidence of its chains.
+//! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate where isolated targets leave most of what stands clear unexplained, weighed by the evidence of its chains.
 //!
 //! Source: our own. It costs more than a look at isolated targets, so it is tried only where these do not explain the frames, with one lag, and on every second frame or so.
 //! Limits: a camera whose motion is not seen has no such candidate; what moves by less than a third of its size in the lag is not seen.
@@ -36,6 +36,8 @@ const TOLD: f64 = 0.5;
 /// What was seen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
+    /// Whether the camera moves.
+    pub camera: Camera,
     /// Time to the first of the frames compared with, s.
     pub lag_s: f64,
     /// Regions a frame.
@@ -74,7 +76,7 @@ fn tells(isolated: &spots::Seen, n_looks: usize) -> bool {
     chains.is_sure() && hits(chains) as f64 >= TOLD * clear.per_frame * n_looks as f64
 }
 
-/// What moves by itself where the camera moves and the chains of isolated targets tell little, if its own surely gain more than these and, where nothing stands
+/// What moves by itself where the camera moves and the chains of isolated targets tell little, or where it stands and nothing stands clear, if its own surely gain more than these and, where nothing stands
 /// clear, than those of faint ones.
 /// # Errors
 /// Frames of more than one size or pixel type.
@@ -86,7 +88,13 @@ pub fn look_beside(
     n_threads: usize,
 ) -> Result<Option<Seen>> {
     let places = growing(frames.len());
-    if scene.camera != Camera::Moving || frames.len() < LEAST_FRAMES || tells(isolated, places.len()) {
+    // Before a fixed camera what moves is mostly found otherwise: where something stands clear, that is taken.
+    let asked = match scene.camera {
+        Camera::Moving => true,
+        Camera::Fixed => isolated.is_poor(),
+        Camera::Unknown => false,
+    };
+    if !asked || frames.len() < LEAST_FRAMES || tells(isolated, places.len()) {
         return Ok(None);
     }
     let seen = look(frames, &scene.ground, info)?;
@@ -106,7 +114,7 @@ pub fn look_beside(
             return Ok(None);
         }
     }
-    Ok(Some(seen))
+    Ok(Some(Seen { camera: scene.camera, ..seen }))
 }
 
 /// Gain of the chains that go with none of the others, nats, beyond that of the surrogates; the others were looked for in the frames at `places`.
@@ -148,6 +156,7 @@ fn look(frames: &[Frame], ground: &[Ground], info: &SourceInfo) -> Result<Seen> 
     sides.sort_by(f64::total_cmp);
     let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
     Ok(Seen {
+        camera: Camera::Unknown,
         lag_s,
         per_frame: n as f64 / looked.len().max(1) as f64,
         side_px: sides.get(sides.len() / 2).copied().unwrap_or(0.0),
@@ -169,8 +178,9 @@ pub fn configure(seen: &Seen, info: &SourceInfo, config: &mut Config, reasons: &
     tracker.initiation = InitiationConfig::TwoPoint(TwoPointConfig::default());
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
     reasons.push(format!(
-        "The camera moves, and against frames {} s and {} s ago, steadied, {:.1} regions a frame move by themselves, median side {:.0} px, {}: so those are \
+        "{} frames {} s and {} s ago, steadied, {:.1} regions a frame move by themselves, median side {:.0} px, {}: so those are \
          detected (detector.threshold.steadied). What stands on the ground is not.",
+        if seen.camera == Camera::Moving { "The camera moves, and against" } else { "Against" },
         seen.lag_s,
         round(3.0 * seen.lag_s),
         seen.per_frame,
@@ -190,6 +200,6 @@ pub fn configure_asked(
     reasons: &mut Vec<String>,
 ) -> Result<()> {
     let seen = if frames.is_empty() { Seen::default() } else { look(frames, &scene.ground, info)? };
-    configure(&Seen { lag_s: SteadiedConfig::default().lag_s, ..seen }, info, config, reasons);
+    configure(&Seen { camera: scene.camera, lag_s: SteadiedConfig::default().lag_s, ..seen }, info, config, reasons);
     Ok(())
 }
