@@ -37,6 +37,12 @@ impl Homography {
         Self(Matrix3::new(a[(0, 0)], a[(0, 1)], t.x, a[(1, 0)], a[(1, 1)], t.y, 0.0, 0.0, 1.0))
     }
 
+    /// From the pixels of an image of means over blocks of that side to those of the image itself: the middle of one is that of its block.
+    pub fn of_blocks(side: usize) -> Self {
+        let (side, first) = (side as f64, 0.5 * (side as f64 - 1.0));
+        Self(Matrix3::new(side, 0.0, first, 0.0, side, first, 0.0, 0.0, 1.0))
+    }
+
     /// Where a point comes to lie.
     #[inline]
     pub fn apply(&self, p: Vector2<f64>) -> Vector2<f64> {
@@ -90,6 +96,13 @@ mod tests {
             let quotient = (a.apply(p + Vector2::new(d, 0.0)) - a.apply(p - Vector2::new(d, 0.0))) / (2.0 * d);
             prop_assert!((a.linear_at(p) * Vector2::new(1.0, 0.0) - quotient).norm() < 1e-6);
         }
+    }
+
+    #[test]
+    fn the_middle_of_a_mean_is_that_of_its_block() {
+        let p = Homography::of_blocks(4).apply(Vector2::new(2.0, 0.0));
+        // Columns 8 to 11 and rows 0 to 3.
+        assert_eq!(p, Vector2::new(9.5, 1.5));
     }
 
     #[test]

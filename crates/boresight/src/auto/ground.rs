@@ -10,7 +10,7 @@
 use crate::camera::{PlaneFollower, PlanePatches};
 use crate::vision::steadied::plane_image;
 use crate::{Frame, Homography, Image, Similarity};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
 /// Where the first frame's ground lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,10 +91,8 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
     let (mut image_from_first, mut spread) = (Homography::identity(), Vec::new());
     let (mut residuals, mut solid) = (Vec::new(), Vec::new());
     for (k, (frame, similar)) in frames.iter().zip(similar).enumerate() {
-        let factor = plane_image(&frame.pixels, &mut line, &mut now) as f64;
-        let corner = 0.5 * (factor - 1.0);
-        let grow = Homography::of_matrix(Matrix3::new(factor, 0.0, corner, 0.0, factor, corner, 0.0, 0.0, 1.0))
-            .unwrap_or_default();
+        let factor = plane_image(&frame.pixels, &mut line, &mut now);
+        let grow = Homography::of_blocks(factor);
         let shrink = grow.inverse();
         match plane.step(&now).filter(|step| step.is_clear()) {
             Some(step) => {
@@ -126,7 +124,7 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
         let (w, h) = (frame.pixels.width() as f64, frame.pixels.height() as f64);
         out.push(Ground {
             first_from_image: in_px.inverse(),
-            spread_px: spread.iter().map(|s| factor * s).collect(),
+            spread_px: spread.iter().map(|s| factor as f64 * s).collect(),
             cell_px: Vector2::new(w / CELLS.0 as f64, h / CELLS.1 as f64),
         });
     }

@@ -153,8 +153,8 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
 
 /// Score from which a target starts a track where few are expected, and where there are many, unless what moves is fainter ([`super::initiation_score`]). Chosen: with 6, 4, 2.5 for all infrared clips of
 /// the exam 1.1, 4.7, 8.3 false tracks a minute come in half A and 0.4, 1.2, 2.7 in half B, for 95.0, 95.1, 96.7 and 88.6, 89.9, 92.4 % held.
-pub const INITIATION_SCORE: f64 = 6.0;
-pub const WEAK_INITIATION_SCORE: f64 = 4.0;
+const INITIATION_SCORE: f64 = 6.0;
+const WEAK_INITIATION_SCORE: f64 = 4.0;
 
 /// Writes detector and tracker for isolated targets.
 pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {

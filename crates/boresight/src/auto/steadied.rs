@@ -1,4 +1,5 @@
-//! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate where isolated targets leave most of what stands clear unexplained, weighed by the evidence of its chains.
+//! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate where isolated targets leave most of what stands clear
+//! unexplained, weighed by the evidence of its chains.
 //!
 //! Source: our own. It costs more than a look at isolated targets, so it is tried only where these do not explain the frames, with one lag, and on every second frame or so.
 //! Limits: a camera whose motion is not seen has no such candidate; what moves by less than a third of its size in the lag is not seen.
@@ -6,7 +7,6 @@
 use super::chains::Chain;
 use super::digits::round;
 use super::evidence::{Evidence, SURE_GAIN};
-use super::ground::Ground;
 use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
 use super::spread::growing;
@@ -76,8 +76,8 @@ fn tells(isolated: &spots::Seen, n_looks: usize) -> bool {
     chains.is_sure() && hits(chains) as f64 >= TOLD * clear.per_frame * n_looks as f64
 }
 
-/// What moves by itself where the camera moves and the chains of isolated targets tell little, or where it stands and nothing stands clear, if its own surely gain more than these and, where nothing stands
-/// clear, than those of faint ones.
+/// What moves by itself where the camera moves and the chains of isolated targets tell little, or where it stands and nothing stands clear, if its own surely
+/// gain more than these and, where nothing stands clear, than those of faint ones.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look_beside(
@@ -97,7 +97,7 @@ pub fn look_beside(
     if !asked || frames.len() < LEAST_FRAMES || tells(isolated, places.len()) {
         return Ok(None);
     }
-    let seen = look(frames, &scene.ground, info)?;
+    let seen = look(frames, scene, info)?;
     if !seen.chains.is_sure() || seen.explained < LEAST_EXPLAINED {
         return Ok(None);
     }
@@ -114,7 +114,7 @@ pub fn look_beside(
             return Ok(None);
         }
     }
-    Ok(Some(Seen { camera: scene.camera, ..seen }))
+    Ok(Some(seen))
 }
 
 /// Gain of the chains that go with none of the others, nats, beyond that of the surrogates; the others were looked for in the frames at `places`.
@@ -136,7 +136,7 @@ fn gain_beside(seen: &Seen, others: &Evidence, places: &[usize]) -> f64 {
 }
 
 /// What is seen with the usual lag.
-fn look(frames: &[Frame], ground: &[Ground], info: &SourceInfo) -> Result<Seen> {
+fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Seen> {
     let lag_s = SteadiedConfig::default().lag_s;
     let span_s = frames.last().map_or(0.0, |f| f.time.seconds_since(frames[0].time));
     let apart_s = span_s / frames.len().saturating_sub(1).max(1) as f64;
@@ -151,12 +151,12 @@ fn look(frames: &[Frame], ground: &[Ground], info: &SourceInfo) -> Result<Seen> 
         detector.detect(frame, &mut scan)?;
         n += scan.detections.len();
         sides.extend(scan.detections.iter().map(|d| d.extent.width_px.max(d.extent.height_px)));
-        sightings.push(Sightings::of(&scan, ground.get(k * step)));
+        sightings.push(Sightings::of(&scan, scene.ground.get(k * step)));
     }
     sides.sort_by(f64::total_cmp);
     let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
     Ok(Seen {
-        camera: Camera::Unknown,
+        camera: scene.camera,
         lag_s,
         per_frame: n as f64 / looked.len().max(1) as f64,
         side_px: sides.get(sides.len() / 2).copied().unwrap_or(0.0),
@@ -199,7 +199,7 @@ pub fn configure_asked(
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) -> Result<()> {
-    let seen = if frames.is_empty() { Seen::default() } else { look(frames, &scene.ground, info)? };
+    let seen = if frames.is_empty() { Seen::default() } else { look(frames, scene, info)? };
     configure(&Seen { camera: scene.camera, lag_s: SteadiedConfig::default().lag_s, ..seen }, info, config, reasons);
     Ok(())
 }

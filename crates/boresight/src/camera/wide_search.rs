@@ -10,7 +10,7 @@ use super::plane;
 use super::reduce::blocks;
 use super::register::{NONE, PlanePatches};
 use crate::{Homography, Image, Similarity};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 
 /// Width of the small images, px.
 const SMALL_PX: usize = 240;
@@ -53,10 +53,7 @@ impl WideSearch {
         let start = Homography::of_similarity(&Similarity::shift(Vector2::from(shift)));
         let middle = 0.5 * Vector2::new(self.own.width() as f64 - 1.0, self.own.height() as f64 - 1.0);
         let small = plane::fit(matches, &start, middle)?.to_from;
-        // A small pixel's middle is that of its block.
-        let f = factor as f64;
-        let first = 0.5 * (f - 1.0);
-        let grow = Homography::of_matrix(Matrix3::new(f, 0.0, first, 0.0, f, first, 0.0, 0.0, 1.0))?;
+        let grow = Homography::of_blocks(factor);
         Some(grow.inverse().then(&small).then(&grow))
     }
 }

@@ -112,9 +112,9 @@ impl<T: Pixel> Typed<T> {
         Ok(Self { filter, finder: finder(config)?, fitter })
     }
 
-    /// Learns from frames, after the filter.
-    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
-        let Some((filter, filtered)) = &mut self.filter else { return self.finder.prime(frames) };
+    /// Learns from frames, after the filter; `times_s` are theirs since the first of them.
+    fn prime(&mut self, times_s: &[f64], frames: &[&Image<T>]) -> Result<()> {
+        let Some((filter, filtered)) = &mut self.filter else { return self.finder.prime(times_s, frames) };
         let filtered: Vec<Image<T>> = frames
             .iter()
             .map(|frame| {
@@ -122,7 +122,7 @@ impl<T: Pixel> Typed<T> {
                 filtered.clone()
             })
             .collect();
-        self.finder.prime(&filtered.iter().collect::<Vec<_>>())
+        self.finder.prime(times_s, &filtered.iter().collect::<Vec<_>>())
     }
 
     /// Appends what is found; whether the frame was one in which nothing could be.
@@ -255,20 +255,20 @@ impl Detector for FrameDetector {
         if let Some(wrong) = frames.iter().find(|f| !self.fits(f)) {
             return Err(self.refused(wrong));
         }
-        let some: Vec<&Pixels> = (0..PRIME_FRAMES.min(frames.len()))
-            .map(|i| &frames[i * (frames.len() - 1) / (PRIME_FRAMES.min(frames.len()) - 1).max(1)].pixels)
-            .collect();
+        let n = PRIME_FRAMES.min(frames.len());
+        let some: Vec<&Frame> = (0..n).map(|i| &frames[i * (frames.len() - 1) / (n - 1).max(1)]).collect();
+        let times_s: Vec<f64> = some.iter().map(|f| f.time.seconds_since(frames[0].time)).collect();
         macro_rules! of_kind {
             ($kind:ident) => {
                 some.iter()
-                    .filter_map(|p| if let Pixels::$kind(image) = p { Some(image) } else { None })
+                    .filter_map(|f| if let Pixels::$kind(image) = &f.pixels { Some(image) } else { None })
                     .collect::<Vec<_>>()
             };
         }
         match &mut self.by_pixel {
-            ByPixel::Gray8(d) => d.prime(&of_kind!(Gray8)),
-            ByPixel::Gray16(d) => d.prime(&of_kind!(Gray16)),
-            ByPixel::GrayF32(d) => d.prime(&of_kind!(GrayF32)),
+            ByPixel::Gray8(d) => d.prime(&times_s, &of_kind!(Gray8)),
+            ByPixel::Gray16(d) => d.prime(&times_s, &of_kind!(Gray16)),
+            ByPixel::GrayF32(d) => d.prime(&times_s, &of_kind!(GrayF32)),
             ByPixel::Rgb8(d, _) => {
                 let grey = |image: &&Image<[u8; 3]>| {
                     let mut grey = Image::default();
@@ -276,7 +276,7 @@ impl Detector for FrameDetector {
                     grey
                 };
                 let grey: Vec<Image<u8>> = of_kind!(Rgb8).iter().map(grey).collect();
-                d.prime(&grey.iter().collect::<Vec<_>>())
+                d.prime(&times_s, &grey.iter().collect::<Vec<_>>())
             }
         }
     }

@@ -45,8 +45,8 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
         self.segmenter.prime_s()
     }
 
-    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
-        self.segmenter.prime(frames)
+    fn prime(&mut self, times_s: &[f64], frames: &[&Image<T>]) -> Result<()> {
+        self.segmenter.prime(times_s, frames)
     }
 
     fn find(&mut self, frame: &TypedFrame<T>, config: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {

@@ -65,7 +65,7 @@ pub(super) trait Segmenter<T: Pixel>: Send {
     /// As [`super::target_finder::TargetFinder::prime`].
     /// # Errors
     /// Frames of different sizes.
-    fn prime(&mut self, _frames: &[&Image<T>]) -> Result<()> {
+    fn prime(&mut self, _times_s: &[f64], _frames: &[&Image<T>]) -> Result<()> {
         Ok(())
     }
 

@@ -35,10 +35,10 @@ pub(super) trait TargetFinder<T: Pixel>: Send {
         0.0
     }
 
-    /// Learns from some of the first frames, evenly spread.
+    /// Learns from some of the first frames, evenly spread; `times_s` are theirs since the first of them.
     /// # Errors
     /// Frames of different sizes.
-    fn prime(&mut self, _frames: &[&Image<T>]) -> Result<()> {
+    fn prime(&mut self, _times_s: &[f64], _frames: &[&Image<T>]) -> Result<()> {
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 mod background;
 mod citations;
+mod faint_movers;
 mod fuse;
 mod golden;
 #[cfg(all(feature = "images", feature = "video"))]

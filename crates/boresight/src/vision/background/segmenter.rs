@@ -24,7 +24,7 @@ impl<T: Pixel> Segmenter<T> for Background<T> {
         self.start_s()
     }
 
-    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+    fn prime(&mut self, _: &[f64], frames: &[&Image<T>]) -> Result<()> {
         self.start_from(frames)
     }
 

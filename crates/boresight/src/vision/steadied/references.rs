@@ -53,12 +53,11 @@ impl References {
         if self.has_started() || !self.kept.is_empty() { 0.0 } else { SHOWN * self.lag_s }
     }
 
-    /// Keeps frames of the first [`Self::prime_s`] seconds, evenly spread, the first among them.
-    pub fn prime(&mut self, frames: Vec<Image<f32>>) {
-        let step_s = self.prime_s() / frames.len().saturating_sub(1).max(1) as f64;
+    /// Keeps frames of the first [`Self::prime_s`] seconds, each with its time since the first, which is among them.
+    pub fn prime(&mut self, frames: Vec<(f64, Image<f32>)>) {
         let (mut plane, mut from_first) = (PlaneFollower::default(), Homography::identity());
         let mut kept: Vec<Reference> = Vec::new();
-        for (i, image) in frames.into_iter().enumerate() {
+        for (i, (time_s, image)) in frames.into_iter().enumerate() {
             match plane.step(&image) {
                 Some(step) => from_first = from_first.then(&step.to_from),
                 // Whatever cannot be followed is of no use, nor what comes after it.
@@ -66,7 +65,7 @@ impl References {
                 None => {}
             }
             plane.keep(&mut image.clone());
-            kept.push(Reference { time_s: i as f64 * step_s, image, other_from_own: from_first });
+            kept.push(Reference { time_s, image, other_from_own: from_first });
         }
         self.kept = kept;
     }

@@ -160,12 +160,12 @@ impl<T: Pixel> Segmenter<T> for Steadied<T> {
         self.references.prime_s()
     }
 
-    fn prime(&mut self, frames: &[&Image<T>]) -> Result<()> {
+    fn prime(&mut self, times_s: &[f64], frames: &[&Image<T>]) -> Result<()> {
         let mut working_frames = Vec::with_capacity(frames.len());
-        for frame in frames {
+        for (time_s, frame) in times_s.iter().zip(frames) {
             let mut image = Image::default();
             working(frame, factor(frame.width(), frame.height()), &mut self.line, &mut image);
-            working_frames.push(image);
+            working_frames.push((*time_s, image));
         }
         self.references.prime(working_frames);
         Ok(())
