@@ -60,7 +60,7 @@ pub struct Scene {
     pub n_moving: usize,
     /// Mean number of moving regions in those.
     pub regions: f64,
-    /// Median width and height of the regions, px of the frame.
+    /// Width and height, px of the frame: half of what moves is in regions at least as wide and as high. Many small pieces and flickers hide no size so.
     pub size_px: [f64; 2],
     /// Median area of the regions, px of the frame.
     pub area_px: f64,
@@ -214,14 +214,22 @@ fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// The value that half of the weight, the second of each pair, lies at or above.
+fn weighted_median(values: &mut [(f64, f64)]) -> f64 {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * values.iter().map(|v| v.1).sum::<f64>();
+    let mut sum = 0.0;
+    values.iter().find(|v| (sum += v.1, sum >= half).1).map_or(0.0, |v| v.0)
+}
+
 fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
     let all = || moved.iter().flatten();
     scene.n_moving = moved.iter().filter(|m| !m.is_empty()).count();
     let n = scene.n_moving.max(1) as f64;
     scene.regions = all().count() as f64 / n;
     scene.size_px = [
-        median(&mut all().map(|m| m.right - m.left).collect::<Vec<_>>()),
-        median(&mut all().map(|m| m.bottom - m.top).collect::<Vec<_>>()),
+        weighted_median(&mut all().map(|m| (m.right - m.left, m.area)).collect::<Vec<_>>()),
+        weighted_median(&mut all().map(|m| (m.bottom - m.top, m.area)).collect::<Vec<_>>()),
     ];
     scene.area_px = median(&mut all().map(|m| m.area).collect::<Vec<_>>());
     scene.share = all().map(|m| m.area).sum::<f64>() / (n * (info.width * info.height).max(1) as f64);

@@ -10,6 +10,7 @@ pub mod cfar;
 pub(crate) mod cluster;
 pub mod colour;
 pub(crate) mod config;
+mod cut_off;
 pub(crate) mod detector;
 pub mod fit;
 pub mod integrate;

@@ -3,6 +3,7 @@
 
 use super::centroid::{Surroundings, centroid};
 use super::config::{CentroidMethod, DetectorConfig, Weight};
+use super::cut_off;
 use super::pixel::Pixel;
 use super::region::Region;
 use super::segmenter::{PixelWeight, Regions, Segmenter};
@@ -68,6 +69,7 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
         }
         self.regions.begin(image.width());
         let level = self.segmenter.segment(frame, &self.ground, &mut self.regions)?;
+        let first = out.len();
         let (min, max) = config.cluster.area_limits();
         for (clusters, dark) in [(&self.regions.bright, false), (&self.regions.dark, true)] {
             for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
@@ -88,6 +90,7 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
                 out.push(detection(region, image, method, &around, dark));
             }
         }
+        cut_off::add(&mut out[first..], (image.width(), image.height()));
         Ok(())
     }
 }
