@@ -5,7 +5,10 @@
 //! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
 
 use super::digits::round;
+use super::evidence::Evidence;
+use super::ground::Ground;
 use super::looks;
+use super::sightings::Sightings;
 use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
@@ -99,10 +102,31 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(C
     Ok((Cells { per_frame, area_px }, fits))
 }
 
+/// The chains of the pieces that would be detected, in the frames at these places; `ground` is the first one's in each.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn chains(
+    cells: &Cells,
+    frames: &[Frame],
+    places: &[usize],
+    ground: &[Ground],
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Evidence> {
+    let scans = looks::scans(&detector(info, least_area(cells)), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+    let sightings: Vec<Sightings> = scans.iter().zip(places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
+    Ok(Evidence::of(&sightings, (info.width * info.height) as f64))
+}
+
+/// Least area of a cell among such, px.
+fn least_area(cells: &Cells) -> u32 {
+    round((0.1 * cells.area_px).max(60.0)) as u32
+}
+
 /// Writes detector and tracker.
 pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
     let side = cells.area_px.sqrt();
-    let least = round((0.1 * cells.area_px).max(60.0)) as u32;
+    let least = least_area(cells);
     reasons.push(format!(
         "Some {:.0} bright compact pieces a frame on an even dark ground, about {side:.0} px across: cells. So what lies 5 robust deviations above the \
          smoothed frame's median is detected, in pieces of {least} px or more.",

@@ -7,7 +7,7 @@ use super::asked;
 use super::interval::interval_s;
 use super::request::Request;
 use super::scene::{self, Scene};
-use super::spots::Seen;
+use super::spread::growing;
 use super::{cells, colour, faint, moving, particles, spots, steadied};
 use crate::io::Colour;
 use crate::vision::threshold::Polarity;
@@ -95,11 +95,17 @@ pub(super) fn choose_looked(
         let cells = cells::look(frames, info, n_threads)?;
         // Cells are bright: where dark ones move beside them, both are looked for.
         let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info, n_threads)?;
-        let evidence = match cells.is_some() && !dark.chains.is_sure() {
-            true => Seen::default(),
-            false => spots::look_beside(dark, frames, &scene.ground, info, n_threads)?,
+        let evidence = spots::look_beside(dark, frames, &scene.ground, info, n_threads)?;
+        let cells = match cells.filter(|_| evidence.polarity() != Polarity::Both) {
+            Some(seen) => {
+                let places = growing(frames.len());
+                let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
+                // Targets that stand alone are told better one by one, where they are seen to move.
+                Some(seen).filter(|_| !evidence.bright.chains.is_surely_more_than(&own))
+            }
+            None => None,
         };
-        if let Some(seen) = cells.filter(|_| evidence.polarity() != Polarity::Both) {
+        if let Some(seen) = cells {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else if let Some(seen) = steadied::look_beside(&evidence, frames, scene, info, n_threads)? {
             steadied::configure(&seen, info, &mut config, &mut reasons);
