@@ -65,8 +65,6 @@ pub struct Counts {
     pub record_failures: AtomicU64,
     /// Viewers of the page now.
     pub viewers: AtomicU64,
-    /// Requests that were refused.
-    pub requests_refused: AtomicU64,
 }
 
 /// Adds to a count.

@@ -186,7 +186,9 @@ impl<'o> Live<'o> {
 
     fn begin(&mut self, ready: Ready) -> Result<Stages> {
         let toml = ready.config.to_toml()?;
-        ready.reasons.iter().for_each(|reason| self.board.say(&format!("  {reason}")));
+        // In one piece: those of several sources do not mix.
+        let reasons: String = ready.reasons.iter().map(|reason| format!("\n  {reason}")).collect();
+        self.board.say(&format!("{}: configuration:{reasons}", self.board.source));
         self.board.configured(toml, ready.reasons);
         self.outputs.iter_mut().for_each(|output| output.configured(&ready.config));
         let mut stages = Stages {
@@ -260,12 +262,14 @@ impl<'o> Live<'o> {
         let shown = Shown { view, when, tracks: &self.reports, events: &self.events };
         for (output, failing) in self.outputs.iter_mut().zip(&mut self.failing) {
             match output.put(&shown) {
-                Ok(()) if std::mem::take(failing) => self.board.say("the output is written again"),
+                Ok(()) if std::mem::take(failing) => {
+                    self.board.say(&format!("{}: the output is written again", self.board.source))
+                }
                 Ok(()) => {}
                 Err(e) => {
                     add(&counts.record_failures, 1);
                     if !std::mem::replace(failing, true) {
-                        self.board.say(&format!("warning: {e}"));
+                        self.board.say(&format!("warning: {}: {e}", self.board.source));
                     }
                 }
             }
@@ -309,7 +313,8 @@ impl<'o> Live<'o> {
         if self.board.counts.refused.fetch_add(1, Ordering::Relaxed) == 0 {
             let why = e.to_string();
             let why = why.lines().next().unwrap_or_default();
-            self.board.say(&format!("warning: a frame is left out, and others like it: {why}"));
+            let name = &self.board.source;
+            self.board.say(&format!("warning: {name}: a frame is left out, and others like it: {why}"));
         }
     }
 
@@ -347,7 +352,8 @@ impl Stages {
             return Ok(());
         }
         if self.size.is_some() {
-            board.say(&format!("frames have {} x {} pixels now; the detector starts anew", size.0, size.1));
+            let (name, w, h) = (&board.source, size.0, size.1);
+            board.say(&format!("{name}: frames have {w} x {h} pixels now; the detector starts anew"));
         }
         let info = info_of(frame, &board.source);
         self.detector = Some(

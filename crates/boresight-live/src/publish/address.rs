@@ -91,6 +91,16 @@ impl Target {
     }
 }
 
+impl Target {
+    /// The same for one of several sources: its topics lie below that of the target, under its name.
+    pub fn of_source(&self, name: &str) -> Self {
+        match self {
+            Self::Mqtt(broker) => Self::Mqtt(Broker { topic: format!("{}/{name}", broker.topic), ..broker.clone() }),
+            Self::Standard | Self::Udp { .. } => self.clone(),
+        }
+    }
+}
+
 fn host_and_port(text: &str, default: Option<u16>) -> Option<(String, u16)> {
     let colon = text.rfind(':').filter(|at| !text[*at..].contains(']'));
     let (host, port) = match colon {

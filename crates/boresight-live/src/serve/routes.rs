@@ -1,19 +1,20 @@
 //! The addresses of the page: the page itself, its picture, the tracks, the events, the metrics. Nothing of the file system is served.
 
 use super::access::{Access, Verdict};
-use super::hub::Hub;
+use super::hubs::Hubs;
 use super::{metrics, viewer};
-use crate::board::add;
+use crate::board::{add, read};
 use axum::Router;
 use axum::extract::{Request, State, WebSocketUpgrade};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use futures_util::stream;
+use futures_util::stream::{self, select_all};
 use std::convert::Infallible;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 use tokio::sync::broadcast::error::RecvError;
 
 const HTML: &str = include_str!("page.html");
@@ -37,8 +38,10 @@ const HEADERS: [(&str, &str); 6] = [
 /// What the handlers share.
 #[derive(Clone)]
 pub struct Shared {
-    /// What is shown.
-    pub hub: Arc<Hub>,
+    /// What is shown: the sources.
+    pub hubs: Hubs,
+    /// Requests that were refused.
+    pub n_refused: Arc<AtomicU64>,
     /// Who may see it.
     pub access: Arc<Access>,
     /// Viewers at once.
@@ -53,6 +56,7 @@ pub fn router(shared: Shared) -> Router {
         .route("/", text("text/html; charset=utf-8", HTML))
         .route("/page.css", text("text/css; charset=utf-8", CSS))
         .route("/page.js", text("text/javascript; charset=utf-8", JS))
+        .route("/api/sources", get(sources))
         .route("/api/tracks", get(tracks))
         .route("/api/config", get(config))
         .route("/api/stream", get(events))
@@ -73,7 +77,7 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
             (StatusCode::SEE_OTHER, headers).into_response()
         }
         Verdict::Refuse(code, why) => {
-            add(&shared.hub.board.counts.requests_refused, 1);
+            add(&shared.n_refused, 1);
             let mut refused = (code, why).into_response();
             // What a refused request goes on to say is not read.
             refused.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
@@ -87,37 +91,64 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
     response
 }
 
-async fn tracks(State(shared): State<Shared>) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], shared.hub.seen().json(&shared.hub.board)).into_response()
+fn json(text: String) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
-async fn config(State(shared): State<Shared>) -> Response {
-    let (toml, reasons) = shared.hub.board.configuration();
-    let json = serde_json::json!({ "toml": toml, "reasons": reasons });
-    ([(header::CONTENT_TYPE, "application/json")], json.to_string()).into_response()
+async fn sources(State(shared): State<Shared>) -> Response {
+    json(shared.hubs.json())
+}
+
+async fn tracks(State(shared): State<Shared>, uri: Uri) -> Response {
+    match shared.hubs.one(&uri) {
+        Ok(hub) => json(hub.seen().json(&hub.board)),
+        Err(refused) => refused.into_response(),
+    }
+}
+
+async fn config(State(shared): State<Shared>, uri: Uri) -> Response {
+    match shared.hubs.one(&uri) {
+        Ok(hub) => {
+            let (toml, reasons) = hub.board.configuration();
+            json(serde_json::json!({ "toml": toml, "reasons": reasons }).to_string())
+        }
+        Err(refused) => refused.into_response(),
+    }
 }
 
 async fn numbers(State(shared): State<Shared>) -> Response {
-    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], metrics::text(&shared.hub.board))
-        .into_response()
+    let boards: Vec<_> = shared.hubs.all().iter().map(|hub| &*hub.board).collect();
+    let text = metrics::text(&boards, read(&shared.n_refused));
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response()
 }
 
-/// Events as they come; one who lags too far behind is told how many are lost.
-async fn events(State(shared): State<Shared>) -> Response {
-    let receiver = shared.hub.events.subscribe();
-    let lines = stream::unfold(receiver, |mut receiver| async move {
-        let event = match receiver.recv().await {
-            Ok(json) => Event::default().data(&*json),
-            Err(RecvError::Lagged(n)) => Event::default().event("lost").data(n.to_string()),
-            Err(RecvError::Closed) => return None,
-        };
-        Some((Ok::<_, Infallible>(event), receiver))
+/// Events as they come, of the source that is named or of all; one who lags too far behind is told how many are lost.
+async fn events(State(shared): State<Shared>, uri: Uri) -> Response {
+    let hubs = match shared.hubs.named(&uri) {
+        Ok(Some(hub)) => std::slice::from_ref(hub),
+        Ok(None) => shared.hubs.all(),
+        Err(refused) => return refused.into_response(),
+    };
+    let each = hubs.iter().map(|hub| {
+        let lines = stream::unfold(hub.events.subscribe(), |mut receiver| async move {
+            let event = match receiver.recv().await {
+                Ok(json) => Event::default().data(&*json),
+                Err(RecvError::Lagged(n)) => Event::default().event("lost").data(n.to_string()),
+                Err(RecvError::Closed) => return None,
+            };
+            Some((Ok::<_, Infallible>(event), receiver))
+        });
+        Box::pin(lines)
     });
-    Sse::new(lines).keep_alive(KeepAlive::default()).into_response()
+    Sse::new(select_all(each)).keep_alive(KeepAlive::default()).into_response()
 }
 
-async fn view(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Some(seat) = viewer::enter(&shared.hub, shared.most_viewers) else {
+async fn view(State(shared): State<Shared>, uri: Uri, upgrade: WebSocketUpgrade) -> Response {
+    let hub = match shared.hubs.one(&uri) {
+        Ok(hub) => hub,
+        Err(refused) => return refused.into_response(),
+    };
+    let Some(seat) = viewer::enter(hub, &shared.hubs, shared.most_viewers) else {
         return (StatusCode::SERVICE_UNAVAILABLE, "all places are taken\n").into_response();
     };
     let upgrade = upgrade.max_message_size(viewer::MAX_WORD).max_frame_size(viewer::MAX_WORD);
