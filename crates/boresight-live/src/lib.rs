@@ -26,6 +26,8 @@ pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
 pub use histogram::Histogram;
 pub use measure::{Latency, Sample, Soak, latency, soak};
 pub use output::{LiveOutput, Shown};
+#[cfg(feature = "nats")]
+pub use publish::Nats;
 pub use publish::{Broker, Lines, Mqtt, Target, Udp, publisher};
 pub use record::{Record, RecordOptions};
 pub use run::{RunOptions, run};

@@ -16,6 +16,8 @@ pub fn publisher(target: &Target, board: &Arc<Board>) -> Result<Box<dyn LiveOutp
     Ok(match target {
         Target::Standard => Box::new(Lines::start(std::io::stdout())?),
         Target::Udp { address } => Box::new(Udp::open(address)?),
+        #[cfg(feature = "nats")]
+        Target::Nats(broker) => Box::new(super::nats::Nats::start(broker, Arc::clone(board))?),
         Target::Mqtt(broker) => Box::new(Mqtt::start(broker, Arc::clone(board))?),
     })
 }
