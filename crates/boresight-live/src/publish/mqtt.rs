@@ -182,7 +182,9 @@ async fn poll(shared: &Shared, mut events: EventLoop, board: &Board, name: &str)
                 events.clean();
                 // They are sent again from our own list, which a broker that has forgotten the session does not shorten.
                 events.pending.clear();
-                if !std::mem::replace(&mut said, true) {
+                // Behind the last word the broker closes: that is no loss.
+                let has_parted = shared.over.load(Ordering::SeqCst) && shared.is_done();
+                if !has_parted && !std::mem::replace(&mut said, true) {
                     board.say(&format!("warning: {name}: {e}; events wait, at most {WAITING}"));
                 }
                 tokio::time::sleep(pause).await;
