@@ -195,9 +195,52 @@ fn several_sources_are_chosen_by_name(browser: &Path) {
     assert!(page.complaints.is_empty(), "{:#?}", page.complaints);
 }
 
+fn sliders_change_the_run_and_show_it_as_toml(browser: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    made(dir.path());
+    let live = Live::start(dir.path(), "127.0.0.1:0", &["sim/frames.y4m", "--tune"]);
+    let mut page = Browser::start(browser, &dir.path().join("profile"));
+    page.open(&live.1, [1280, 900]);
+    page.until("document.querySelectorAll('#dials input').length >= 3 && held.at(-1).shot.tracks.length === 2");
+    page.value("document.getElementById('tuning').open = true");
+    let slide = |page: &mut Browser, key: &str, place: u32| {
+        let script = format!(
+            "(() => {{ const s = document.querySelector('#dials input[name=\"{key}\"]'); s.value = {place}; s.dispatchEvent(new Event('input')); s.dispatchEvent(new Event('change')); }})()"
+        );
+        page.value(&script);
+    };
+    // As far as it goes: no target is so large.
+    slide(&mut page, "detector.cluster.min-area-px", 1000);
+    page.until("document.getElementById('toml').textContent === '[detector.cluster]\\nmin-area-px = 10000\\n'");
+    page.until("held.at(-1).shot.tracks.length === 0");
+    slide(&mut page, "detector.cluster.min-area-px", 350);
+    page.until("held.at(-1).shot.tracks.length === 2");
+    slide(&mut page, "tracker.coast-s", 500);
+    page.until("document.getElementById('toml').textContent.includes('[tracker]\\ncoast-s = 1.73')");
+    page.until("fetch('api/config').then((a) => a.json()).then((c) => c.toml.includes('coast-s = 1.73'))");
+    assert_eq!(
+        page.value("[...document.querySelectorAll('#dials .refused')].every((r) => r.textContent === '')"),
+        true
+    );
+    // What is copied is a configuration.
+    let toml = page.value("document.getElementById('toml').textContent");
+    std::fs::write(dir.path().join("copied.toml"), toml.as_str().unwrap()).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_boresight"));
+    let out = command.current_dir(dir.path()).args(["config", "--check", "copied.toml"]).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(page.value(FITS), true);
+    page.picture("live-tune.png");
+    page.resize([390, 844]);
+    page.until("innerWidth === 390");
+    assert_eq!(page.value(FITS), true, "a telephone");
+    page.picture("live-tune-phone.png");
+    assert!(page.complaints.is_empty(), "{:#?}", page.complaints);
+}
+
 fn main() -> std::process::ExitCode {
     let found = browser();
-    let tests: [(&str, fn(&Path)); 4] = [
+    let tests: [(&str, fn(&Path)); 5] = [
+        ("sliders_change_the_run_and_show_it_as_toml", sliders_change_the_run_and_show_it_as_toml),
         ("the_page_shows_the_targets_where_they_are", the_page_shows_the_targets_where_they_are),
         (
             "a_viewer_of_one_picture_a_second_gets_the_newest_and_slows_nothing",

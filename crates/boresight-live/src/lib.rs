@@ -19,7 +19,9 @@ mod run_all;
 mod serve;
 mod slot;
 mod source;
+mod stages;
 mod timeline;
+mod tune;
 
 pub use board::{Board, Counts, Said, State};
 pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};

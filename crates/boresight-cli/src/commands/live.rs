@@ -57,6 +57,9 @@ pub struct Args {
     /// Show a page at this address, such as 127.0.0.1:8090. Any but this machine's own address demands a token, which is printed.
     #[arg(long, value_name = "ADDRESS")]
     serve: Option<String>,
+    /// Let the page change a few parameters while the run goes on; each change is said, and shown as TOML to copy.
+    #[arg(long, requires = "serve")]
+    tune: bool,
     /// A name of this machine by which browsers may call the page, besides its numbers and localhost. Can be repeated.
     #[arg(long = "host", value_name = "NAME", requires = "serve")]
     hosts: Vec<String>,
@@ -223,7 +226,8 @@ fn serve(address: &str, args: &Args, boards: &[Arc<Board>]) -> anyhow::Result<Pa
             .hint("127.0.0.1:8090 for this machine alone, 0.0.0.0:8090 for others as well")
     };
     let found: SocketAddr = address.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(wrong)?;
-    let page = Page::serve(&PageOptions { names: args.hosts.clone(), ..PageOptions::at(found) }, boards)?;
+    let page =
+        Page::serve(&PageOptions { names: args.hosts.clone(), tune: args.tune, ..PageOptions::at(found) }, boards)?;
     match page.token() {
         None => say!("page: http://{}/", page.address()),
         // The one time that it is shown.

@@ -282,6 +282,6 @@ addEventListener("resize", show);
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const keys = { " ": () => pause(!paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), ArrowDown: () => next(1), ArrowUp: () => next(-1), s: snapshot };
-  if (keys[event.key] && !(event.target instanceof HTMLButtonElement && event.key === " ") && !(event.target instanceof HTMLSelectElement)) { event.preventDefault(); keys[event.key](); }
+  if (keys[event.key] && !(event.target instanceof HTMLButtonElement && event.key === " ") && !(event.target instanceof HTMLSelectElement) && !event.target.closest?.("#tuning")) { event.preventDefault(); keys[event.key](); }
 });
 connect();

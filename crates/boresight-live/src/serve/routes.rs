@@ -1,10 +1,12 @@
 //! The addresses of the page: the page itself, its picture, the tracks, the events, the metrics. Nothing of the file system is served.
 
-use super::access::{Access, Verdict};
+use super::access::{Access, CHANGE_PATH, Verdict};
 use super::hubs::Hubs;
 use super::{metrics, viewer};
 use crate::board::{add, read};
+use crate::tune::{self, Change};
 use axum::Router;
+use axum::body::to_bytes;
 use axum::extract::{Request, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::{Next, from_fn_with_state};
@@ -12,6 +14,7 @@ use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use futures_util::stream::{self, select_all};
+use serde::Deserialize;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -20,6 +23,10 @@ use tokio::sync::broadcast::error::RecvError;
 const HTML: &str = include_str!("page.html");
 const CSS: &str = include_str!("page.css");
 const JS: &str = include_str!("page.js");
+const TUNING: &str = include_str!("tuning.js");
+
+/// Longest body of a change, bytes.
+const MOST_WISHED: usize = 1024;
 
 /// What every answer says to the browser: run nothing of others, stand in no frame, guess no type, keep nothing.
 const HEADERS: [(&str, &str); 6] = [
@@ -56,9 +63,10 @@ pub fn router(shared: Shared) -> Router {
         .route("/", text("text/html; charset=utf-8", HTML))
         .route("/page.css", text("text/css; charset=utf-8", CSS))
         .route("/page.js", text("text/javascript; charset=utf-8", JS))
+        .route("/tuning.js", text("text/javascript; charset=utf-8", TUNING))
         .route("/api/sources", get(sources))
         .route("/api/tracks", get(tracks))
-        .route("/api/config", get(config))
+        .route(CHANGE_PATH, get(config).post(change))
         .route("/api/stream", get(events))
         .route("/api/view", get(view))
         .route("/metrics", get(numbers))
@@ -110,9 +118,55 @@ async fn config(State(shared): State<Shared>, uri: Uri) -> Response {
     match shared.hubs.one(&uri) {
         Ok(hub) => {
             let (toml, reasons) = hub.board.configuration();
-            json(serde_json::json!({ "toml": toml, "reasons": reasons }).to_string())
+            let mut answer = serde_json::json!({ "toml": toml, "reasons": reasons });
+            if let Some(token) = shared.access.change_token() {
+                let dials = tune::dials(&toml).into_iter().map(|(dial, value)| {
+                    let mut dial = serde_json::to_value(dial).unwrap_or_default();
+                    dial["value"] = value.into();
+                    dial
+                });
+                (answer["dials"], answer["change_token"]) = (dials.collect(), token.into());
+            }
+            json(answer.to_string())
         }
         Err(refused) => refused.into_response(),
+    }
+}
+
+#[derive(Deserialize)]
+struct Wish {
+    key: String,
+    value: f64,
+}
+
+/// Takes a change of one parameter; the run makes it before its next frame, and says it.
+async fn change(State(shared): State<Shared>, request: Request) -> Response {
+    let hub = match shared.hubs.one(request.uri()) {
+        Ok(hub) => hub,
+        Err(refused) => return refused.into_response(),
+    };
+    let is_json = request.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
+    if !is_json {
+        return (StatusCode::UNSUPPORTED_MEDIA_TYPE, "expected application/json\n").into_response();
+    }
+    let Ok(body) = to_bytes(request.into_body(), MOST_WISHED).await else {
+        return (StatusCode::PAYLOAD_TOO_LARGE, "a change is shorter\n").into_response();
+    };
+    let Ok(wish) = serde_json::from_slice::<Wish>(&body) else {
+        let why = "expected {\"key\":\"tracker.coast-s\",\"value\":2}\n";
+        return (StatusCode::BAD_REQUEST, why).into_response();
+    };
+    let (toml, _) = hub.board.configuration();
+    if toml.is_empty() {
+        return (StatusCode::CONFLICT, "the configuration is not chosen yet\n").into_response();
+    }
+    match Change::of(&toml, &wish.key, wish.value) {
+        Err(e) => (StatusCode::UNPROCESSABLE_ENTITY, format!("{e}\n")).into_response(),
+        Ok(change) if hub.board.ask_change(change) => {
+            let told = serde_json::json!({ "change": change.words(), "toml": change.toml() });
+            (StatusCode::ACCEPTED, json(told.to_string())).into_response()
+        }
+        Ok(_) => (StatusCode::TOO_MANY_REQUESTS, "the run has not yet taken those before\n").into_response(),
     }
 }
 

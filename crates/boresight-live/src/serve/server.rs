@@ -35,12 +35,14 @@ pub struct PageOptions {
     pub most_viewers: u64,
     /// Connections at once.
     pub most_connections: usize,
+    /// Whether a few parameters may be changed from the page.
+    pub tune: bool,
 }
 
 impl PageOptions {
     /// The usual limits.
     pub fn at(address: SocketAddr) -> Self {
-        Self { address, names: Vec::new(), most_viewers: 64, most_connections: 256 }
+        Self { address, names: Vec::new(), most_viewers: 64, most_connections: 256, tune: false }
     }
 }
 
@@ -74,7 +76,8 @@ impl Page {
             .map_err(failed)?;
         let listener = runtime.block_on(TcpListener::bind(options.address)).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let access = Arc::new(Access::to(address, &options.names)?);
+        let access = Access::to(address, &options.names)?;
+        let access = Arc::new(if options.tune { access.with_changes()? } else { access });
         let token = access.token().map(ToString::to_string);
         let hubs = Hubs::new(boards.iter().map(|board| Arc::new(Hub::new(Arc::clone(board)))).collect());
         let shared =
