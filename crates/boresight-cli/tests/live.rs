@@ -170,6 +170,28 @@ fn several_sources_are_recorded_beside_each_other_each_with_its_configuration() 
 }
 
 #[test]
+fn packaging_asks_for_options_that_there_are_and_the_compiler_that_is_needed() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    let help = boresight(&["live", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let (unit, container) = (read("packaging/boresight-live.service"), read("packaging/Containerfile"));
+    let run = container.lines().filter(|l| l.contains("--serve"));
+    let mut n = 0;
+    let unit = unit.lines().filter(|l| !l.contains("systemctl"));
+    for word in unit.chain(run).flat_map(|l| l.split([' ', '='])).filter(|w| w.starts_with("--")) {
+        assert!(help.contains(word), "{word}");
+        n += 1;
+    }
+    assert!(n >= 5, "{n}");
+    let of = |text: &str, before: &str| {
+        let rest = text.split(before).nth(1).unwrap();
+        rest.split(|c: char| c != '.' && !c.is_ascii_digit()).next().unwrap().to_string()
+    };
+    assert_eq!(of(&container, "library/rust:"), of(&read("Cargo.toml"), "rust-version = \""));
+}
+
+#[test]
 fn what_cannot_be_is_said_with_its_mend_and_code() {
     let out = fed(boresight(&["live", "-"]).spawn().unwrap(), "{\"detections\":7}\n{}\n");
     let said = String::from_utf8_lossy(&out.stderr);

@@ -4,6 +4,7 @@
 //! may be lost, a clock, and outputs that must never keep the run waiting.
 
 mod board;
+mod cbor;
 mod choose;
 mod event;
 mod histogram;
@@ -24,6 +25,7 @@ mod timeline;
 mod tune;
 
 pub use board::{Board, Counts, Said, State};
+pub use cbor::Form;
 pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
 pub use histogram::Histogram;
 pub use measure::{Latency, Sample, Soak, latency, soak};

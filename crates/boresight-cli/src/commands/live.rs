@@ -63,7 +63,7 @@ pub struct Args {
     /// A name of this machine by which browsers may call the page, besides its numbers and localhost. Can be repeated.
     #[arg(long = "host", value_name = "NAME", requires = "serve")]
     hosts: Vec<String>,
-    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`. Can be repeated.
+    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. Can be repeated.
     #[arg(long, value_name = "URL")]
     publish: Vec<String>,
     /// Updates of each track a second that are published, at most.

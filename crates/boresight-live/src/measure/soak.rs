@@ -2,6 +2,7 @@
 
 use super::camera::{CameraPlug, View};
 use crate::board::{Board, read};
+use crate::cbor::Form;
 use crate::output::{LiveOutput, Shown};
 use crate::publish::Udp;
 use crate::record::{Record, RecordOptions};
@@ -82,7 +83,7 @@ pub fn soak(hours: f64, folder: &std::path::Path) -> Result<Soak> {
     let scale = Scale { samples: Arc::clone(&samples), next_s: 3600.0 };
     let record = Record::create(folder, limits)?;
     let mut outputs: Vec<Box<dyn LiveOutput>> =
-        vec![page.output(0)?, Box::new(Udp::open(&to)?), Box::new(record), Box::new(scale)];
+        vec![page.output(0)?, Box::new(Udp::open(&to, Form::Json)?), Box::new(record), Box::new(scale)];
     let config = Some(Config::from_toml(CONFIG, "soak")?);
     let options = RunOptions { config, ..RunOptions::default() };
     run(Box::new(CameraPlug(view, None)), &options, &board, &mut outputs, &|| false)?;

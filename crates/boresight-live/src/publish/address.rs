@@ -1,5 +1,6 @@
 //! Where events go, from what stands on the command line.
 
+use crate::cbor::Form;
 use boresight::{Error, ErrorKind, Result};
 
 /// Longest topic, bytes.
@@ -10,9 +11,9 @@ const MQTT_PORT: u16 = 1883;
 const NATS_PORT: u16 = 4222;
 /// What is understood.
 const KNOWN: &str = if cfg!(feature = "nats") {
-    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT"
+    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT; ?cbor behind it for CBOR"
 } else {
-    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC"
+    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; ?cbor behind it for CBOR"
 };
 
 /// A place for events.
@@ -24,6 +25,8 @@ pub enum Target {
     Udp {
         /// Name or number of the host, and the port.
         address: String,
+        /// How events are written.
+        form: Form,
     },
     /// An MQTT broker.
     Mqtt(Broker),
@@ -45,6 +48,8 @@ pub struct Broker {
     pub topic: String,
     /// User and password.
     pub user: Option<(String, String)>,
+    /// How events are written.
+    pub form: Form,
 }
 
 impl std::fmt::Debug for Broker {
@@ -59,6 +64,7 @@ impl Broker {
     fn parse(
         scheme: &'static str,
         rest: &str,
+        form: Form,
         port: u16,
         is_topic: impl Fn(&str) -> bool,
         expected: &'static str,
@@ -76,12 +82,12 @@ impl Broker {
         };
         let (host, port) = host_and_port(place, Some(port)).ok_or("expected HOST:PORT")?;
         let host = host.trim_matches(['[', ']']).to_string();
-        Ok(Self { scheme, host, port, topic: topic.to_string(), user })
+        Ok(Self { scheme, host, port, topic: topic.to_string(), user, form })
     }
 }
 
 impl Target {
-    /// Reads `-`, `udp://HOST:PORT`, `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC` or, with the feature `nats`, `nats://..`.
+    /// Reads `-`; or, with `?cbor` behind it where events shall be CBOR, `udp://HOST:PORT`, `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC` or, with the feature `nats`, `nats://..`.
     /// # Errors
     /// [`ErrorKind::Config`] for anything else.
     pub fn parse(text: &str) -> Result<Self> {
@@ -98,17 +104,21 @@ impl Target {
             return Ok(Self::Standard);
         }
         let Some((scheme, rest)) = text.split_once("://") else { return Err(wrong("expected an address")) };
+        let (rest, form) = match rest.strip_suffix("?cbor") {
+            Some(rest) => (rest, Form::Cbor),
+            None => (rest, Form::Json),
+        };
         match scheme {
             "udp" => {
                 let (host, port) =
                     host_and_port(rest.trim_end_matches('/'), None).ok_or_else(|| wrong("expected HOST:PORT"))?;
-                Ok(Self::Udp { address: format!("{host}:{port}") })
+                Ok(Self::Udp { address: format!("{host}:{port}"), form })
             }
             "mqtt" => {
                 let bad = |c: char| c.is_control() || c == '#' || c == '+';
                 let is_topic = |topic: &str| !topic.contains(bad) && !topic.ends_with('/');
                 let wildcards = "expected a topic without wildcards (# and +), such as site/camera";
-                Ok(Self::Mqtt(Broker::parse("mqtt", rest, MQTT_PORT, is_topic, wildcards).map_err(wrong)?))
+                Ok(Self::Mqtt(Broker::parse("mqtt", rest, form, MQTT_PORT, is_topic, wildcards).map_err(wrong)?))
             }
             #[cfg(feature = "nats")]
             "nats" => {
@@ -116,7 +126,7 @@ impl Target {
                 let bad = |c: char| c.is_control() || c.is_whitespace() || c == '*' || c == '>';
                 let is_subject = |topic: &str| !topic.contains(bad) && topic.split(['.', '/']).all(|t| !t.is_empty());
                 let wildcards = "expected a subject without wildcards (* and >) and spaces, such as site.camera";
-                let mut broker = Broker::parse("nats", rest, NATS_PORT, is_subject, wildcards).map_err(wrong)?;
+                let mut broker = Broker::parse("nats", rest, form, NATS_PORT, is_subject, wildcards).map_err(wrong)?;
                 broker.topic = broker.topic.replace('/', ".");
                 Ok(Self::Nats(broker))
             }
@@ -162,7 +172,10 @@ mod tests {
         };
         assert_eq!(broker("mqtt://b/a/c"), ("b".into(), 1883, "a/c".into(), None));
         assert_eq!(broker("mqtt://u:p@[::1]:99/t"), ("::1".into(), 99, "t".into(), Some(("u".into(), "p".into()))));
-        assert_eq!(Target::parse("udp://[::1]:9").unwrap(), Target::Udp { address: "[::1]:9".into() });
+        assert_eq!(
+            Target::parse("udp://[::1]:9").unwrap(),
+            Target::Udp { address: "[::1]:9".into(), form: Form::Json }
+        );
         for bad in [
             "",
             "udp://h",
@@ -176,6 +189,8 @@ mod tests {
         ] {
             assert!(Target::parse(bad).unwrap_err().to_string().contains("hint: give -"), "{bad}");
         }
+        let Target::Mqtt(cbor) = Target::parse("mqtt://b/a?cbor").unwrap() else { panic!("mqtt") };
+        assert_eq!((cbor.topic.as_str(), cbor.form), ("a", Form::Cbor));
         let Target::Mqtt(north) = Target::parse("mqtt://b/a").unwrap().of_source("north") else { panic!("mqtt") };
         assert_eq!(north.topic, "a/north");
         let said = format!(

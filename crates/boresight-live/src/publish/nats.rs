@@ -204,7 +204,7 @@ impl<'b> Connection<'b> {
                 unanswered.push_back(event);
             }
             for event in &*unanswered {
-                let payload = event.json.as_bytes();
+                let payload = &*self.broker.form.bytes(&event.json);
                 if payload.len() > self.max_payload {
                     shared.refused.fetch_add(1, Ordering::Relaxed);
                     continue;

@@ -4,6 +4,7 @@ use super::access::{Access, CHANGE_PATH, Verdict};
 use super::hubs::Hubs;
 use super::{metrics, viewer};
 use crate::board::{add, read};
+use crate::cbor::of_json;
 use crate::tune::{self, Change};
 use axum::Router;
 use axum::body::to_bytes;
@@ -23,6 +24,7 @@ use tokio::sync::broadcast::error::RecvError;
 const HTML: &str = include_str!("page.html");
 const CSS: &str = include_str!("page.css");
 const JS: &str = include_str!("page.js");
+const OPENAPI: &str = include_str!("openapi.json");
 const TUNING: &str = include_str!("tuning.js");
 
 /// Longest body of a change, bytes.
@@ -64,6 +66,7 @@ pub fn router(shared: Shared) -> Router {
         .route("/page.css", text("text/css; charset=utf-8", CSS))
         .route("/page.js", text("text/javascript; charset=utf-8", JS))
         .route("/tuning.js", text("text/javascript; charset=utf-8", TUNING))
+        .route("/api/openapi.json", text("application/json", OPENAPI))
         .route("/api/sources", get(sources))
         .route("/api/tracks", get(tracks))
         .route(CHANGE_PATH, get(config).post(change))
@@ -103,31 +106,42 @@ fn json(text: String) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
-async fn sources(State(shared): State<Shared>) -> Response {
-    json(shared.hubs.json())
+/// JSON, or CBOR where the request asks for that.
+fn answer(headers: &HeaderMap, text: String) -> Response {
+    let asked = headers.get(header::ACCEPT).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    let wants_cbor =
+        asked.split(',').any(|kind| kind.split(';').next().unwrap_or_default().trim() == "application/cbor");
+    match of_json(&text).filter(|_| wants_cbor) {
+        Some(bytes) => ([(header::CONTENT_TYPE, "application/cbor")], bytes).into_response(),
+        None => json(text),
+    }
 }
 
-async fn tracks(State(shared): State<Shared>, uri: Uri) -> Response {
+async fn sources(State(shared): State<Shared>, headers: HeaderMap) -> Response {
+    answer(&headers, shared.hubs.json())
+}
+
+async fn tracks(State(shared): State<Shared>, uri: Uri, headers: HeaderMap) -> Response {
     match shared.hubs.one(&uri) {
-        Ok(hub) => json(hub.seen().json(&hub.board)),
+        Ok(hub) => answer(&headers, hub.seen().json(&hub.board)),
         Err(refused) => refused.into_response(),
     }
 }
 
-async fn config(State(shared): State<Shared>, uri: Uri) -> Response {
+async fn config(State(shared): State<Shared>, uri: Uri, headers: HeaderMap) -> Response {
     match shared.hubs.one(&uri) {
         Ok(hub) => {
             let (toml, reasons) = hub.board.configuration();
-            let mut answer = serde_json::json!({ "toml": toml, "reasons": reasons });
+            let mut told = serde_json::json!({ "toml": toml, "reasons": reasons });
             if let Some(token) = shared.access.change_token() {
                 let dials = tune::dials(&toml).into_iter().map(|(dial, value)| {
                     let mut dial = serde_json::to_value(dial).unwrap_or_default();
                     dial["value"] = value.into();
                     dial
                 });
-                (answer["dials"], answer["change_token"]) = (dials.collect(), token.into());
+                (told["dials"], told["change_token"]) = (dials.collect(), token.into());
             }
-            json(answer.to_string())
+            answer(&headers, told.to_string())
         }
         Err(refused) => refused.into_response(),
     }
