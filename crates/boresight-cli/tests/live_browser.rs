@@ -237,9 +237,11 @@ fn sliders_change_the_run_and_show_it_as_toml(browser: &Path) {
     assert!(page.complaints.is_empty(), "{:#?}", page.complaints);
 }
 
+type Test = fn(&Path);
+
 fn main() -> std::process::ExitCode {
     let found = browser();
-    let tests: [(&str, fn(&Path)); 5] = [
+    let tests: [(&str, Test); 5] = [
         ("sliders_change_the_run_and_show_it_as_toml", sliders_change_the_run_and_show_it_as_toml),
         ("the_page_shows_the_targets_where_they_are", the_page_shows_the_targets_where_they_are),
         (
