@@ -99,6 +99,7 @@ struct Told {
     nis: (f64, u64),
     rate: Option<(Instant, f64)>,
     changes: VecDeque<Change>,
+    only_tracks: bool,
 }
 
 /// The board.
@@ -156,6 +157,16 @@ impl Board {
     pub fn configuration(&self) -> (String, Vec<String>) {
         let told = self.told();
         (told.config.clone(), told.reasons.clone())
+    }
+
+    /// Notes that detections come from elsewhere.
+    pub(crate) fn only_tracks(&self) {
+        self.told().only_tracks = true;
+    }
+
+    /// Whether the run has a detector.
+    pub(crate) fn detects(&self) -> bool {
+        !self.told().only_tracks
     }
 
     /// Asks the run to change a parameter; `false` if it has not yet taken those before.

@@ -179,6 +179,9 @@ impl<'o> Live<'o> {
         self.board.say(&format!("{}: configuration:{reasons}", self.board.source));
         self.board.configured(toml, ready.reasons.clone());
         self.outputs.iter_mut().for_each(|output| output.configured(&ready.config));
+        if ready.detector.is_none() {
+            self.board.only_tracks();
+        }
         let (mut stages, kept) = Stages::of(ready)?;
         self.board.set(State::Running, "");
         self.tell_state();

@@ -44,10 +44,20 @@ fn number(tree: &toml::Table, key: &str) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|v| v as f64))
 }
 
-/// The parameters of this configuration that can be changed, with their values.
-pub fn dials(toml: &str) -> Vec<(Dial, f64)> {
+/// Detectors that find targets without joining pixels to regions.
+const WITHOUT_REGIONS: [&str; 4] = ["isolated", "spot", "cfar", "integrate"];
+
+/// The parameters of this configuration that can be changed, with their values; `detects`: whether there is a detector at all.
+pub fn dials(toml: &str, detects: bool) -> Vec<(Dial, f64)> {
     let tree: toml::Table = toml::from_str(toml).unwrap_or_default();
-    DIALS.iter().filter_map(|dial| number(&tree, dial.key).map(|value| (*dial, value))).collect()
+    let threshold = tree.get("detector").and_then(|d| d.get("threshold"));
+    let has_regions = threshold.is_none_or(|t| WITHOUT_REGIONS.iter().all(|name| t.get(name).is_none()));
+    let acts = |dial: &&Dial| match dial.key {
+        key if key.starts_with("detector.") && !detects => false,
+        key if key.starts_with("detector.cluster.") => has_regions,
+        _ => true,
+    };
+    DIALS.iter().filter(acts).filter_map(|dial| number(&tree, dial.key).map(|value| (*dial, value))).collect()
 }
 
 /// One parameter and the value that it shall have.
@@ -62,9 +72,9 @@ impl Change {
     /// A change of this configuration.
     /// # Errors
     /// [`ErrorKind::Config`] for a key that it has not, or that may not be changed, and for a value beyond its limits.
-    pub fn of(toml: &str, key: &str, value: f64) -> Result<Self> {
+    pub fn of(toml: &str, detects: bool, key: &str, value: f64) -> Result<Self> {
         let wrong = |what: String, hint: &str| Error::new(ErrorKind::Config, what).at(key).hint(hint);
-        let Some((dial, _)) = dials(toml).into_iter().find(|(dial, _)| dial.key == key) else {
+        let Some((dial, _)) = dials(toml, detects).into_iter().find(|(dial, _)| dial.key == key) else {
             return Err(wrong("cannot be changed here".into(), "/api/config lists what can"));
         };
         // NaN is within no limits.
@@ -116,7 +126,7 @@ mod tests {
                 let change = Change { key: dial.key, value, whole: dial.whole };
                 let config = change.apply(&Config::default()).unwrap();
                 let toml = config.to_toml().unwrap();
-                let (_, now) = dials(&toml).into_iter().find(|(d, _)| d.key == dial.key).unwrap();
+                let (_, now) = dials(&toml, true).into_iter().find(|(d, _)| d.key == dial.key).unwrap();
                 // A detector's numbers may be kept with 32 bits.
                 assert!((now - value).abs() <= 1e-6 * value, "{}: {now}", change.words());
                 assert_eq!(
@@ -126,6 +136,21 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn what_would_change_nothing_is_not_offered() {
+        let keys = |set: &str, detects: bool| -> Vec<&str> {
+            let config = Config::default().with(set).unwrap().with("detector.cluster.min-area-px=9").unwrap();
+            dials(&config.to_toml().unwrap(), detects).into_iter().map(|(dial, _)| dial.key).collect()
+        };
+        let (area, score) = ("detector.cluster.min-area-px", "detector.threshold.isolated.min-score");
+        let isolated = keys("detector.threshold=isolated", true);
+        assert!(isolated.contains(&score) && !isolated.contains(&area), "{isolated:?}");
+        let band = keys("detector.threshold.band.low=5", true);
+        assert!(band.contains(&area) && !band.contains(&score), "{band:?}");
+        let detections = keys("detector.threshold=isolated", false);
+        assert!(detections.contains(&"tracker.coast-s") && detections.iter().all(|k| k.starts_with("tracker.")));
     }
 
     #[test]
@@ -140,9 +165,9 @@ mod tests {
             ("tracker.coast-s", f64::NAN),
             ("", 1.0),
         ] {
-            assert!(Change::of(&toml, key, value).is_err(), "{key} {value}");
+            assert!(Change::of(&toml, true, key, value).is_err(), "{key} {value}");
         }
-        let change = Change::of(&toml, "tracker.coast-s", 2.5).unwrap();
+        let change = Change::of(&toml, true, "tracker.coast-s", 2.5).unwrap();
         assert_eq!(
             (change.words().as_str(), change.toml().as_str()),
             ("tracker.coast-s = 2.5", "[tracker]\ncoast-s = 2.5\n")

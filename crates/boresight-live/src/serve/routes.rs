@@ -134,7 +134,7 @@ async fn config(State(shared): State<Shared>, uri: Uri, headers: HeaderMap) -> R
             let (toml, reasons) = hub.board.configuration();
             let mut told = serde_json::json!({ "toml": toml, "reasons": reasons });
             if let Some(token) = shared.access.change_token() {
-                let dials = tune::dials(&toml).into_iter().map(|(dial, value)| {
+                let dials = tune::dials(&toml, hub.board.detects()).into_iter().map(|(dial, value)| {
                     let mut dial = serde_json::to_value(dial).unwrap_or_default();
                     dial["value"] = value.into();
                     dial
@@ -174,7 +174,7 @@ async fn change(State(shared): State<Shared>, request: Request) -> Response {
     if toml.is_empty() {
         return (StatusCode::CONFLICT, "the configuration is not chosen yet\n").into_response();
     }
-    match Change::of(&toml, &wish.key, wish.value) {
+    match Change::of(&toml, hub.board.detects(), &wish.key, wish.value) {
         Err(e) => (StatusCode::UNPROCESSABLE_ENTITY, format!("{e}\n")).into_response(),
         Ok(change) if hub.board.ask_change(change) => {
             let told = serde_json::json!({ "change": change.words(), "toml": change.toml() });
