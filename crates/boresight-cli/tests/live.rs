@@ -140,6 +140,58 @@ fn a_record_on_a_full_disk_keeps_whole_lines_and_the_run_goes_on() {
 }
 
 #[test]
+fn several_sources_are_recorded_beside_each_other_each_with_its_configuration() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let text: String = (0..100).map(line).collect();
+    std::fs::write(dir.path().join("a.jsonl"), &text).unwrap();
+    std::fs::write(dir.path().join("b.jsonl"), &text).unwrap();
+    std::fs::write(dir.path().join("far.toml"), "[tracker]\ncoast-s = 7.5\n").unwrap();
+    let (a, b, far, kept) =
+        (at("a.jsonl"), format!("far={}", at("b.jsonl")), format!("far={}", at("far.toml")), at("kept"));
+    let out = boresight(&["live", &a, &b, "--config", &far, "--publish", "-", "--record", &kept]).output().unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success() && said.contains("far: running") && said.contains("a: configuration:"), "{said}");
+    let events: Vec<serde_json::Value> =
+        String::from_utf8(out.stdout).unwrap().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    for name in ["a", "far"] {
+        let of = |event: &str| events.iter().filter(|e| e["source"] == name && e["event"] == event).count();
+        assert_eq!((of("start"), of("end")), (1, 1), "{name}: {said}");
+        assert!(dir.path().join("kept").join(name).join("000001.jsonl").exists(), "{name}");
+    }
+    let config = |name: &str| std::fs::read_to_string(format!("{kept}/{name}/000001.config.toml")).unwrap();
+    assert!(config("far").contains("coast-s = 7.5") && !config("a").contains("coast-s = 7.5"));
+    // One that is not there ends alone; the code says it in the end.
+    let gone = at("gone.mp4");
+    let out = boresight(&["live", &a, &gone, "--publish", "-", "--quiet"]).output().unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(3) && said.contains("the other sources go on"), "{said}");
+    assert!(String::from_utf8_lossy(&out.stdout).contains("\"event\":\"end\",\"source\":\"a\""), "{said}");
+}
+
+#[test]
+fn packaging_asks_for_options_that_there_are_and_the_compiler_that_is_needed() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    let help = boresight(&["live", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let (unit, container) = (read("packaging/boresight-live.service"), read("packaging/Containerfile"));
+    let run = container.lines().filter(|l| l.contains("--serve"));
+    let mut n = 0;
+    let unit = unit.lines().filter(|l| !l.contains("systemctl"));
+    for word in unit.chain(run).flat_map(|l| l.split([' ', '='])).filter(|w| w.starts_with("--")) {
+        assert!(help.contains(word), "{word}");
+        n += 1;
+    }
+    assert!(n >= 5, "{n}");
+    let of = |text: &str, before: &str| {
+        let rest = text.split(before).nth(1).unwrap();
+        rest.split(|c: char| c != '.' && !c.is_ascii_digit()).next().unwrap().to_string()
+    };
+    assert_eq!(of(&container, "library/rust:"), of(&read("Cargo.toml"), "rust-version = \""));
+}
+
+#[test]
 fn what_cannot_be_is_said_with_its_mend_and_code() {
     let out = fed(boresight(&["live", "-"]).spawn().unwrap(), "{\"detections\":7}\n{}\n");
     let said = String::from_utf8_lossy(&out.stderr);
@@ -154,6 +206,9 @@ fn what_cannot_be_is_said_with_its_mend_and_code() {
         (&["live", "gone.mp4"], 3, "no such file"),
         (&["live", "-"], 3, "nothing came"),
         (&["live"], 2, "SOURCE"),
+        (&["live", "-", "-"], 2, "one source only"),
+        (&["live", "a=x", "a=y"], 2, "same name"),
+        (&["live", "-", "--config", "a.toml", "--config", "b.toml"], 2, "NAME=FILE"),
     ] {
         let out = boresight(args).stdin(Stdio::null()).output().unwrap();
         let said = String::from_utf8_lossy(&out.stderr);

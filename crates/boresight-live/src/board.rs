@@ -1,10 +1,15 @@
 //! What a run says of itself while it goes on: its state and its counts, written by every thread, read by page and metrics.
 
 use crate::histogram::Histogram;
+use crate::tune::Change;
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// Changes that wait for the run.
+const MOST_CHANGES: usize = 64;
 
 /// What the run is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -65,8 +70,6 @@ pub struct Counts {
     pub record_failures: AtomicU64,
     /// Viewers of the page now.
     pub viewers: AtomicU64,
-    /// Requests that were refused.
-    pub requests_refused: AtomicU64,
 }
 
 /// Adds to a count.
@@ -95,6 +98,8 @@ struct Told {
     config: String,
     nis: (f64, u64),
     rate: Option<(Instant, f64)>,
+    changes: VecDeque<Change>,
+    only_tracks: bool,
 }
 
 /// The board.
@@ -152,6 +157,31 @@ impl Board {
     pub fn configuration(&self) -> (String, Vec<String>) {
         let told = self.told();
         (told.config.clone(), told.reasons.clone())
+    }
+
+    /// Notes that detections come from elsewhere.
+    pub(crate) fn only_tracks(&self) {
+        self.told().only_tracks = true;
+    }
+
+    /// Whether the run has a detector.
+    pub(crate) fn detects(&self) -> bool {
+        !self.told().only_tracks
+    }
+
+    /// Asks the run to change a parameter; `false` if it has not yet taken those before.
+    pub(crate) fn ask_change(&self, change: Change) -> bool {
+        let mut told = self.told();
+        let has_room = told.changes.len() < MOST_CHANGES;
+        if has_room {
+            told.changes.push_back(change);
+        }
+        has_room
+    }
+
+    /// The oldest change that is asked for.
+    pub(crate) fn take_change(&self) -> Option<Change> {
+        self.told().changes.pop_front()
     }
 
     /// Notes the normalised squares of a scan's innovations, and that a scan was tracked now.

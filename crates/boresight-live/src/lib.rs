@@ -4,6 +4,7 @@
 //! may be lost, a clock, and outputs that must never keep the run waiting.
 
 mod board;
+mod cbor;
 mod choose;
 mod event;
 mod histogram;
@@ -15,18 +16,25 @@ mod publish;
 mod queue;
 mod record;
 mod run;
+mod run_all;
 mod serve;
 mod slot;
 mod source;
+mod stages;
 mod timeline;
+mod tune;
 
 pub use board::{Board, Counts, Said, State};
+pub use cbor::Form;
 pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
 pub use histogram::Histogram;
 pub use measure::{Latency, Sample, Soak, latency, soak};
 pub use output::{LiveOutput, Shown};
+#[cfg(feature = "nats")]
+pub use publish::Nats;
 pub use publish::{Broker, Lines, Mqtt, Target, Udp, publisher};
 pub use record::{Record, RecordOptions};
 pub use run::{RunOptions, run};
+pub use run_all::{OneRun, run_all};
 pub use serve::{Page, PageOptions, resident_bytes};
-pub use source::{Address, Connect, Content, Feed, Frames, Paced, Pauses};
+pub use source::{Address, Connect, Content, Feed, Frames, NamedSource, Paced, Pauses, name_sources};

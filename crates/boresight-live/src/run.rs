@@ -5,17 +5,17 @@
 //! time on, half a second behind the clock, until the budget of the configuration deletes them.
 
 use crate::board::{Board, State, add, read as read_count, unix_s};
-use crate::choose::{Kept, Ready, info_of};
+use crate::choose::{Kept, Ready};
 use crate::event::{Event, TrackReport, When, status_line};
 use crate::lives::Lives;
 use crate::output::{LiveOutput, Shown};
 use crate::slot::{Slot, Taken};
 use crate::source::{Arrived, Connect, Content, Pauses, start};
+use crate::stages::Stages;
+use crate::tune::Change;
 use boresight::auto::DetectorKind;
 use boresight::io::StopFlag;
-use boresight::track::Tracking;
-use boresight::vision::Detector;
-use boresight::{Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View, track, vision};
+use boresight::{Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
@@ -102,21 +102,6 @@ fn broken_reader() -> Error {
     Error::new(ErrorKind::Damaged, "the reader of the source broke off, which is our own mistake")
 }
 
-/// The stages of a run once its configuration is settled.
-struct Stages {
-    config: Config,
-    detector: Option<Box<dyn Detector>>,
-    tracking: Box<dyn Tracking>,
-    size: Option<(usize, usize, boresight::PixelKind)>,
-    scan: Scan,
-    n_steps: u64,
-    /// Time of the last scan, and when it was the newest thing.
-    last: Option<(Timestamp, Instant)>,
-    /// Time between the last two arrivals: a slow stream is not a silent one.
-    usual: Duration,
-    n_tracks: usize,
-}
-
 struct Live<'o> {
     board: &'o Arc<Board>,
     outputs: &'o mut [Box<dyn LiveOutput>],
@@ -149,6 +134,9 @@ impl<'o> Live<'o> {
         };
         let mut stages = self.begin(ready)?;
         while !stop() {
+            if let Some(change) = self.board.take_change() {
+                self.retune(&mut stages, change);
+            }
             match slot.take(LOOK_AROUND) {
                 Taken::Item(arrived) => {
                     self.board.set(State::Running, "");
@@ -186,23 +174,18 @@ impl<'o> Live<'o> {
 
     fn begin(&mut self, ready: Ready) -> Result<Stages> {
         let toml = ready.config.to_toml()?;
-        ready.reasons.iter().for_each(|reason| self.board.say(&format!("  {reason}")));
-        self.board.configured(toml, ready.reasons);
+        // In one piece: those of several sources do not mix.
+        let reasons: String = ready.reasons.iter().map(|reason| format!("\n  {reason}")).collect();
+        self.board.say(&format!("{}: configuration:{reasons}", self.board.source));
+        self.board.configured(toml, ready.reasons.clone());
         self.outputs.iter_mut().for_each(|output| output.configured(&ready.config));
-        let mut stages = Stages {
-            tracking: track::build(&ready.config.tracker)?,
-            config: ready.config,
-            detector: ready.detector,
-            size: None,
-            scan: Scan::default(),
-            n_steps: 0,
-            last: None,
-            usual: Duration::ZERO,
-            n_tracks: 0,
-        };
+        if ready.detector.is_none() {
+            self.board.only_tracks();
+        }
+        let (mut stages, kept) = Stages::of(ready)?;
         self.board.set(State::Running, "");
         self.tell_state();
-        for arrived in ready.kept {
+        for arrived in kept {
             self.step(&mut stages, arrived, false)?;
         }
         Ok(stages)
@@ -243,9 +226,8 @@ impl<'o> Live<'o> {
 
     /// The scan of `stages` through the tracker to the outputs.
     fn track(&mut self, stages: &mut Stages, frame: Option<&Frame>, arrived_unix_s: f64, at: Instant) {
-        let Stages { tracking, scan, .. } = stages;
-        let tracks = match tracking.step(scan) {
-            Ok(tracks) => tracks,
+        let (scan, tracks) = match stages.track() {
+            Ok(tracked) => tracked,
             Err(e) => return self.refuse(&e),
         };
         let counts = &self.board.counts;
@@ -260,12 +242,14 @@ impl<'o> Live<'o> {
         let shown = Shown { view, when, tracks: &self.reports, events: &self.events };
         for (output, failing) in self.outputs.iter_mut().zip(&mut self.failing) {
             match output.put(&shown) {
-                Ok(()) if std::mem::take(failing) => self.board.say("the output is written again"),
+                Ok(()) if std::mem::take(failing) => {
+                    self.board.say(&format!("{}: the output is written again", self.board.source))
+                }
                 Ok(()) => {}
                 Err(e) => {
                     add(&counts.record_failures, 1);
                     if !std::mem::replace(failing, true) {
-                        self.board.say(&format!("warning: {e}"));
+                        self.board.say(&format!("warning: {}: {e}", self.board.source));
                     }
                 }
             }
@@ -279,7 +263,6 @@ impl<'o> Live<'o> {
         if !scan.blind {
             self.board.scan_done(self.reports.iter().filter_map(|t| t.nis));
         }
-        stages.n_tracks = tracks.len();
         stages.last = Some((stages.scan.time, at));
         stages.n_steps += 1;
     }
@@ -305,11 +288,40 @@ impl<'o> Live<'o> {
         self.track(stages, None, unix_s(SystemTime::now()), now.checked_sub(lag).unwrap_or(now));
     }
 
+    /// Takes a changed parameter; with another tracker the tracks of the one before end.
+    fn retune(&mut self, stages: &mut Stages, change: Change) {
+        let (name, words) = (&self.board.source, change.words());
+        let text = stages.retune(change).and_then(|()| stages.config.to_toml());
+        match text {
+            Ok(toml) => {
+                self.board.say(&format!("{name}: changed on the page: {words}"));
+                let mut reasons = self.board.configuration().1;
+                reasons.push(format!("Changed on the page: {words}."));
+                self.board.configured(toml, reasons);
+                self.outputs.iter_mut().for_each(|output| output.configured(&stages.config));
+                if !change.is_of_detector() {
+                    self.end_tracks();
+                }
+            }
+            Err(e) => self.board.say(&format!("warning: {name}: {words} is not taken: {e}")),
+        }
+    }
+
+    fn end_tracks(&mut self) {
+        self.lines.clear();
+        self.lives.end(&self.board.source, &mut self.lines);
+        for line in self.lines.drain(..) {
+            let event = Event { is_status: false, json: line.into() };
+            self.outputs.iter_mut().for_each(|output| output.event(&event));
+        }
+    }
+
     fn refuse(&mut self, e: &Error) {
         if self.board.counts.refused.fetch_add(1, Ordering::Relaxed) == 0 {
             let why = e.to_string();
             let why = why.lines().next().unwrap_or_default();
-            self.board.say(&format!("warning: a frame is left out, and others like it: {why}"));
+            let name = &self.board.source;
+            self.board.say(&format!("warning: {name}: a frame is left out, and others like it: {why}"));
         }
     }
 
@@ -325,36 +337,10 @@ impl<'o> Live<'o> {
     }
 
     fn end(&mut self, why: &str) {
-        self.lines.clear();
-        self.lives.end(&self.board.source, &mut self.lines);
-        for line in self.lines.drain(..) {
-            let event = Event { is_status: false, json: line.into() };
-            self.outputs.iter_mut().for_each(|output| output.event(&event));
-        }
+        self.end_tracks();
         self.board.counts.now.store(0, Ordering::Relaxed);
         self.board.set(State::Ended, why);
         self.tell_state();
         self.outputs.iter_mut().for_each(|output| output.finish());
-    }
-}
-
-impl Stages {
-    /// Builds the detector anew where the size or type of the frames has changed.
-    fn fit(&mut self, frame: &Frame, board: &Board) -> Result<()> {
-        let size = (frame.pixels.width(), frame.pixels.height(), frame.pixels.kind());
-        if self.detector.is_some() && self.size.is_none_or(|s| s == size) {
-            self.size = Some(size);
-            return Ok(());
-        }
-        if self.size.is_some() {
-            board.say(&format!("frames have {} x {} pixels now; the detector starts anew", size.0, size.1));
-        }
-        let info = info_of(frame, &board.source);
-        self.detector = Some(
-            vision::build(&self.config.detector, &info)
-                .map_err(|e| Error::new(ErrorKind::Config, "the configuration does not fit the frames").because(e))?,
-        );
-        self.size = Some(size);
-        Ok(())
     }
 }

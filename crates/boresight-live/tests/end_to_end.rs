@@ -37,13 +37,13 @@ fn recorded(dir: &Path, ending: &str) -> String {
 #[test]
 fn page_wire_and_record_show_the_same_states_near_the_truth() {
     let (board, dir) = (board(), tempfile::tempdir().unwrap());
-    let page = Page::serve(&PageOptions::at("127.0.0.1:0".parse().unwrap()), Arc::clone(&board)).unwrap();
+    let page = Page::serve(&PageOptions::at("127.0.0.1:0".parse().unwrap()), &[Arc::clone(&board)]).unwrap();
     let to = page.address();
     let wire = UdpSocket::bind("127.0.0.1:0").unwrap();
     let target = Target::parse(&format!("udp://{}", wire.local_addr().unwrap())).unwrap();
     let record = Record::create(dir.path(), RecordOptions::default()).unwrap();
     let mut outputs: Vec<Box<dyn LiveOutput>> =
-        vec![Box::new(record), publisher(&target, &board).unwrap(), page.output().unwrap()];
+        vec![Box::new(record), publisher(&target, &board).unwrap(), page.output(0).unwrap()];
     let datagrams = std::thread::spawn(move || collect_udp(&wire));
     let mut stream = TcpStream::connect(to).unwrap();
     write!(stream, "GET /api/stream HTTP/1.1\r\nHost: {to}\r\n\r\n").unwrap();
@@ -145,7 +145,7 @@ fn page_wire_and_record_show_the_same_states_near_the_truth() {
     }
     assert!(n_near > 60, "{n_near}");
     let (_, _, metrics) = get(to, "/metrics");
-    assert!(metrics.contains("boresight_tracks_total 2\n"), "{metrics}");
+    assert!(metrics.contains("boresight_tracks_total{source=\"cam\"} 2\n"), "{metrics}");
 }
 
 /// Records a run of the scene and returns where.

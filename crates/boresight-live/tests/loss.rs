@@ -77,7 +77,7 @@ fn a_source_that_comes_back_finds_its_tracks() {
     let target = Target::parse(&format!("udp://{}", wire.local_addr().unwrap())).unwrap();
     let mut outputs: Vec<Box<dyn LiveOutput>> = vec![publisher(&target, &board).unwrap()];
     let datagrams = std::thread::spawn(move || collect_udp(&wire));
-    let pauses = Pauses { first: Duration::from_millis(20), longest: Duration::from_millis(50) };
+    let pauses = Pauses { first: Duration::from_millis(20), longest: Duration::from_millis(50), ..Pauses::default() };
     let options = RunOptions { config: Some(config()), updates_hz: f64::INFINITY, pauses, ..RunOptions::default() };
     let counts = &board.counts;
     let enough = || counts.tracked.load(Ordering::SeqCst) >= 120;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 fn page(address: &str) -> Page {
-    Page::serve(&PageOptions::at(address.parse().unwrap()), board()).unwrap()
+    Page::serve(&PageOptions::at(address.parse().unwrap()), &[board()]).unwrap()
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn on_any_other_address_the_token_is_the_only_way_in() {
 fn places_are_limited_and_given_back() {
     let board = board();
     let options = PageOptions { most_viewers: 2, ..PageOptions::at("127.0.0.1:0".parse().unwrap()) };
-    let page = Page::serve(&options, Arc::clone(&board)).unwrap();
+    let page = Page::serve(&options, &[Arc::clone(&board)]).unwrap();
     let to = page.address();
     let (first, _second) = (Viewer::enter(to, "").ok().unwrap(), Viewer::enter(to, "").ok().unwrap());
     assert_eq!(Viewer::enter(to, "").err(), Some(503));
@@ -117,7 +117,7 @@ fn places_are_limited_and_given_back() {
 #[test]
 fn fifty_viewers_one_of_them_stalled_hold_up_nobody() {
     let board = board();
-    let page = Page::serve(&PageOptions::at("127.0.0.1:0".parse().unwrap()), Arc::clone(&board)).unwrap();
+    let page = Page::serve(&PageOptions::at("127.0.0.1:0".parse().unwrap()), &[Arc::clone(&board)]).unwrap();
     let to = page.address();
     // This one never reads, and never says that it has drawn.
     let stalled = Viewer::enter(to, "").ok().unwrap();
@@ -141,7 +141,7 @@ fn fifty_viewers_one_of_them_stalled_hold_up_nobody() {
         })
         .collect();
     assert_eq!(board.counts.viewers.load(Ordering::SeqCst), 50);
-    let mut outputs: Vec<Box<dyn LiveOutput>> = vec![page.output().unwrap()];
+    let mut outputs: Vec<Box<dyn LiveOutput>> = vec![page.output(0).unwrap()];
     let options = RunOptions { config: Some(config()), ..RunOptions::default() };
     // Every frame waits to be taken here: the run ends only if no viewer holds it up.
     run(Box::new(ScenePlug::of(scene(100, 50.0), true)), &options, &board, &mut outputs, &|| false).unwrap();

@@ -5,11 +5,11 @@ use crate::console::{print, say};
 use boresight::auto::DetectorKind;
 use boresight::{Config, Error, ErrorKind};
 use boresight_live::{
-    Address, Board, LiveOutput, Page, PageOptions, Record, RecordOptions, RunOptions, Target, latency, publisher, run,
-    soak,
+    Address, Board, LiveOutput, NamedSource, OneRun, Page, PageOptions, Pauses, Record, RecordOptions, RunOptions,
+    Target, latency, name_sources, publisher, run_all, soak,
 };
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,6 +21,8 @@ const EXAMPLES: &str = "Examples:
       anything an installed ffmpeg can read; events to a broker, tables to kept/
   boresight live flight.mp4 --pace --serve 0.0.0.0:8090
       a file played by the clock, on a page for others, who need the token that is printed
+  boresight live north=/dev/video0 south=rtsp://camera/stream --serve 127.0.0.1:8090 --record kept
+      two cameras, each with its tracker; tables in kept/north and kept/south
   boresight live - --publish - < scans.jsonl
       detections as JSON lines in, events as JSON lines out
   boresight live --latency-test
@@ -30,12 +32,13 @@ const EXAMPLES: &str = "Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A stream's address, a camera (/dev/video0), a file, or `-`: YUV4MPEG2, GIF or JSON lines of detections on standard input.
+    /// A stream's address, a camera (/dev/video0), a file, or `-`: YUV4MPEG2, GIF or JSON lines of detections on standard input. Several run at once;
+    /// `NAME=SOURCE` names one.
     #[arg(value_name = "SOURCE", required_unless_present_any = ["latency_test", "soak"])]
-    source: Option<String>,
-    /// Configuration file; without it everything is chosen by looking at the first seconds.
+    sources: Vec<String>,
+    /// Configuration file; without it everything is chosen by looking at the first seconds. `NAME=FILE` holds for the source of that name alone. Can be repeated.
     #[arg(short, long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    config: Vec<String>,
     /// Detector, instead of the one chosen, with the tracker that fits it: isolated, cfar, integrate, moving, spot, local.
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     detector: Option<DetectorKind>,
@@ -54,16 +57,19 @@ pub struct Args {
     /// Show a page at this address, such as 127.0.0.1:8090. Any but this machine's own address demands a token, which is printed.
     #[arg(long, value_name = "ADDRESS")]
     serve: Option<String>,
+    /// Let the page change a few parameters while the run goes on; each change is said, and shown as TOML to copy.
+    #[arg(long, requires = "serve")]
+    tune: bool,
     /// A name of this machine by which browsers may call the page, besides its numbers and localhost. Can be repeated.
     #[arg(long = "host", value_name = "NAME", requires = "serve")]
     hosts: Vec<String>,
-    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC. Can be repeated.
+    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. Can be repeated.
     #[arg(long, value_name = "URL")]
     publish: Vec<String>,
     /// Updates of each track a second that are published, at most.
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = above_0)]
     updates_hz: f64,
-    /// Record detections and tracks in rolling files in this folder.
+    /// Record detections and tracks in rolling files in this folder; of several sources each in a folder of its own there.
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
     /// The oldest records go when all are larger than this, MB.
@@ -76,7 +82,7 @@ pub struct Args {
     #[arg(long, value_name = "MB", default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..))]
     segment_mb: u64,
     /// Measure the time from a frame to its tracks on the wire, with simulated cameras of 1280 x 720 at 30 frames/s; with --config, of that one.
-    #[arg(long, conflicts_with = "source")]
+    #[arg(long, conflicts_with = "sources")]
     latency_test: bool,
     /// Simulated cameras at once of `--latency-test`.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
@@ -85,7 +91,7 @@ pub struct Args {
     #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = above_0)]
     seconds: f64,
     /// Measure the growth of memory over so many simulated hours, as fast as they go.
-    #[arg(long, value_name = "HOURS", conflicts_with = "source", value_parser = above_0)]
+    #[arg(long, value_name = "HOURS", conflicts_with = "sources", value_parser = above_0)]
     soak: Option<f64>,
     /// Say nothing but errors and warnings.
     #[arg(short, long)]
@@ -114,13 +120,42 @@ pub fn run_live(args: &Args) -> anyhow::Result<ExitCode> {
     if let Some(hours) = args.soak {
         return measure_soak(hours);
     }
-    let source = args.source.clone().unwrap_or_default();
-    let options = options(args)?;
+    let sources = name_sources(&args.sources)?;
+    let is_single = sources.len() == 1;
+    let options = sources.iter().map(|source| options(args, &source.name, &sources)).collect::<Result<Vec<_>, _>>()?;
     let targets = args.publish.iter().map(|url| Target::parse(url)).collect::<boresight::Result<Vec<_>>>()?;
-    let board = Arc::new(Board::new(shown_name(&source), if args.quiet { warnings_only } else { line }));
-    let page = args.serve.as_deref().map(|address| serve(address, args, &board)).transpose()?;
+    let say = if args.quiet { warnings_only } else { line };
+    let boards: Vec<_> = sources.iter().map(|source| Arc::new(Board::new(&source.name, say))).collect();
+    let page = args.serve.as_deref().map(|address| serve(address, args, &boards)).transpose()?;
+    let stop = Stop::on_signal()?;
+    let mut runs = Vec::new();
+    for (k, ((NamedSource { name, source }, mut options), board)) in
+        sources.into_iter().zip(options).zip(boards).enumerate()
+    {
+        // A single one writes where it is told; several beside each other, under their names.
+        let within = (!is_single).then_some(&*name);
+        options.pauses.from_the_start = !is_single;
+        let outputs = outputs(args, &targets, page.as_ref(), k, within, &board)?;
+        let connect = Box::new(Address::new(&source, options.base.input.clone(), args.pace, args.rate_hz.is_some()));
+        runs.push(OneRun { connect, options, board, outputs });
+    }
+    stop.run_begins();
+    run_all(runs, &|| stop.go_on().is_break())?;
+    Ok(if stop.go_on().is_break() { ExitCode::from(130) } else { ExitCode::SUCCESS })
+}
+
+/// What takes the tracks of the source with this number: record, wire, page. `within`: its name, where there are several.
+fn outputs(
+    args: &Args,
+    targets: &[Target],
+    page: Option<&Page>,
+    source: usize,
+    within: Option<&str>,
+    board: &Arc<Board>,
+) -> anyhow::Result<Vec<Box<dyn LiveOutput>>> {
     let mut outputs: Vec<Box<dyn LiveOutput>> = Vec::new();
     if let Some(dir) = &args.record {
+        let dir = within.map_or_else(|| dir.clone(), |name| dir.join(name));
         let limits = RecordOptions {
             segment_bytes: args.segment_mb << 20,
             most_bytes: args.record_mb << 20,
@@ -129,27 +164,42 @@ pub fn run_live(args: &Args) -> anyhow::Result<ExitCode> {
         };
         outputs.push(Box::new(Record::create(dir, limits)?));
     }
-    for target in &targets {
-        outputs.push(publisher(target, &board)?);
+    for target in targets {
+        let target = within.map_or_else(|| target.clone(), |name| target.of_source(name));
+        outputs.push(publisher(&target, board)?);
     }
-    if let Some(page) = &page {
-        outputs.push(page.output()?);
+    if let Some(page) = page {
+        outputs.push(page.output(source)?);
     }
-    let stop = Stop::on_signal()?;
-    let address = Address::new(&source, options.base.input.clone(), args.pace, args.rate_hz.is_some());
-    stop.run_begins();
-    run(Box::new(address), &options, &board, &mut outputs, &|| stop.go_on().is_break())?;
-    Ok(if stop.go_on().is_break() { ExitCode::from(130) } else { ExitCode::SUCCESS })
+    Ok(outputs)
 }
 
-fn options(args: &Args) -> anyhow::Result<RunOptions> {
+/// The configuration file of a source: the one for its name, else the one for all.
+fn config_file<'a>(given: &'a [String], name: &str, sources: &[NamedSource]) -> boresight::Result<Option<&'a Path>> {
+    let split = |text: &'a str| match text.split_once('=') {
+        Some((name, file)) if sources.iter().any(|s| s.name == name) => (Some(name), file),
+        _ => (None, text),
+    };
+    let of = |who: Option<&str>| {
+        let mut files = given.iter().map(|text| split(text)).filter(|(n, _)| *n == who).map(|(_, file)| file);
+        match (files.next(), files.next()) {
+            (first, None) => Ok(first.map(Path::new)),
+            (_, Some(second)) => Err(Error::new(ErrorKind::Config, "two configurations are given for one source")
+                .at(format!("--config {second}"))
+                .hint("give one for all (--config FILE), or one for each by its name: --config NAME=FILE")),
+        }
+    };
+    Ok(of(Some(name))?.or(of(None)?))
+}
+
+fn options(args: &Args, name: &str, sources: &[NamedSource]) -> anyhow::Result<RunOptions> {
     if args.detector == Some(DetectorKind::Colour) {
         return Err(Error::new(ErrorKind::Config, "a colour is learnt from a recording, not from a stream")
             .at("--detector colour")
             .hint("`boresight track --detector colour` on a recording writes a config.toml; give it by --config")
             .into());
     }
-    let config = args.config.as_deref().map(Config::from_file).transpose()?;
+    let config = config_file(&args.config, name, sources)?.map(Config::from_file).transpose()?;
     let mut base = config.clone().unwrap_or_default();
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
@@ -164,24 +214,11 @@ fn options(args: &Args) -> anyhow::Result<RunOptions> {
         detector: args.detector,
         learn_s: args.learn_s,
         updates_hz: args.updates_hz,
-        ..RunOptions::default()
+        pauses: Pauses::default(),
     })
 }
 
-/// The source's name without the password that may stand in an address.
-fn shown_name(source: &str) -> String {
-    match (source, source.split_once("://")) {
-        ("-", _) => "standard input".to_string(),
-        (_, Some((scheme, rest))) => {
-            let place = rest.find('/').unwrap_or(rest.len());
-            let from = rest[..place].rfind('@').map_or(0, |at| at + 1);
-            format!("{scheme}://{}", &rest[from..])
-        }
-        _ => source.to_string(),
-    }
-}
-
-fn serve(address: &str, args: &Args, board: &Arc<Board>) -> anyhow::Result<Page> {
+fn serve(address: &str, args: &Args, boards: &[Arc<Board>]) -> anyhow::Result<Page> {
     let wrong = || {
         let error = Error::new(ErrorKind::Config, "expected an address of this machine and a port");
         error
@@ -189,7 +226,8 @@ fn serve(address: &str, args: &Args, board: &Arc<Board>) -> anyhow::Result<Page>
             .hint("127.0.0.1:8090 for this machine alone, 0.0.0.0:8090 for others as well")
     };
     let found: SocketAddr = address.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(wrong)?;
-    let page = Page::serve(&PageOptions { names: args.hosts.clone(), ..PageOptions::at(found) }, Arc::clone(board))?;
+    let page =
+        Page::serve(&PageOptions { names: args.hosts.clone(), tune: args.tune, ..PageOptions::at(found) }, boards)?;
     match page.token() {
         None => say!("page: http://{}/", page.address()),
         // The one time that it is shown.
@@ -205,7 +243,7 @@ fn serve(address: &str, args: &Args, board: &Arc<Board>) -> anyhow::Result<Page>
 }
 
 fn measure_latency(args: &Args) -> anyhow::Result<ExitCode> {
-    let config = args.config.as_deref().map(Config::from_file).transpose()?;
+    let config = config_file(&args.config, "", &[])?.map(Config::from_file).transpose()?;
     let measured = latency(args.streams.into(), args.seconds, config)?;
     let mut text = String::from("stream  frames  arrived  dropped   p50 ms   p99 ms  longest ms\n");
     for (k, m) in measured.iter().enumerate() {
@@ -251,9 +289,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_password_in_an_address_is_not_shown() {
-        assert_eq!(shown_name("rtsp://me:secret@cam/stream@1"), "rtsp://cam/stream@1");
-        assert_eq!(shown_name("rtsp://cam/a@b"), "rtsp://cam/a@b");
-        assert_eq!((shown_name("-"), shown_name("a@b.mp4")), ("standard input".into(), "a@b.mp4".into()));
+    fn a_source_takes_the_configuration_of_its_name_before_that_of_all() {
+        let sources = name_sources(&["a=x".to_string(), "b=y".to_string()]).unwrap();
+        let file = |given: &[&str], name: &str| {
+            let given: Vec<String> = given.iter().map(ToString::to_string).collect();
+            config_file(&given, name, &sources).map(|found| found.map(|p| p.display().to_string()))
+        };
+        assert_eq!(file(&["all.toml", "b=b.toml"], "a").unwrap().as_deref(), Some("all.toml"));
+        assert_eq!(file(&["all.toml", "b=b.toml"], "b").unwrap().as_deref(), Some("b.toml"));
+        assert_eq!(file(&["b=b.toml"], "a").unwrap(), None);
+        assert_eq!(file(&["c=c.toml"], "a").unwrap().as_deref(), Some("c=c.toml"), "no source has that name");
+        assert!(file(&["x.toml", "y.toml"], "a").unwrap_err().to_string().contains("NAME=FILE"));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::camera::{CameraPlug, View};
 use crate::board::{Board, read};
+use crate::cbor::Form;
 use crate::output::LiveOutput;
 use crate::publish::Udp;
 use crate::run::{RunOptions, run};
@@ -71,7 +72,7 @@ fn one(seconds: f64, config: Config) -> Result<Latency> {
 
     let n_frames = ((seconds + SETTLES_S) * RATE_HZ) as u64;
     let board = Arc::new(Board::new("simulated", |_| {}));
-    let mut outputs: Vec<Box<dyn LiveOutput>> = vec![Box::new(Udp::open(&address.to_string())?)];
+    let mut outputs: Vec<Box<dyn LiveOutput>> = vec![Box::new(Udp::open(&address.to_string(), Form::Json)?)];
     let options = RunOptions { updates_hz: f64::INFINITY, config: Some(config), ..RunOptions::default() };
     let outcome = run(Box::new(CameraPlug(view(n_frames), Some(started))), &options, &board, &mut outputs, &|| false);
     over.store(true, Ordering::SeqCst);

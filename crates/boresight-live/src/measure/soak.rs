@@ -2,6 +2,7 @@
 
 use super::camera::{CameraPlug, View};
 use crate::board::{Board, read};
+use crate::cbor::Form;
 use crate::output::{LiveOutput, Shown};
 use crate::publish::Udp;
 use crate::record::{Record, RecordOptions};
@@ -73,7 +74,7 @@ pub fn soak(hours: f64, folder: &std::path::Path) -> Result<Soak> {
     let n_frames = (hours * 3600.0 * rate_hz) as u64 + 1;
     let view = View { size_px: [128, 96], rate_hz, n_frames, n_targets: 3, seen_s: 40.0 };
     let board = Arc::new(Board::new("simulated", |_| {}));
-    let page = Page::serve(&PageOptions::at(([127, 0, 0, 1], 0).into()), Arc::clone(&board))?;
+    let page = Page::serve(&PageOptions::at(([127, 0, 0, 1], 0).into()), &[Arc::clone(&board)])?;
     let failed = |e: std::io::Error| Error::new(ErrorKind::Output, "no socket can be had").because(e);
     let sink = UdpSocket::bind("127.0.0.1:0").map_err(failed)?;
     let to = sink.local_addr().map_err(failed)?.to_string();
@@ -82,7 +83,7 @@ pub fn soak(hours: f64, folder: &std::path::Path) -> Result<Soak> {
     let scale = Scale { samples: Arc::clone(&samples), next_s: 3600.0 };
     let record = Record::create(folder, limits)?;
     let mut outputs: Vec<Box<dyn LiveOutput>> =
-        vec![page.output()?, Box::new(Udp::open(&to)?), Box::new(record), Box::new(scale)];
+        vec![page.output(0)?, Box::new(Udp::open(&to, Form::Json)?), Box::new(record), Box::new(scale)];
     let config = Some(Config::from_toml(CONFIG, "soak")?);
     let options = RunOptions { config, ..RunOptions::default() };
     run(Box::new(CameraPlug(view, None)), &options, &board, &mut outputs, &|| false)?;

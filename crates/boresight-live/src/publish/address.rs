@@ -1,11 +1,20 @@
 //! Where events go, from what stands on the command line.
 
+use crate::cbor::Form;
 use boresight::{Error, ErrorKind, Result};
 
 /// Longest topic, bytes.
 const MAX_TOPIC: usize = 512;
-/// The port of MQTT without TLS.
+/// The ports of MQTT without TLS and of NATS.
 const MQTT_PORT: u16 = 1883;
+#[cfg(feature = "nats")]
+const NATS_PORT: u16 = 4222;
+/// What is understood.
+const KNOWN: &str = if cfg!(feature = "nats") {
+    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT; ?cbor behind it for CBOR"
+} else {
+    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; ?cbor behind it for CBOR"
+};
 
 /// A place for events.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,33 +25,69 @@ pub enum Target {
     Udp {
         /// Name or number of the host, and the port.
         address: String,
+        /// How events are written.
+        form: Form,
     },
-    /// A broker.
+    /// An MQTT broker.
     Mqtt(Broker),
+    /// A NATS server.
+    #[cfg(feature = "nats")]
+    Nats(Broker),
 }
 
 /// A broker's address.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Broker {
+    /// What it speaks: `mqtt` or `nats`.
+    pub scheme: &'static str,
     /// Name or number of the host.
     pub host: String,
     /// Port.
     pub port: u16,
-    /// Topic of the tracks' events; the state of the run goes to `TOPIC/status`.
+    /// Topic of the tracks' events; the state of the run goes to `status` below it.
     pub topic: String,
     /// User and password.
     pub user: Option<(String, String)>,
+    /// How events are written.
+    pub form: Form,
 }
 
 impl std::fmt::Debug for Broker {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // The password stays unsaid.
-        write!(f, "mqtt://{}:{}/{}", self.host, self.port, self.topic)
+        write!(f, "{}://{}:{}/{}", self.scheme, self.host, self.port, self.topic)
+    }
+}
+
+impl Broker {
+    /// Reads `[USER:PASSWORD@]HOST[:PORT]/TOPIC`.
+    fn parse(
+        scheme: &'static str,
+        rest: &str,
+        form: Form,
+        port: u16,
+        is_topic: impl Fn(&str) -> bool,
+        expected: &'static str,
+    ) -> std::result::Result<Self, &'static str> {
+        let Some((place, topic)) = rest.split_once('/') else { return Err("the topic is missing") };
+        if topic.is_empty() || topic.len() > MAX_TOPIC || !is_topic(topic) {
+            return Err(expected);
+        }
+        let (user, place) = match place.rsplit_once('@') {
+            Some((user, place)) => {
+                let (name, password) = user.split_once(':').unwrap_or((user, ""));
+                (Some((name.to_string(), password.to_string())), place)
+            }
+            None => (None, place),
+        };
+        let (host, port) = host_and_port(place, Some(port)).ok_or("expected HOST:PORT")?;
+        let host = host.trim_matches(['[', ']']).to_string();
+        Ok(Self { scheme, host, port, topic: topic.to_string(), user, form })
     }
 }
 
 impl Target {
-    /// Reads `-`, `udp://HOST:PORT` or `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC`.
+    /// Reads `-`; or, with `?cbor` behind it where events shall be CBOR, `udp://HOST:PORT`, `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC` or, with the feature `nats`, `nats://..`.
     /// # Errors
     /// [`ErrorKind::Config`] for anything else.
     pub fn parse(text: &str) -> Result<Self> {
@@ -53,40 +98,55 @@ impl Target {
         };
         let wrong = |what: &str| {
             let error = Error::new(ErrorKind::Config, what).at(&shown);
-            error.hint("give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC")
+            error.hint(KNOWN)
         };
         if text == "-" {
             return Ok(Self::Standard);
         }
         let Some((scheme, rest)) = text.split_once("://") else { return Err(wrong("expected an address")) };
+        let (rest, form) = match rest.strip_suffix("?cbor") {
+            Some(rest) => (rest, Form::Cbor),
+            None => (rest, Form::Json),
+        };
         match scheme {
             "udp" => {
                 let (host, port) =
                     host_and_port(rest.trim_end_matches('/'), None).ok_or_else(|| wrong("expected HOST:PORT"))?;
-                Ok(Self::Udp { address: format!("{host}:{port}") })
+                Ok(Self::Udp { address: format!("{host}:{port}"), form })
             }
             "mqtt" => {
-                let Some((place, topic)) = rest.split_once('/') else { return Err(wrong("the topic is missing")) };
                 let bad = |c: char| c.is_control() || c == '#' || c == '+';
-                if topic.is_empty() || topic.len() > MAX_TOPIC || topic.contains(bad) || topic.ends_with('/') {
-                    return Err(wrong("expected a topic without wildcards (# and +), such as site/camera"));
-                }
-                let (user, place) = match place.rsplit_once('@') {
-                    Some((user, place)) => {
-                        let (name, password) = user.split_once(':').unwrap_or((user, ""));
-                        (Some((name.to_string(), password.to_string())), place)
-                    }
-                    None => (None, place),
-                };
-                let (host, port) = host_and_port(place, Some(MQTT_PORT)).ok_or_else(|| wrong("expected HOST:PORT"))?;
-                Ok(Self::Mqtt(Broker {
-                    host: host.trim_matches(['[', ']']).to_string(),
-                    port,
-                    topic: topic.to_string(),
-                    user,
-                }))
+                let is_topic = |topic: &str| !topic.contains(bad) && !topic.ends_with('/');
+                let wildcards = "expected a topic without wildcards (# and +), such as site/camera";
+                Ok(Self::Mqtt(Broker::parse("mqtt", rest, form, MQTT_PORT, is_topic, wildcards).map_err(wrong)?))
             }
+            #[cfg(feature = "nats")]
+            "nats" => {
+                // A slash tells levels apart in an address, a dot in a subject.
+                let bad = |c: char| c.is_control() || c.is_whitespace() || c == '*' || c == '>';
+                let is_subject = |topic: &str| !topic.contains(bad) && topic.split(['.', '/']).all(|t| !t.is_empty());
+                let wildcards = "expected a subject without wildcards (* and >) and spaces, such as site.camera";
+                let mut broker = Broker::parse("nats", rest, form, NATS_PORT, is_subject, wildcards).map_err(wrong)?;
+                broker.topic = broker.topic.replace('/', ".");
+                Ok(Self::Nats(broker))
+            }
+            #[cfg(not(feature = "nats"))]
+            "nats" => Err(Error::new(ErrorKind::Config, "this build does not speak nats://")
+                .at(&shown)
+                .hint("build it with: cargo install --path crates/boresight-cli --features nats")),
             other => Err(wrong(&format!("{other}:// is not spoken here"))),
+        }
+    }
+}
+
+impl Target {
+    /// The same for one of several sources: its topics lie below that of the target, under its name.
+    pub fn of_source(&self, name: &str) -> Self {
+        match self {
+            Self::Mqtt(broker) => Self::Mqtt(Broker { topic: format!("{}/{name}", broker.topic), ..broker.clone() }),
+            #[cfg(feature = "nats")]
+            Self::Nats(broker) => Self::Nats(Broker { topic: format!("{}.{name}", broker.topic), ..broker.clone() }),
+            Self::Standard | Self::Udp { .. } => self.clone(),
         }
     }
 }
@@ -112,7 +172,10 @@ mod tests {
         };
         assert_eq!(broker("mqtt://b/a/c"), ("b".into(), 1883, "a/c".into(), None));
         assert_eq!(broker("mqtt://u:p@[::1]:99/t"), ("::1".into(), 99, "t".into(), Some(("u".into(), "p".into()))));
-        assert_eq!(Target::parse("udp://[::1]:9").unwrap(), Target::Udp { address: "[::1]:9".into() });
+        assert_eq!(
+            Target::parse("udp://[::1]:9").unwrap(),
+            Target::Udp { address: "[::1]:9".into(), form: Form::Json }
+        );
         for bad in [
             "",
             "udp://h",
@@ -121,16 +184,44 @@ mod tests {
             "mqtt://h",
             "mqtt://h/",
             "mqtt://h/a/#",
-            "nats://h:1/x",
+            "ftp://h:1/x",
             "udp://h:70000",
         ] {
             assert!(Target::parse(bad).unwrap_err().to_string().contains("hint: give -"), "{bad}");
         }
+        let Target::Mqtt(cbor) = Target::parse("mqtt://b/a?cbor").unwrap() else { panic!("mqtt") };
+        assert_eq!((cbor.topic.as_str(), cbor.form), ("a", Form::Cbor));
+        let Target::Mqtt(north) = Target::parse("mqtt://b/a").unwrap().of_source("north") else { panic!("mqtt") };
+        assert_eq!(north.topic, "a/north");
         let said = format!(
             "{} {:?}",
             Target::parse("mqtt://u:secret@h").unwrap_err(),
             Target::parse("mqtt://u:secret@h/t").unwrap()
         );
         assert!(!said.contains("secret"), "{said}");
+    }
+
+    #[test]
+    #[cfg(feature = "nats")]
+    fn a_subject_has_dots_and_no_wildcards() {
+        let broker = |text: &str| match Target::parse(text) {
+            Ok(Target::Nats(b)) => (b.host, b.port, b.topic, b.user),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(broker("nats://b/a/c.d"), ("b".into(), 4222, "a.c.d".into(), None));
+        assert_eq!(broker("nats://t@b:9/a"), ("b".into(), 9, "a".into(), Some(("t".into(), String::new()))));
+        for bad in
+            ["nats://h", "nats://h/", "nats://h/a.", "nats://h/a..b", "nats://h/a.*", "nats://h/>", "nats://h/a b"]
+        {
+            assert!(Target::parse(bad).unwrap_err().to_string().contains("nats://"), "{bad}");
+        }
+        let Target::Nats(north) = Target::parse("nats://b/a").unwrap().of_source("north") else { panic!("nats") };
+        assert_eq!((north.topic.as_str(), format!("{north:?}").as_str()), ("a.north", "nats://b:4222/a.north"));
+    }
+
+    #[test]
+    #[cfg(not(feature = "nats"))]
+    fn what_was_not_built_is_said_with_its_mend() {
+        assert!(Target::parse("nats://h/a").unwrap_err().to_string().contains("--features nats"));
     }
 }

@@ -7,6 +7,7 @@
 
 use super::address::Broker;
 use crate::board::{Board, unix_s};
+use crate::cbor::Form;
 use crate::event::{Event, status_line};
 use crate::output::{LiveOutput, Shown};
 use crate::queue::Queue;
@@ -108,11 +109,11 @@ impl Mqtt {
         });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let (client, events) = AsyncClient::new(options(broker, &board), 2 * WINDOW);
-        let (topic, name) = (broker.topic.clone(), format!("{broker:?}"));
+        let (topic, form, name) = (broker.topic.clone(), broker.form, format!("{broker:?}"));
         let here = Arc::clone(&shared);
         let work = move || {
             runtime.block_on(async {
-                let feeding = feed(&here, &client, &topic);
+                let feeding = feed(&here, &client, &topic, form);
                 tokio::select! {
                     () = poll(&here, events, &board, &name) => {}
                     () = feeding => {}
@@ -132,7 +133,12 @@ fn options(broker: &Broker, board: &Board) -> MqttOptions {
     let mut options = MqttOptions::new(format!("boresight-{id}"), &broker.host, broker.port);
     options.set_keep_alive(Duration::from_secs(10)).set_inflight(WINDOW as u16).set_clean_session(true);
     let gone = status_line(&board.source, "gone", "the program ended without a word", unix_s(SystemTime::now()));
-    options.set_last_will(LastWill::new(format!("{}/status", broker.topic), gone, QoS::AtLeastOnce, true));
+    options.set_last_will(LastWill::new(
+        format!("{}/status", broker.topic),
+        broker.form.bytes(&gone),
+        QoS::AtLeastOnce,
+        true,
+    ));
     if let Some((user, password)) = &broker.user {
         options.set_credentials(user, password);
     }
@@ -140,13 +146,13 @@ fn options(broker: &Broker, board: &Board) -> MqttOptions {
 }
 
 /// Hands events to the client while there is room.
-async fn feed(shared: &Shared, client: &AsyncClient, topic: &str) {
+async fn feed(shared: &Shared, client: &AsyncClient, topic: &str, form: Form) {
     let status = format!("{topic}/status");
     loop {
         while let Some(event) = shared.next() {
             let to = if event.is_status { &status } else { topic };
             // There is room: the client's queue is twice the window. Were it full all the same, the next connection sends it again.
-            let _ = client.try_publish(to, QoS::AtLeastOnce, event.is_status, event.json.as_bytes());
+            let _ = client.try_publish(to, QoS::AtLeastOnce, event.is_status, form.bytes(&event.json));
         }
         if shared.over.load(Ordering::SeqCst) && shared.is_done() {
             let _ = client.try_disconnect();
@@ -182,7 +188,9 @@ async fn poll(shared: &Shared, mut events: EventLoop, board: &Board, name: &str)
                 events.clean();
                 // They are sent again from our own list, which a broker that has forgotten the session does not shorten.
                 events.pending.clear();
-                if !std::mem::replace(&mut said, true) {
+                // Behind the last word the broker closes: that is no loss.
+                let has_parted = shared.over.load(Ordering::SeqCst) && shared.is_done();
+                if !has_parted && !std::mem::replace(&mut said, true) {
                     board.say(&format!("warning: {name}: {e}; events wait, at most {WAITING}"));
                 }
                 tokio::time::sleep(pause).await;

@@ -15,7 +15,9 @@ use std::sync::Arc;
 pub fn publisher(target: &Target, board: &Arc<Board>) -> Result<Box<dyn LiveOutput>> {
     Ok(match target {
         Target::Standard => Box::new(Lines::start(std::io::stdout())?),
-        Target::Udp { address } => Box::new(Udp::open(address)?),
+        Target::Udp { address, form } => Box::new(Udp::open(address, *form)?),
+        #[cfg(feature = "nats")]
+        Target::Nats(broker) => Box::new(super::nats::Nats::start(broker, Arc::clone(board))?),
         Target::Mqtt(broker) => Box::new(Mqtt::start(broker, Arc::clone(board))?),
     })
 }

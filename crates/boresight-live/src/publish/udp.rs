@@ -1,5 +1,6 @@
 //! Events as datagrams, one each: nobody is waited for, and what the network loses is lost.
 
+use crate::cbor::Form;
 use crate::event::Event;
 use crate::output::{LiveOutput, Shown};
 use boresight::{Error, ErrorKind, Result};
@@ -9,6 +10,7 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 pub struct Udp {
     socket: UdpSocket,
     to: SocketAddr,
+    form: Form,
     dropped: u64,
 }
 
@@ -16,7 +18,7 @@ impl Udp {
     /// Finds the address and opens a socket.
     /// # Errors
     /// A name that is not known.
-    pub fn open(address: &str) -> Result<Self> {
+    pub fn open(address: &str, form: Form) -> Result<Self> {
         let failed = |e: std::io::Error| {
             Error::new(ErrorKind::Output, "cannot be sent to").at(format!("udp://{address}")).because(e)
         };
@@ -27,7 +29,7 @@ impl Udp {
         let any: SocketAddr = if to.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
         let socket = UdpSocket::bind(any).map_err(failed)?;
         socket.set_nonblocking(true).map_err(failed)?;
-        Ok(Self { socket, to, dropped: 0 })
+        Ok(Self { socket, to, form, dropped: 0 })
     }
 }
 
@@ -39,7 +41,7 @@ impl LiveOutput for Udp {
 
     fn event(&mut self, event: &Event) {
         // A full buffer, a network that is down, a listener that is not there: counted, never waited for.
-        self.dropped += u64::from(self.socket.send_to(event.json.as_bytes(), self.to).is_err());
+        self.dropped += u64::from(self.socket.send_to(&self.form.bytes(&event.json), self.to).is_err());
     }
 
     fn dropped(&self) -> u64 {

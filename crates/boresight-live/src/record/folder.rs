@@ -173,6 +173,8 @@ fn read_manifest(path: &Path) -> Vec<Entry> {
 impl LiveOutput for Record {
     fn configured(&mut self, config: &Config) {
         self.config = config.to_toml().unwrap_or_default();
+        // A segment has one configuration: what follows another goes into the next.
+        self.close();
     }
 
     fn put(&mut self, shown: &Shown<'_>) -> Result<()> {

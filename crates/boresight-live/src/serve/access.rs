@@ -3,6 +3,9 @@
 //! On a loopback address no token is asked for: the machine's own users may look, but a strange web page may not, so the host must be one of
 //! the machine's own names (a foreign name that was made to lead here is refused) and the origin this server. On any other address a token is
 //! asked for: 128 random bits, once in the address, then a cookie of its own. Secrets are compared in a time that does not depend on them.
+//!
+//! Where parameters may be changed, that is done by POST to `/api/config` alone, which must name this server as its origin (a browser always says it) and bring a token of its own,
+//! on loopback too: only who may read `/api/config` knows it.
 
 use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
 use boresight::{Error, ErrorKind, Result};
@@ -27,7 +30,14 @@ pub struct Access {
     address: SocketAddr,
     names: Vec<String>,
     secrets: Option<Secrets>,
+    /// The token that a change brings, where changes are allowed.
+    change: Option<String>,
 }
+
+/// The header with the token of a change.
+pub const CHANGE_HEADER: &str = "x-boresight-change";
+/// Where changes go.
+pub const CHANGE_PATH: &str = "/api/config";
 
 struct Secrets {
     token: String,
@@ -74,7 +84,19 @@ impl Access {
             true => None,
             false => Some(Secrets { token: random()?, cookie: random()? }),
         };
-        Ok(Self { address, names: names.iter().map(|n| n.to_ascii_lowercase()).collect(), secrets })
+        Ok(Self { address, names: names.iter().map(|n| n.to_ascii_lowercase()).collect(), secrets, change: None })
+    }
+
+    /// The same, where parameters may be changed.
+    /// # Errors
+    /// A system without randomness.
+    pub fn with_changes(self) -> Result<Self> {
+        Ok(Self { change: Some(random()?), ..self })
+    }
+
+    /// The token that a change must bring, where changes are allowed.
+    pub fn change_token(&self) -> Option<&str> {
+        self.change.as_deref()
     }
 
     /// The token, if one is asked for.
@@ -100,10 +122,11 @@ impl Access {
 
     /// Judges a request.
     pub fn judge(&self, method: &Method, uri: &Uri, headers: &HeaderMap) -> Verdict {
-        if method != Method::GET && method != Method::HEAD {
+        let changes = self.change.as_deref().filter(|_| method == Method::POST && uri.path() == CHANGE_PATH);
+        if method != Method::GET && method != Method::HEAD && changes.is_none() {
             return Verdict::Refuse(
                 StatusCode::METHOD_NOT_ALLOWED,
-                "nothing can be changed here: only GET is answered\n",
+                "nothing can be changed there: only GET is answered\n",
             );
         }
         let Some(Some(host)) = only(headers, &header::HOST) else {
@@ -123,6 +146,13 @@ impl Access {
         let fetch = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
         if fetch("sec-fetch-site") == Some("cross-site") && fetch("sec-fetch-mode") != Some("navigate") {
             return Verdict::Refuse(StatusCode::FORBIDDEN, "a page of another origin may not look\n");
+        }
+        if let Some(token) = changes {
+            let given = headers.get(CHANGE_HEADER).map(header::HeaderValue::as_bytes).unwrap_or_default();
+            if !headers.contains_key(header::ORIGIN) || given.len() > LONGEST || !is_same(given, token.as_bytes()) {
+                let why = "a change says its origin and brings the token of /api/config in x-boresight-change\n";
+                return Verdict::Refuse(StatusCode::FORBIDDEN, why);
+            }
         }
         let Some(secrets) = &self.secrets else { return Verdict::Pass };
         let cookies = headers.get_all(header::COOKIE).iter().filter_map(|c| c.to_str().ok()).flat_map(|c| c.split(';'));

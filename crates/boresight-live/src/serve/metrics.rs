@@ -4,47 +4,75 @@
 
 use crate::board::{Board, State, read};
 use std::fmt::Write;
+use std::sync::atomic::AtomicU64;
 
 /// Upper edges of the latency's buckets, s.
 const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
 
-/// The text.
-pub fn text(board: &Board) -> String {
-    let c = &board.counts;
+/// A number of a source: its name, its kind, what it is, and how it is had; `None`: it is not known yet.
+type Number = (&'static str, &'static str, &'static str, fn(&Board) -> Option<f64>);
+
+const NUMBERS: [Number; 17] = [
+    ("frames_total", "counter", "Frames or scans that came from the source.", |b| count(&b.counts.arrived)),
+    ("frames_tracked_total", "counter", "Frames that went through detector and tracker.", |b| count(&b.counts.tracked)),
+    ("frames_dropped_total", "counter", "Frames that a newer one replaced.", |b| count(&b.counts.dropped)),
+    ("frames_refused_total", "counter", "Frames that detector or tracker refused.", |b| count(&b.counts.refused)),
+    ("bad_lines_total", "counter", "Lines of detections that could not be read.", |b| count(&b.counts.bad_lines)),
+    ("source_lost_total", "counter", "Times that the source was lost.", |b| count(&b.counts.lost)),
+    ("detections_total", "counter", "Detections.", |b| count(&b.counts.detections)),
+    ("tracks_total", "counter", "Tracks that were confirmed.", |b| count(&b.counts.tracks)),
+    ("tracks", "gauge", "Confirmed tracks now.", |b| count(&b.counts.now)),
+    ("events_total", "counter", "Events for the wire.", |b| count(&b.counts.events)),
+    ("events_dropped_total", "counter", "Events that an output could not take.", |b| count(&b.counts.events_dropped)),
+    ("output_failures_total", "counter", "Frames that an output could not write.", |b| {
+        count(&b.counts.record_failures)
+    }),
+    ("viewers", "gauge", "Viewers of the page.", |b| count(&b.counts.viewers)),
+    ("rate_hz", "gauge", "Frames tracked a second.", |b| Some(b.rate_hz())),
+    ("running", "gauge", "1 while frames come.", |b| Some(f64::from(u8::from(b.said().state == State::Running)))),
+    ("nis_mean", "gauge", "Mean normalised squared innovation; 2 if consistent.", |b| b.mean_nis().map(|n| n.0)),
+    ("nis_count", "gauge", "Innovations behind the mean.", |b| b.mean_nis().map(|n| n.1 as f64)),
+];
+
+fn count(of: &AtomicU64) -> Option<f64> {
+    Some(read(of) as f64)
+}
+
+/// A name as the value of a label.
+fn label(source: &str) -> String {
+    source.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
+}
+
+/// The text: of each source under its name, and of the process.
+pub fn text(boards: &[&Board], n_refused: u64) -> String {
     let mut out = String::new();
-    let mut one = |name: &str, kind: &str, help: &str, value: f64| {
-        let _ =
-            writeln!(out, "# HELP boresight_{name} {help}\n# TYPE boresight_{name} {kind}\nboresight_{name} {value}");
+    let head = |out: &mut String, name: &str, kind: &str, help: &str| {
+        let _ = writeln!(out, "# HELP boresight_{name} {help}\n# TYPE boresight_{name} {kind}");
     };
-    one("frames_total", "counter", "Frames or scans that came from the source.", read(&c.arrived) as f64);
-    one("frames_tracked_total", "counter", "Frames that went through detector and tracker.", read(&c.tracked) as f64);
-    one("frames_dropped_total", "counter", "Frames that a newer one replaced.", read(&c.dropped) as f64);
-    one("frames_refused_total", "counter", "Frames that detector or tracker refused.", read(&c.refused) as f64);
-    one("bad_lines_total", "counter", "Lines of detections that could not be read.", read(&c.bad_lines) as f64);
-    one("source_lost_total", "counter", "Times that the source was lost.", read(&c.lost) as f64);
-    one("detections_total", "counter", "Detections.", read(&c.detections) as f64);
-    one("tracks_total", "counter", "Tracks that were confirmed.", read(&c.tracks) as f64);
-    one("tracks", "gauge", "Confirmed tracks now.", read(&c.now) as f64);
-    one("events_total", "counter", "Events for the wire.", read(&c.events) as f64);
-    one("events_dropped_total", "counter", "Events that an output could not take.", read(&c.events_dropped) as f64);
-    one("output_failures_total", "counter", "Frames that an output could not write.", read(&c.record_failures) as f64);
-    one("viewers", "gauge", "Viewers of the page.", read(&c.viewers) as f64);
-    one("requests_refused_total", "counter", "Requests that were refused.", read(&c.requests_refused) as f64);
-    one("rate_hz", "gauge", "Frames tracked a second.", board.rate_hz());
-    one("running", "gauge", "1 while frames come.", f64::from(u8::from(board.said().state == State::Running)));
-    if let Some((nis, _)) = board.mean_nis() {
-        one("nis_mean", "gauge", "Mean normalised squared innovation; 2 if consistent.", nis);
+    for (name, kind, help, value) in NUMBERS {
+        head(&mut out, name, kind, help);
+        for board in boards {
+            if let Some(value) = value(board) {
+                let _ = writeln!(out, "boresight_{name}{{source=\"{}\"}} {value}", label(&board.source));
+            }
+        }
     }
+    head(&mut out, "requests_refused_total", "counter", "Requests that were refused.");
+    let _ = writeln!(out, "boresight_requests_refused_total {n_refused}");
     if let Some(bytes) = resident_bytes() {
-        one("resident_bytes", "gauge", "Memory of the process.", bytes as f64);
+        head(&mut out, "resident_bytes", "gauge", "Memory of the process.");
+        let _ = writeln!(out, "boresight_resident_bytes {bytes}");
     }
-    let name = "boresight_latency_seconds";
-    let _ = writeln!(out, "# HELP {name} From the arrival of a frame to the last output.\n# TYPE {name} histogram");
-    for (edge, n) in EDGES_S.iter().zip(board.latency.cumulative(&EDGES_S)) {
-        let _ = writeln!(out, "{name}_bucket{{le=\"{edge}\"}} {n}");
+    head(&mut out, "latency_seconds", "histogram", "From the arrival of a frame to the last output.");
+    for board in boards {
+        let (name, source, latency) = ("boresight_latency_seconds", label(&board.source), &board.latency);
+        for (edge, n) in EDGES_S.iter().zip(latency.cumulative(&EDGES_S)) {
+            let _ = writeln!(out, "{name}_bucket{{source=\"{source}\",le=\"{edge}\"}} {n}");
+        }
+        let (n, sum) = (latency.n(), latency.sum_s());
+        let _ = writeln!(out, "{name}_bucket{{source=\"{source}\",le=\"+Inf\"}} {n}");
+        let _ = writeln!(out, "{name}_sum{{source=\"{source}\"}} {sum}\n{name}_count{{source=\"{source}\"}} {n}");
     }
-    let n = board.latency.n();
-    let _ = writeln!(out, "{name}_bucket{{le=\"+Inf\"}} {n}\n{name}_sum {}\n{name}_count {n}", board.latency.sum_s());
     out
 }
 
@@ -53,4 +81,20 @@ pub fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kib = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?.split_whitespace().next()?;
     kib.parse::<u64>().ok().map(|kib| kib << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_stands_once_under_each_source_and_a_name_cannot_break_its_line() {
+        let boards = [Board::new("north", |_| {}), Board::new("a\"b\\c\nd", |_| {})];
+        let text = text(&[&boards[0], &boards[1]], 3);
+        let lines = |start: &str| text.lines().filter(|l| l.starts_with(start)).count();
+        assert_eq!((lines("# TYPE boresight_frames_total "), lines("boresight_frames_total{")), (1, 2), "{text}");
+        assert_eq!((lines("# TYPE boresight_latency_seconds "), lines("boresight_latency_seconds_count{")), (1, 2));
+        assert!(text.contains("boresight_tracks{source=\"a\\\"b\\\\c\\nd\"} 0\n"), "{text}");
+        assert!(text.contains("boresight_requests_refused_total 3\n"));
+    }
 }

@@ -2,6 +2,7 @@
 
 mod access;
 mod hub;
+mod hubs;
 mod metrics;
 mod page_output;
 mod picture;

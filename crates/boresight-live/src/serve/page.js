@@ -5,13 +5,33 @@ const rows = new Map();
 const $ = (id) => document.getElementById(id);
 const canvas = $("picture"), shift = $("shift");
 let held = [], bytes = 0, paused = false, at = -1, chosen = null, drawn = null, bitmap = null, socket = null, pause_ms = 500;
+let source = new URLSearchParams(location.search).get("source");
 
 const colour = (id) => `hsl(${(id * 137.5) % 360} 85% 60%)`;
 const fixed = (v, n) => (Number.isFinite(v) ? v.toFixed(n) : "–");
 const speed = (t) => Math.hypot(t.vx_px_per_s, t.vy_px_per_s);
 
-function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/view`);
+/** Asks which sources there are, and shows the choice where there are several. */
+async function look_for_sources() {
+  const { sources } = await (await fetch("api/sources")).json();
+  if (!sources.some((s) => s.source === source)) source = sources[0].source;
+  const query = `?source=${encodeURIComponent(source)}`;
+  $("api-tracks").href = `api/tracks${query}`;
+  $("api-config").href = `api/config${query}`;
+  const box = $("sources"), names = sources.map((s) => s.source);
+  box.hidden = sources.length < 2;
+  $("source").hidden = !box.hidden;
+  if (names.join("\n") !== [...box.options].map((o) => o.value).join("\n")) {
+    box.replaceChildren(...names.map((name) => new Option(name, name)));
+  }
+  sources.forEach((s, k) => { box.options[k].text = s.state === "running" ? s.source : `${s.source} (${s.state})`; });
+  box.value = source;
+}
+
+async function connect() {
+  try { await look_for_sources(); } catch { return again(); }
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  socket = new WebSocket(`${scheme}://${location.host}/api/view?source=${encodeURIComponent(source)}`);
   socket.binaryType = "arraybuffer";
   const mine = socket;
   socket.onmessage = async (message) => {
@@ -21,11 +41,13 @@ function connect() {
     const next = () => { if (mine.readyState === WebSocket.OPEN) mine.send("next"); };
     if (document.hidden) setTimeout(next, 1000); else requestAnimationFrame(next);
   };
-  socket.onclose = () => {
-    state("away", "no answer; connecting again");
-    setTimeout(connect, pause_ms);
-    pause_ms = Math.min(2 * pause_ms, 8000);
-  };
+  socket.onclose = again;
+}
+
+function again() {
+  state("away", "no answer; connecting again");
+  setTimeout(connect, pause_ms);
+  pause_ms = Math.min(2 * pause_ms, 8000);
 }
 
 async function take(data) {
@@ -249,6 +271,9 @@ canvas.onclick = (event) => {
   const near = [...held[at].shot.tracks].sort((a, b) => far(a) - far(b))[0];
   if (near && far(near) * scale < 30) choose(near.track);
 };
+// What is held belongs to one source: the page of another begins anew.
+$("sources").onchange = (event) => { location.search = `?source=${encodeURIComponent(event.target.value)}`; };
+setInterval(() => { if (!$("sources").hidden && !document.hidden) look_for_sources().catch(() => {}); }, 3000);
 $("pause").onclick = () => pause(!paused);
 $("snapshot").onclick = snapshot;
 shift.oninput = () => { pause(true); at = Number(shift.value); show(); };
@@ -257,6 +282,6 @@ addEventListener("resize", show);
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const keys = { " ": () => pause(!paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), ArrowDown: () => next(1), ArrowUp: () => next(-1), s: snapshot };
-  if (keys[event.key] && !(event.target instanceof HTMLButtonElement && event.key === " ")) { event.preventDefault(); keys[event.key](); }
+  if (keys[event.key] && !(event.target instanceof HTMLButtonElement && event.key === " ") && !(event.target instanceof HTMLSelectElement) && !event.target.closest?.("#tuning")) { event.preventDefault(); keys[event.key](); }
 });
 connect();

@@ -2,6 +2,7 @@
 
 use super::access::Access;
 use super::hub::Hub;
+use super::hubs::Hubs;
 use super::page_output::PageOutput;
 use super::routes::{Shared, router};
 use crate::board::{Board, add};
@@ -34,28 +35,33 @@ pub struct PageOptions {
     pub most_viewers: u64,
     /// Connections at once.
     pub most_connections: usize,
+    /// Whether a few parameters may be changed from the page.
+    pub tune: bool,
 }
 
 impl PageOptions {
     /// The usual limits.
     pub fn at(address: SocketAddr) -> Self {
-        Self { address, names: Vec::new(), most_viewers: 64, most_connections: 256 }
+        Self { address, names: Vec::new(), most_viewers: 64, most_connections: 256, tune: false }
     }
 }
 
 /// A page that is served until this is dropped.
 pub struct Page {
     runtime: Option<Runtime>,
-    hub: Arc<Hub>,
+    hubs: Hubs,
     address: SocketAddr,
     token: Option<String>,
 }
 
 impl Page {
-    /// Listens.
+    /// Listens, for the sources of these boards.
     /// # Errors
-    /// An address that is taken or not this machine's.
-    pub fn serve(options: &PageOptions, board: Arc<Board>) -> Result<Self> {
+    /// An address that is taken or not this machine's; no source.
+    pub fn serve(options: &PageOptions, boards: &[Arc<Board>]) -> Result<Self> {
+        if boards.is_empty() {
+            return Err(Error::new(ErrorKind::Config, "a page shows at least one source").at(options.address));
+        }
         let failed = |e: std::io::Error| {
             Error::new(ErrorKind::Output, "cannot be listened on")
                 .at(options.address)
@@ -70,12 +76,14 @@ impl Page {
             .map_err(failed)?;
         let listener = runtime.block_on(TcpListener::bind(options.address)).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        let access = Arc::new(Access::to(address, &options.names)?);
+        let access = Access::to(address, &options.names)?;
+        let access = Arc::new(if options.tune { access.with_changes()? } else { access });
         let token = access.token().map(ToString::to_string);
-        let hub = Arc::new(Hub::new(board));
-        let shared = Shared { hub: Arc::clone(&hub), access, most_viewers: options.most_viewers };
+        let hubs = Hubs::new(boards.iter().map(|board| Arc::new(Hub::new(Arc::clone(board)))).collect());
+        let shared =
+            Shared { hubs: hubs.clone(), access, n_refused: Arc::default(), most_viewers: options.most_viewers };
         runtime.spawn(accept(listener, shared, options.most_connections));
-        Ok(Self { runtime: Some(runtime), hub, address, token })
+        Ok(Self { runtime: Some(runtime), hubs, address, token })
     }
 
     /// The address that is listened on.
@@ -88,11 +96,13 @@ impl Page {
         self.token.as_deref()
     }
 
-    /// What feeds the page.
+    /// What feeds the page with a source, by its place among the boards.
     /// # Errors
-    /// A system without threads.
-    pub fn output(&self) -> Result<Box<dyn LiveOutput>> {
-        Ok(Box::new(PageOutput::start(Arc::clone(&self.hub))?))
+    /// A place that there is not; a system without threads.
+    pub fn output(&self, source: usize) -> Result<Box<dyn LiveOutput>> {
+        let none = || Error::new(ErrorKind::Config, format!("the page has no source {source}"));
+        let hub = self.hubs.all().get(source).ok_or_else(none)?;
+        Ok(Box::new(PageOutput::start(Arc::clone(hub))?))
     }
 }
 
@@ -106,7 +116,7 @@ impl Drop for Page {
 
 async fn accept(listener: TcpListener, shared: Shared, most: usize) {
     let places = Arc::new(Semaphore::new(most));
-    let board = Arc::clone(&shared.hub.board);
+    let n_refused = Arc::clone(&shared.n_refused);
     let service = TowerToHyperService::new(router(shared));
     loop {
         let Ok((stream, _)) = listener.accept().await else {
@@ -115,7 +125,7 @@ async fn accept(listener: TcpListener, shared: Shared, most: usize) {
             continue;
         };
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-            add(&board.counts.requests_refused, 1);
+            add(&n_refused, 1);
             continue;
         };
         let service = service.clone();

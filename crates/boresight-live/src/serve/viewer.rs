@@ -1,6 +1,7 @@
 //! One viewer of the page: gets the newest message, says when it has drawn it, and only then gets the next. A slow one gets fewer.
 
 use super::hub::Hub;
+use super::hubs::Hubs;
 use axum::extract::ws::{Message, WebSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -24,11 +25,11 @@ impl Drop for Counted {
     }
 }
 
-/// Takes a place among the viewers, if there is one left.
-pub fn enter(hub: &Arc<Hub>, most: u64) -> Option<Seat> {
+/// Takes a place among the viewers of all sources, if there is one left.
+pub fn enter(hub: &Arc<Hub>, all: &Hubs, most: u64) -> Option<Seat> {
     let seat = Seat(Counted(Arc::clone(hub)));
-    let before = hub.board.counts.viewers.fetch_add(1, Ordering::SeqCst);
-    (before < most).then_some(seat)
+    hub.board.counts.viewers.fetch_add(1, Ordering::SeqCst);
+    (all.n_viewers() <= most).then_some(seat)
 }
 
 /// A place among the viewers.

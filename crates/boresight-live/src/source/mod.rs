@@ -3,10 +3,12 @@
 mod address;
 mod detection_lines;
 mod feed;
+mod names;
 mod pace;
 mod reader;
 
 pub use address::Address;
 pub use feed::{Connect, Content, Feed, Frames};
+pub use names::{NamedSource, name_sources};
 pub use pace::Paced;
 pub use reader::{Arrived, Pauses, start};

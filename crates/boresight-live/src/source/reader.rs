@@ -23,18 +23,20 @@ pub struct Arrived {
     pub wall: SystemTime,
 }
 
-/// Pauses between attempts to connect: the first, and the longest; each is twice the one before.
+/// Attempts to connect: the pauses between them, each twice the one before, and whether there is a second where the first failed.
 #[derive(Clone, Copy, Debug)]
 pub struct Pauses {
     /// The first.
     pub first: Duration,
     /// The longest.
     pub longest: Duration,
+    /// Whether an endless source that was never there is tried again, as one that was lost; else it is an error.
+    pub from_the_start: bool,
 }
 
 impl Default for Pauses {
     fn default() -> Self {
-        Self { first: Duration::from_millis(250), longest: Duration::from_secs(30) }
+        Self { first: Duration::from_millis(250), longest: Duration::from_secs(30), from_the_start: false }
     }
 }
 
@@ -79,7 +81,7 @@ impl Reader {
                 Ok(()) if !self.connect.is_endless() => return Ok(()),
                 Ok(()) => "the stream ended".to_string(),
                 // What never came once is named wrongly; a broken file does not mend.
-                Err(e) if self.n_read == 0 || !self.connect.is_endless() => return Err(e),
+                Err(e) if (self.n_read == 0 && !pauses.from_the_start) || !self.connect.is_endless() => return Err(e),
                 Err(e) => e.to_string().lines().next().unwrap_or_default().to_string(),
             };
             if self.n_read > before {

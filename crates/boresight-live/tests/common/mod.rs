@@ -127,10 +127,15 @@ pub struct Viewer(pub TcpStream);
 impl Viewer {
     /// Enters; the code if it is refused.
     pub fn enter(to: SocketAddr, headers: &str) -> std::result::Result<Self, u16> {
+        Self::enter_at(to, "/api/view", headers)
+    }
+
+    /// The same at another address, of one of several sources.
+    pub fn enter_at(to: SocketAddr, path: &str, headers: &str) -> std::result::Result<Self, u16> {
         let mut stream = TcpStream::connect(to).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
-        write!(stream, "GET /api/view HTTP/1.1\r\nHost: {to}\r\n{upgrade}\r\n{headers}\r\n").unwrap();
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {to}\r\n{upgrade}\r\n{headers}\r\n").unwrap();
         let mut head = Vec::new();
         let mut byte = [0];
         while !head.ends_with(b"\r\n\r\n") && stream.read(&mut byte).is_ok_and(|n| n == 1) {
