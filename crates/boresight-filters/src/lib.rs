@@ -30,6 +30,7 @@ mod kf;
 #[doc(hidden)]
 pub mod linalg;
 pub mod linear;
+pub mod linearised;
 pub mod lms;
 mod lms_filter;
 pub mod mixture;

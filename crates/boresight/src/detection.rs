@@ -1,6 +1,7 @@
 //! A detection is a position with its covariance and what was seen there; a scan is all detections of one time.
 
 use crate::{CameraMotion, FrameIndex, Timestamp};
+use boresight_filters::converted::Polar;
 use nalgebra::{Matrix2, Vector2};
 
 /// Class of a detection, a number given by the detector.
@@ -36,6 +37,15 @@ pub struct DetectedVelocity {
     pub cov: Matrix2<f64>,
     /// Covariance of position (row) with velocity (column), px²/s.
     pub with_position: Matrix2<f64>,
+}
+
+/// What a radar measured of a detection: range and azimuth, and where from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadarPlot {
+    /// Range and azimuth (from +x towards +y) with their deviations.
+    pub polar: Polar,
+    /// Where the radar stood at that time, px or m.
+    pub sensor: Vector2<f64>,
 }
 
 /// How a position came about where a fit was asked for.
@@ -79,6 +89,8 @@ pub struct Detection {
     pub fit: Option<PositionFit>,
     /// How long before the scan's time it was seen, ns: of a radar whose antenna turns, each plot has its own. 0 where all of a frame is seen at once.
     pub age_ns: u64,
+    /// Range and azimuth, of a radar's plot: `position` and `cov` are their conversion.
+    pub plot: Option<Box<RadarPlot>>,
 }
 
 impl Detection {
@@ -107,6 +119,7 @@ impl Detection {
             velocity: None,
             fit: None,
             age_ns: 0,
+            plot: None,
         }
     }
 
@@ -153,6 +166,11 @@ impl Detection {
     /// As seen so long before the scan's time, ns.
     pub fn with_age_ns(self, age_ns: u64) -> Self {
         Self { age_ns, ..self }
+    }
+
+    /// As this plot of a radar, or none.
+    pub fn with_plot(self, plot: Option<RadarPlot>) -> Self {
+        Self { plot: plot.map(Box::new), ..self }
     }
 }
 

@@ -104,7 +104,7 @@ pub mod vision;
 pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;
 pub use cpu::cpu_features;
-pub use detection::{ClassId, DetectedVelocity, Detection, Extent, PositionFit, Scan};
+pub use detection::{ClassId, DetectedVelocity, Detection, Extent, PositionFit, RadarPlot, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};
 pub(crate) use homography::Homography;

@@ -12,7 +12,7 @@ use super::first_scans::first;
 use super::{noise, speed};
 use crate::io::LengthUnit;
 use crate::track::{
-    ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, Report,
+    ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, RadarUpdate, Report,
 };
 use crate::{Config, Detection, Scan, TrackStatus};
 use std::collections::BTreeMap;
@@ -47,6 +47,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
     let (sigma, px) = (spread(scans), unit.sign());
     let t = &mut config.tracker;
     t.report = Report::All;
+    t.radar_update = RadarUpdate::Extended;
     t.extra_noise_px = 0.0;
     t.extra_noise_per_height = 0.0;
     t.acceleration_density_px2_per_s3 = round(3.0 * sigma.powi(2) / (STRAY_TURNS * turn_s).powi(3));
@@ -63,7 +64,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
     t.merged_measurements = MergedMeasurementsConfig::off();
     let mut told = vec![format!(
         "Plots of a radar, a turn in {turn_s:.3} s, to {sigma:.0} {px} at the median: a target may move by {} {px}/s. {:.1} plots a turn are false; one of them would continue a track of nothing with {:.1} %: \
-         {hits} plots in {CONFIRM_TURNS} turns confirm a track, which is unseen for at most {} s.",
+         {hits} plots in {CONFIRM_TURNS} turns confirm a track, which is unseen for at most {} s. A plot corrects a track by its range and azimuth, linearised at the prediction (tracker.radar-update).",
         t.max_speed_px_per_s,
         clutter.n_false,
         100.0 * clutter.p_chance,

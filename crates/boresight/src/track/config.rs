@@ -12,6 +12,7 @@ use super::initial_tracks::InitialTrackConfig;
 use super::initiation::InitiationConfig;
 use super::merged_measurements::MergedMeasurementsConfig;
 use super::mht::config::MhtConfig;
+use super::radar_update::RadarUpdate;
 use super::reidentify::ReidentificationConfig;
 use super::score_likelihood::ScoreLikelihoodConfig;
 use crate::associate::AssociatorConfig;
@@ -48,6 +49,9 @@ pub struct TrackerConfig {
     pub extra_noise_per_height: f64,
     /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
     pub extra_noise_px: f64,
+    /// How a radar's plots correct a track: `converted` once to positions, or `extended`, by range and azimuth linearised at each track's prediction. Of other detections
+    /// it says nothing.
+    pub radar_update: RadarUpdate,
     /// Probability that a target's detection lies in its gate, in (0, 1); the gate is χ² with 2 degrees of freedom.
     pub gate_probability: f64,
     /// Largest speed of a target, px/s, above 0: limits two-point initiation and gates that grow while a track coasts.
@@ -123,6 +127,7 @@ impl Default for TrackerConfig {
             detection_covariance_scale: 1.0,
             extra_noise_per_height: 0.0,
             extra_noise_px: 0.3,
+            radar_update: RadarUpdate::default(),
             gate_probability: 0.99,
             max_speed_px_per_s: 150.0,
             gate_within_max_speed: true,

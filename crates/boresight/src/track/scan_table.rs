@@ -4,11 +4,13 @@
 //! out what lies in a rectangle.
 //! Limits: [`MOST_LOOKED_AT`] detections are looked at for one track, so that 10⁵ detections in one pixel cost bounded time.
 
+use super::radar_update::{Plots, RadarUpdate};
 use super::score_likelihood::ScanScores;
 use crate::associate::UniformGrid;
 use crate::camera::CameraPath;
 use crate::{Detection, Error, ErrorKind, Result, Scan};
-use nalgebra::Matrix2;
+use boresight_filters::Gaussian;
+use nalgebra::{Matrix2, Vector2};
 
 /// Candidates looked at per track before the search stops.
 pub const MOST_LOOKED_AT: usize = 4096;
@@ -30,6 +32,10 @@ impl Cov2 {
     pub fn matrix(&self) -> Matrix2<f64> {
         Matrix2::new(self.xx, self.xy, self.xy, self.yy)
     }
+
+    fn of(m: &Matrix2<f64>) -> Self {
+        Self { xx: m[(0, 0)], xy: m[(0, 1)], yy: m[(1, 1)] }
+    }
 }
 
 /// A track's predicted position and covariance, and how far it can have come.
@@ -43,6 +49,12 @@ pub struct Predicted {
     pub cov: Cov2,
     /// Farthest distance from the prediction that the largest speed allows, px.
     pub reach: f64,
+}
+
+impl Predicted {
+    fn belief(&self) -> Gaussian<2> {
+        Gaussian { mean: Vector2::new(self.x, self.y), cov: self.cov.matrix() }
+    }
 }
 
 /// A scan made ready for gating: checked, noise added, sorted into a grid.
@@ -61,6 +73,7 @@ pub struct ScanTable {
     pub camera: CameraPath,
     /// Scores, read by the tracker where they say something.
     pub(super) scores: ScanScores,
+    plots: Plots,
     grid: UniformGrid,
 }
 
@@ -105,6 +118,11 @@ impl ScanTable {
         Ok(())
     }
 
+    /// Takes range and azimuth of a radar's plots, if they are to correct the tracks themselves; `scale` and `extra_noise_px` as in [`ScanTable::read`].
+    pub(super) fn read_plots(&mut self, scan: &Scan, update: RadarUpdate, scale: f64, extra_noise_px: f64) {
+        self.plots.read(scan, update, scale, extra_noise_px * extra_noise_px);
+    }
+
     /// Takes all detections as seen at the scan's time: what counts frames, not seconds, knows no other.
     pub fn forget_ages(&mut self) {
         self.timed = false;
@@ -123,6 +141,17 @@ impl ScanTable {
         self.noise[at]
     }
 
+    /// Where a detection at `position` counts for a track predicted there (px), and with which noise: as it stands, or a radar's plot linearised at the prediction.
+    #[inline]
+    pub fn measured(&self, detection: u32, position: Vector2<f64>, at: &Predicted) -> (Vector2<f64>, Cov2) {
+        if !self.plots.is_empty()
+            && let Some(m) = self.plots.measured(detection, &at.belief())
+        {
+            return (m.position, Cov2::of(&m.cov));
+        }
+        (position, self.noise(detection))
+    }
+
     /// Sorts the scan's detections into the grid.
     pub fn sort(&mut self, scan: &Scan) {
         self.grid.build(scan.detections.iter().map(|d| (d.position.x, d.position.y)));
@@ -137,7 +166,12 @@ impl ScanTable {
     #[inline]
     pub(super) fn half_sides(&self, track: &Predicted, gate: f64) -> (f64, f64) {
         let half = |own: f64, largest: f64| (gate * (own + largest)).sqrt().min(track.reach);
-        (half(track.cov.xx, self.max_xx), half(track.cov.yy, self.max_yy))
+        let halves = (half(track.cov.xx, self.max_xx), half(track.cov.yy, self.max_yy));
+        if self.plots.is_empty() {
+            return halves;
+        }
+        let linearised = self.plots.half_side(&track.belief(), gate);
+        (halves.0.max(linearised), halves.1.max(linearised))
     }
 
     /// Fetches ahead what gating a batch of tracks will read.

@@ -120,5 +120,6 @@ fn detection<T: Pixel>(
         velocity: None,
         fit: None,
         age_ns: 0,
+        plot: None,
     }
 }

@@ -108,6 +108,7 @@ impl<'o> RowReader<'o> {
             velocity: None,
             fit: None,
             age_ns: age_ns(row)?,
+            plot: None,
         };
         Ok(Some(Seen { frame, id, time, detection }))
     }

@@ -11,7 +11,8 @@ mod write;
 #[cfg(feature = "video")]
 mod yuv;
 
-#[cfg(all(feature = "video", fuzzing))]
+#[cfg(feature = "video")]
+#[doc(hidden)] // For the fuzz target alone: a NUT stream reaches the library through ffmpeg's pipe only.
 pub use ffmpeg::read_nut;
 #[cfg(feature = "video")]
 pub use open::{open_ffmpeg, open_mp4};

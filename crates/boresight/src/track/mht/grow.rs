@@ -139,11 +139,11 @@ fn children(
 fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis> {
     let Context { scan, table, config, .. } = growth.context;
     let d = &scan.detections[pair.detection as usize];
-    let noise = table.noise(pair.detection);
     let mut child = leaf.clone();
     let carried = table.is_timed().then(|| Carried::sure(&growth.context, &mut child.track, pair.detection));
     let predicted = carried.as_ref().map_or(&leaf.predicted, |c| &c.predicted);
-    let measurement = Measurement { position: d.position, cov: noise.matrix() };
+    let (position, noise) = growth.context.measured(pair.detection, predicted);
+    let measurement = Measurement { position, cov: noise.matrix() };
     child.track.filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
     if let Some(carried) = &carried {
         carried.to_scan(&mut child.track);
@@ -162,7 +162,7 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
         hit: true,
         detection: Some(pair.detection),
         likelihood_ratio,
-        innovation: Some(innovation_of(&d.position, predicted, &innovation_cov(predicted, &noise))),
+        innovation: Some(innovation_of(&position, predicted, &innovation_cov(predicted, &noise))),
         ..Outcome::default()
     };
     Some(child)

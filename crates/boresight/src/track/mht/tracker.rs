@@ -126,6 +126,7 @@ impl Tracking for Mht {
         let step_s = self.clock.step_s(scan)?;
         let c = &self.config;
         self.table.read(scan, c.detection_covariance_scale, c.extra_noise_px, c.extra_noise_per_height)?;
+        self.table.read_plots(scan, c.radar_update, c.detection_covariance_scale, c.extra_noise_px);
         if !c.filter.form.takes_any_time() {
             self.table.forget_ages();
         }

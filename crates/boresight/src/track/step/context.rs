@@ -1,10 +1,11 @@
 //! What every part of a step reads and none changes: the scan, its table, the configuration.
 
 use super::super::config::TrackerConfig;
-use super::super::scan_table::ScanTable;
+use super::super::scan_table::{Cov2, Predicted, ScanTable};
 use super::super::score_likelihood::LogScore;
 use super::super::single_track::Track;
 use crate::{Scan, Timestamp};
+use nalgebra::Vector2;
 
 /// What every part of a step reads.
 #[derive(Clone, Copy)]
@@ -28,6 +29,12 @@ impl Context<'_> {
     #[inline]
     pub fn age_ns(&self, j: u32) -> u64 {
         if self.table.is_timed() { self.scan.detections[j as usize].age_ns } else { 0 }
+    }
+
+    /// Where detection `j` counts for a track predicted there (px), and with which noise.
+    #[inline]
+    pub fn measured(&self, j: u32, at: &Predicted) -> (Vector2<f64>, Cov2) {
+        self.table.measured(j, self.scan.detections[j as usize].position, at)
     }
 
     /// −2 ln of the density of detection `j`'s score for a track; 0 where scores say nothing.

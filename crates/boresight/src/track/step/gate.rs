@@ -33,8 +33,9 @@ pub fn gate_row(
         looked_at += 1;
         let (dx, dy) = (p.x - track.x, p.y - track.y);
         if dx.abs() <= half_x && dy.abs() <= half_y && free(p.index) {
-            let r = table.noise(p.index);
-            if let Some(pair) = pair(track, [dx, dy], &r, p.index, gate, likelihood, &extra_cost) {
+            let (z, r) = table.measured(p.index, Vector2::new(p.x, p.y), track);
+            if let Some(pair) = pair(track, [z.x - track.x, z.y - track.y], &r, p.index, gate, likelihood, &extra_cost)
+            {
                 gates.push(pair);
                 gated += 1;
             }

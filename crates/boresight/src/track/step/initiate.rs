@@ -12,14 +12,14 @@ use super::super::config::TrackerConfig;
 use super::super::confirm::motion_test::MotionProgress;
 use super::super::filter::TrackedFilter;
 use super::super::initiation::{InitiationConfig, VelocityPrior, from_one_point, from_two_points, from_velocity};
-use super::super::scan_table::{Cov2, MOST_LOOKED_AT};
+use super::super::scan_table::{Cov2, MOST_LOOKED_AT, Predicted};
 use super::super::score_likelihood::LogScore;
 use super::super::single_track::{BATCH, Outcome, Track, motion_of, place_of};
 use super::context::Context;
 use super::gate::normalised_square;
 use super::plot_time::seconds;
 use super::report::report;
-use crate::{Detection, Result, Timestamp, TrackState};
+use crate::{Result, Timestamp, TrackState};
 use boresight_filters::{Filter, Measurement, Weighted};
 use nalgebra::Vector2;
 
@@ -153,7 +153,9 @@ fn begin(
     let Context { scan, table, config, .. } = *context;
     let d = &scan.detections[detection];
     let noise = table.noise(detection as u32);
-    let Some((mut filter, likelihood_ratio)) = first_filter(config, clutter, d, &noise, first, prior, dt_s) else {
+    let Some((mut filter, likelihood_ratio)) =
+        first_filter(context, clutter, detection as u32, &noise, first, prior, dt_s)
+    else {
         return;
     };
     let age_ns = context.age_ns(detection as u32);
@@ -185,14 +187,15 @@ fn begin(
 
 /// The filter of a new track and Λ of its second point (1 if there is none); nothing if the filter refuses it.
 fn first_filter(
-    config: &TrackerConfig,
+    context: &Context<'_>,
     clutter: &Clutter,
-    d: &Detection,
+    detection: u32,
     noise: &Cov2,
     first: Option<&Unassociated>,
     prior: VelocityPrior,
     dt_s: f64,
 ) -> Option<(TrackedFilter, f64)> {
+    let (config, d) = (context.config, &context.scan.detections[detection as usize]);
     let height_px = d.extent.height_px;
     match (first, prior) {
         (Some(first), Some((velocity, variance))) => {
@@ -200,10 +203,13 @@ fn first_filter(
             let mut filter = config.start_filter(&start, height_px).ok()?;
             filter.predict(dt_s).ok()?;
             let p = filter.predicted();
+            let cov = Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] };
+            let at = Predicted { x: p.mean.x, y: p.mean.y, cov, reach: f64::INFINITY };
+            let (position, noise) = context.measured(detection, &at);
             let s = p.cov + noise.matrix();
-            let density = (-0.5 * normalised_square(&(d.position - p.mean), &s)).exp()
+            let density = (-0.5 * normalised_square(&(position - p.mean), &s)).exp()
                 / (std::f64::consts::TAU * s.determinant().sqrt());
-            let measurement = Measurement { position: d.position, cov: noise.matrix() };
+            let measurement = Measurement { position, cov: noise.matrix() };
             filter.update(&[Weighted { measurement, weight: 1.0 }]).ok()?;
             let clutter_density = clutter.at(d.position.x, d.position.y).max(1e-200);
             Some((filter, config.detection_probability * density / clutter_density))

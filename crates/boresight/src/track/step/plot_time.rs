@@ -97,8 +97,8 @@ pub(in crate::track) fn gate_row_by_time(
             };
             if let Some(at) = at {
                 latest = Some((age_ns, at));
-                let off = [p.x - at.x, p.y - at.y];
-                let r = table.noise(p.index);
+                let (z, r) = table.measured(p.index, Vector2::new(p.x, p.y), &at);
+                let off = [z.x - at.x, z.y - at.y];
                 if let Some(pair) = pair(&at, off, &r, p.index, gate, likelihood, &extra_cost) {
                     gates.push(pair);
                     gated += 1;
@@ -137,7 +137,7 @@ impl Carried {
     /// Where detection `j` counts at that time (px), and with which noise.
     pub fn place(&self, context: &Context<'_>, j: u32) -> (Vector2<f64>, Cov2) {
         let other = self.others.iter().find(|o| o.0 == j);
-        other.map_or_else(|| (context.scan.detections[j as usize].position, context.table.noise(j)), |o| (o.1, o.2))
+        other.map_or_else(|| context.measured(j, &self.predicted), |o| (o.1, o.2))
     }
 
     /// Takes the track on to the scan.
@@ -150,8 +150,8 @@ impl Carried {
 fn carried(context: &Context<'_>, track: &Track, j: u32, age_ns: u64) -> Option<(u32, Vector2<f64>, Cov2)> {
     let own_ns = context.age_ns(j);
     let (own, then) = (predicted_at(context, track, own_ns)?, predicted_at(context, track, age_ns)?);
-    let position = context.scan.detections[j as usize].position + Vector2::new(then.x - own.x, then.y - own.y);
-    let (velocity, mut noise) = (track.filter.kinematics().cov, context.table.noise(j));
+    let (position, mut noise) = context.measured(j, &own);
+    let (position, velocity) = (position + Vector2::new(then.x - own.x, then.y - own.y), track.filter.kinematics().cov);
     let between2 = (seconds(own_ns) - seconds(age_ns)).powi(2);
     noise.xx += between2 * velocity[(1, 1)];
     noise.xy += between2 * velocity[(1, 3)];

@@ -49,7 +49,7 @@ pub(in crate::track) fn update(
                     by_shares(context, track, &carried.predicted, gates, row, shares, stage.soft, place, weighted);
                 carried.to_scan(track);
             } else {
-                let place = |j: u32| (context.scan.detections[j as usize].position, context.table.noise(j));
+                let place = |j: u32| context.measured(j, predicted);
                 outcome = by_shares(context, track, predicted, gates, row, shares, stage.soft, place, weighted);
             }
         }
@@ -94,12 +94,12 @@ fn hard(
     let missed = Outcome { likelihood_ratio: 1.0 - prior.p_detection * prior.p_gate, ..Outcome::default() };
     let [share] = shares else { return missed };
     let detection = &context.scan.detections[share.detection as usize];
-    let noise = context.table.noise(share.detection);
-    let measurement = Measurement { position: detection.position, cov: noise.matrix() };
+    let (position, noise) = context.measured(share.detection, predicted);
+    let measurement = Measurement { position, cov: noise.matrix() };
     if track.filter.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
         return missed;
     }
-    let innovation = innovation_of(&detection.position, predicted, &innovation_cov(predicted, &noise));
+    let innovation = innovation_of(&position, predicted, &innovation_cov(predicted, &noise));
     let clutter = gates.clutter(share.detection);
     let score = (-0.5 * context.score_cost(track, share.detection)).exp();
     let density = score * (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());

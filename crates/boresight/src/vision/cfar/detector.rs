@@ -268,6 +268,7 @@ impl CfarDetector {
             velocity: None,
             fit: None,
             age_ns: 0,
+            plot: None,
         };
         self.found.push(Found { detection, cells: first..self.cells.len() });
     }

@@ -41,6 +41,7 @@ pub fn detection<T: Pixel>(
         velocity: None,
         fit: None,
         age_ns: 0,
+        plot: None,
     })
 }
 

@@ -309,6 +309,7 @@ impl SpotDetector {
             velocity: None,
             fit: None,
             age_ns: 0,
+            plot: None,
         }
     }
 }

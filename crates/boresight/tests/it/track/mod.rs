@@ -5,6 +5,7 @@ mod blind;
 mod extremes;
 mod merged;
 mod plot_times;
+mod radar_update;
 mod random_scans;
 mod units;
 

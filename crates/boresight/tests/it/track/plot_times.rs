@@ -13,17 +13,17 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-const TURN_S: f64 = 2.5;
+pub(super) const TURN_S: f64 = 2.5;
 const STD_M: f64 = 10.0;
 /// m²/s³.
-const DENSITY: f64 = 0.5;
+pub(super) const DENSITY: f64 = 0.5;
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
 /// The state `[x, vx, y, vy]` after `dt_s`, with continuous white acceleration.
-fn moved(s: Vector4<f64>, dt_s: f64, rng: &mut ChaCha8Rng) -> Vector4<f64> {
+pub(super) fn moved(s: Vector4<f64>, dt_s: f64, rng: &mut ChaCha8Rng) -> Vector4<f64> {
     let mut out = s;
     for a in [0, 2] {
         // cov = q [[t³/3, t²/2], [t²/2, t]]: the velocity first, the place given it.
@@ -71,7 +71,7 @@ fn plot(t: &Turn) -> Detection {
     Detection::at(t.plot, Matrix2::identity() * STD_M * STD_M).with_extent(Extent::around(t.plot, 400.0, 400.0))
 }
 
-fn ns(s: f64) -> i64 {
+pub(super) fn ns(s: f64) -> i64 {
     Timestamp::from_secs_f64(s).ns
 }
 

@@ -16,7 +16,7 @@ use crate::io::tables::number::timestamp_of_seconds;
 use crate::io::tables::options::TableOptions;
 use crate::io::tables::row::Row;
 use crate::io::tables::table::Table;
-use crate::{Detection, Error, ErrorKind, Extent, FrameIndex, Result, Scan};
+use crate::{Detection, Error, ErrorKind, Extent, FrameIndex, RadarPlot, Result, Scan};
 use boresight_filters::converted::{Polar, converted};
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_2;
@@ -215,8 +215,9 @@ fn detection(plot: &Plot, options: &RadarOptions, own: &OwnShip) -> Result<Detec
     };
     let [range_std, azimuth_std_rad] = plot.std;
     let polar = Polar { range: plot.range, azimuth_rad, range_std, azimuth_std_rad };
-    let m = converted(&polar, &Vector2::new(x, y))?;
-    let mut out = Detection::at(m.position, m.cov);
+    let sensor = Vector2::new(x, y);
+    let m = converted(&polar, &sensor)?;
+    let mut out = Detection::at(m.position, m.cov).with_plot(Some(RadarPlot { polar, sensor }));
     out.extent = Extent { left_px: m.position.x, top_px: m.position.y, width_px: 0.0, height_px: 0.0 };
     Ok(out)
 }

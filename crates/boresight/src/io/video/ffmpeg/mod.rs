@@ -5,7 +5,6 @@ mod nut;
 mod pictures;
 mod source;
 
-/// For the fuzz target: all pictures of a NUT stream.
-#[cfg(fuzzing)]
+#[doc(hidden)] // For the fuzz target alone.
 pub use nut::read_all as read_nut;
 pub(in crate::io::video) use source::{INSTALL, open};

@@ -322,7 +322,6 @@ impl<R: Read> Nut<R> {
 }
 
 /// Reads every picture of a stream and throws it away; how many there were.
-#[cfg(any(test, fuzzing))]
 pub fn read_all(bytes: &[u8]) -> io::Result<u64> {
     const MOST_BYTES: u64 = 1 << 20;
     let mut nut = Nut::open(bytes)?;
