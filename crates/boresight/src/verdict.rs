@@ -2,7 +2,7 @@
 //!
 //! Source: our own. A sink counts while the run goes on; the first of these that holds is said:
 //! nothing was detected; nothing was tracked; only things at rest were tracked; the boxes are as large as a ground; tracks last for moments; the innovations
-//! are not as large as the filter says. Otherwise the tracks are believed, and their covariances called right if the innovations are as large as stated and each is
+//! are not as large as the filter says; the run is too short to know a background. Otherwise the tracks are believed, and their covariances called right if the innovations are as large as stated and each is
 //! a surprise: of a filter that lags, or of errors that last, they are alike from scan to scan, whatever their size.
 //! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
 
@@ -27,6 +27,8 @@ const HONEST_NIS: [f64; 2] = [1.0, 4.0];
 const RIGHT_NIS: [f64; 2] = [1.6, 2.4];
 /// Correlation of innovations of scans in a row (0 expected) up to which they are surprises: 0.2 changes the variance of a mean of many by half.
 const WHITE: f64 = 0.2;
+/// A background is known from a run at least so many times as long as the time it is learnt in: then what stays in its place for half of that time is seen to come or go.
+const LEAST_STARTS: f64 = 2.0;
 /// Fewer innovations say nothing.
 const LEAST_NIS: u64 = 50;
 
@@ -205,6 +207,19 @@ impl Observed {
                     self.found(mean_s, summary)
                 ),
                 Some(format!("--set tracker.detection-covariance-scale={scale:.3}")),
+            );
+        }
+        if let ThresholdConfig::Moving(background) = &config.detector.threshold
+            && summary.duration_s < LEAST_STARTS * background.start_s
+        {
+            return doubt(
+                format!(
+                    "{}, but {:.1} s show little of the ground: what covers a place for half of the first {} s is taken for it, and what it leaves for a target.",
+                    self.found(mean_s, summary),
+                    summary.duration_s,
+                    background.start_s,
+                ),
+                another_detector(config),
             );
         }
         let honest = nis.map_or(String::new(), |n| {

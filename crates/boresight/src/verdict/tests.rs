@@ -1,6 +1,7 @@
 //! Tests of `verdict`.
 
 use super::*;
+use crate::vision::background::BackgroundConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::{
     Detection, Extent, Frame, FrameIndex, Image, Pixels, Scan, Timestamp, TrackId, TrackInnovation, TrackState,
@@ -70,6 +71,21 @@ fn each_way_to_fail_is_told_with_what_to_try() {
     let scale = "--set tracker.detection-covariance-scale=14.000";
     doubted(run(&all, 1, |_| vec![(1, true, 5.0, 28.0)]), "too small: mean NIS 28.00", scale);
     doubted(run(&all, 1, |_| vec![(1, true, 5.0, 0.5)]), "too large", "--set tracker.detection-covariance-scale=0.250");
+}
+
+#[test]
+fn a_background_is_not_known_from_a_run_that_is_hardly_longer_than_its_learning() {
+    let background = |start_s: f64| {
+        let mut config = Config::default();
+        let moving = BackgroundConfig { start_s, ..BackgroundConfig::default() };
+        config.detector.threshold = ThresholdConfig::Moving(moving);
+        run(&config, 1, |_| vec![(1, true, 5.0, 1.9)])
+    };
+    // The run lasts 9.9 s.
+    let short = background(5.0);
+    assert!(short.is_doubtful && short.sentence.contains("but 9.9 s show little of the ground"), "{short:?}");
+    assert_eq!(short.next.as_deref(), Some("--detector isolated"));
+    assert!(!background(4.9).is_doubtful && !background(0.0).is_doubtful);
 }
 
 #[test]
