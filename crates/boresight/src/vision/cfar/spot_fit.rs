@@ -13,6 +13,10 @@ const STEPS: usize = 8;
 /// Half side of the window, in deviations of the spot expected.
 const WINDOW: f64 = 2.7;
 
+/// Farthest that a centre may lie beyond the middle of the outermost pixels, in deviations of the spot and px: there a sixth of the spot is seen.
+const MOST_BEYOND: f64 = 1.0;
+const MOST_BEYOND_PX: f64 = 2.0;
+
 /// A fitted spot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {
@@ -125,7 +129,9 @@ pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot
     let reach = 1.5 * guess.sigma + 0.7;
     let near = (p[0] - guess.x).abs() <= reach && (p[1] - guess.y).abs() <= reach;
     let sized = p[4] > 0.3001 && p[4] < 2.5 * guess.sigma;
-    if !near || !sized || p[2] * guess.height <= 0.0 || now.n < 12 {
+    let beyond = |at: f64, n: usize| (-at).max(at - (n - 1) as f64);
+    let is_seen = beyond(p[0], on.width).max(beyond(p[1], on.height)) <= (MOST_BEYOND * p[4]).min(MOST_BEYOND_PX);
+    if !near || !is_seen || !sized || p[2] * guess.height <= 0.0 || now.n < 12 {
         return None;
     }
     let variance = (now.cost / (now.n - 5) as f64).max(least_variance);
