@@ -100,8 +100,10 @@ pub(super) fn choose_looked(
             Some(seen) => {
                 let places = growing(frames.len());
                 let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                // Targets that stand alone are told better one by one, where they are seen to move.
-                Some(seen).filter(|_| !evidence.bright.chains.is_surely_more_than(&own))
+                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
+                let alone = &evidence.bright.chains;
+                let most_move = 2.0 * alone.moving.len() as f64 > seen.per_frame;
+                Some(seen).filter(|_| !(most_move && alone.is_surely_more_than(&own)))
             }
             None => None,
         };
