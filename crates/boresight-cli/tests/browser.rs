@@ -3,7 +3,11 @@
 //! Needs Chromium (Debian: `apt-get install chromium`); where there is none the tests show as ignored and say so. A page is looked at in a frame of the width that is
 //! tried, since a browser's own window has a least width.
 
-use libtest_mimic::{Arguments, Trial};
+#[path = "chromium/installed.rs"]
+mod installed;
+
+use installed::trial;
+use libtest_mimic::Arguments;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -99,12 +103,6 @@ fn a_bad_page_is_noticed(browser: &Path) {
     assert!(content >= 2000 && (pictures, broken) == (1, 1), "{content} {pictures} {broken}");
 }
 
-fn browser() -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let names = ["chromium", "chromium-browser", "google-chrome", "chrome-headless-shell"];
-    std::env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file())
-}
-
 /// Pages: a name, the commands that make it, its file, and how many pictures it has at least.
 const PAGES: [(&str, &[&str], &str, u32); 6] = [
     (
@@ -148,22 +146,10 @@ const PAGES: [(&str, &[&str], &str, u32); 6] = [
 ];
 
 fn main() -> std::process::ExitCode {
-    let found = browser();
-    let of = |name: String, run: Box<dyn FnOnce(&Path) + Send>| {
-        let browser = found.clone();
-        let trial = Trial::test(name, move || {
-            run(&browser.ok_or("no browser is installed: apt-get install chromium")?);
-            Ok(())
-        });
-        match &found {
-            Some(_) => trial,
-            None => trial.with_kind("needs a browser: apt-get install chromium").with_ignored_flag(true),
-        }
-    };
-    let mut trials = vec![of("a_bad_page_is_noticed".to_string(), Box::new(a_bad_page_is_noticed))];
+    let mut trials = vec![trial("a_bad_page_is_noticed", a_bad_page_is_noticed)];
     for (name, lines, page, least) in PAGES {
         let name = format!("{name} opens without errors at {} and {} px", WIDTHS[0], WIDTHS[1]);
-        trials.push(of(name, Box::new(move |browser| check(browser, lines, page, least))));
+        trials.push(trial(name, move |browser| check(browser, lines, page, least)));
     }
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }

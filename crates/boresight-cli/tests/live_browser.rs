@@ -5,8 +5,9 @@
 
 mod chromium;
 
-use chromium::{Browser, browser};
-use libtest_mimic::{Arguments, Trial};
+use chromium::Browser;
+use chromium::installed::trial;
+use libtest_mimic::Arguments;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -240,7 +241,6 @@ fn sliders_change_the_run_and_show_it_as_toml(browser: &Path) {
 type Test = fn(&Path);
 
 fn main() -> std::process::ExitCode {
-    let found = browser();
     let tests: [(&str, Test); 5] = [
         ("sliders_change_the_run_and_show_it_as_toml", sliders_change_the_run_and_show_it_as_toml),
         ("the_page_shows_the_targets_where_they_are", the_page_shows_the_targets_where_they_are),
@@ -251,16 +251,6 @@ fn main() -> std::process::ExitCode {
         ("the_page_comes_back_with_the_server", the_page_comes_back_with_the_server),
         ("several_sources_are_chosen_by_name", several_sources_are_chosen_by_name),
     ];
-    let trials = tests.map(|(name, run)| {
-        let browser = found.clone();
-        let trial = Trial::test(name, move || {
-            run(&browser.ok_or("no browser is installed: apt-get install chromium")?);
-            Ok(())
-        });
-        match &found {
-            Some(_) => trial,
-            None => trial.with_kind("needs a browser: apt-get install chromium").with_ignored_flag(true),
-        }
-    });
+    let trials = tests.map(|(name, run)| trial(name, run));
     libtest_mimic::run(&Arguments::from_args(), trials.into()).exit_code()
 }

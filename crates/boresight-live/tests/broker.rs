@@ -4,15 +4,13 @@ mod common;
 
 use boresight_live::{Event, LiveOutput, Mqtt, Target};
 use common::board;
+use common::daemon::{Daemon, PATIENCE, port};
 use libtest_mimic::{Arguments, Trial};
 use rumqttc::{Client, MqttOptions, Packet, QoS};
 use std::collections::BTreeSet;
-use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
-
-const PATIENCE: Duration = Duration::from_secs(30);
+use std::time::Instant;
 
 fn program() -> Option<String> {
     let candidates = ["mosquitto", "/usr/sbin/mosquitto"];
@@ -20,41 +18,10 @@ fn program() -> Option<String> {
     candidates.iter().find(runs).map(ToString::to_string)
 }
 
-/// A broker that dies with its test, and the folder of its configuration.
-struct Broker {
-    child: Child,
-    _config: tempfile::TempDir,
-}
-
-impl Broker {
-    fn start(port: u16) -> Self {
-        let program = program().unwrap();
-        // As it comes it drops what a subscriber has not taken beyond 1000 messages: here every one is looked for, however slow the machine.
-        let dir = tempfile::tempdir().unwrap();
-        let config = dir.path().join("mosquitto.conf");
-        let text = format!("listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n");
-        std::fs::write(&config, text).unwrap();
-        let child =
-            Command::new(program).arg("-c").arg(&config).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let until = Instant::now() + PATIENCE;
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(Instant::now() < until, "the broker does not listen");
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        Self { child, _config: dir }
-    }
-}
-
-impl Drop for Broker {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// A port that was free a moment ago.
-fn port() -> u16 {
-    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+fn start(port: u16) -> Daemon {
+    // As it comes it drops what a subscriber has not taken beyond 1000 messages: here every one is looked for, however slow the machine.
+    let config = format!("listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 0\n");
+    Daemon::start(program().unwrap().as_ref(), &config, port)
 }
 
 /// Everything that comes on these topics: topic, payload, retained.
@@ -113,7 +80,7 @@ fn until_all(from: &Receiver<(String, String, bool)>, mut missing: BTreeSet<u64>
 
 fn a_broker_that_is_killed_and_comes_back_gets_what_waited() {
     let port = port();
-    let mut broker = Broker::start(port);
+    let mut broker = start(port);
     let first = subscribe(port, "first");
     let mut mqtt = Mqtt::start(&target(port), board()).unwrap();
     mqtt.event(&status("running"));
@@ -122,7 +89,7 @@ fn a_broker_that_is_killed_and_comes_back_gets_what_waited() {
     drop(broker);
     // While it is away nobody waits, and nothing is lost that fits.
     (50..500).for_each(|k| mqtt.event(&event(k)));
-    broker = Broker::start(port);
+    broker = start(port);
     let second = subscribe(port, "second");
     // What came in before this subscription was there went to nobody; of the rest everything comes.
     (500..600).for_each(|k| mqtt.event(&event(k)));
@@ -144,7 +111,7 @@ fn what_waits_for_a_broker_is_bounded_and_comes_when_it_does() {
     let mut mqtt = Mqtt::start(&target(port), board()).unwrap();
     (0..5000).for_each(|k| mqtt.event(&event(k)));
     assert_eq!(mqtt.dropped(), 5000 - 4096, "bounded: the oldest go, and are counted");
-    let _broker = Broker::start(port);
+    let _broker = start(port);
     let listener = subscribe(port, "listener");
     (5000..5010).for_each(|k| mqtt.event(&event(k)));
     until_all(&listener, (5000..5010).collect());
@@ -153,7 +120,7 @@ fn what_waits_for_a_broker_is_bounded_and_comes_when_it_does() {
 
 fn the_last_will_is_said_when_the_program_dies() {
     let port = port();
-    let _broker = Broker::start(port);
+    let _broker = start(port);
     let listener = subscribe(port, "listener");
     let mut mqtt = Mqtt::start(&target(port), board()).unwrap();
     mqtt.event(&status("running"));

@@ -3,55 +3,24 @@
 mod common;
 
 use boresight_live::{Board, Event, LiveOutput, Nats, RunOptions, Target, publisher, run};
+use common::daemon::{Daemon, PATIENCE, port};
 use common::{ScenePlug, board, config, scene};
 use libtest_mimic::{Arguments, Trial};
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-
-const PATIENCE: Duration = Duration::from_secs(30);
 
 fn program() -> Option<&'static str> {
     let runs = |p: &&str| Command::new(p).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
     ["nats-server", "/usr/sbin/nats-server"].into_iter().find(runs)
 }
 
-/// A server that dies with its test, and the folder of its configuration.
-struct Server {
-    child: Child,
-    _config: tempfile::TempDir,
-}
-
-impl Server {
-    fn start(port: u16, more: &str) -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        let config = dir.path().join("nats.conf");
-        std::fs::write(&config, format!("listen: 127.0.0.1:{port}\n{more}\n")).unwrap();
-        let mut command = Command::new(program().unwrap());
-        let child = command.arg("-c").arg(&config).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let until = Instant::now() + PATIENCE;
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(Instant::now() < until, "the server does not listen");
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        Self { child, _config: dir }
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// A port that was free a moment ago.
-fn port() -> u16 {
-    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+fn serving(port: u16, more: &str) -> Daemon {
+    Daemon::start(program().unwrap().as_ref(), &format!("listen: 127.0.0.1:{port}\n{more}\n"), port)
 }
 
 /// Everything that comes on any subject: subject and payload. `connect` is the object that is sent at first.
@@ -116,7 +85,7 @@ fn until_all(from: &Receiver<(String, String)>, mut missing: BTreeSet<u64>) -> u
 
 fn a_server_that_is_killed_and_comes_back_gets_what_waited() {
     let port = port();
-    let mut server = Server::start(port, "");
+    let mut server = serving(port, "");
     let first = subscribe(port, "{}");
     let mut nats = start(&format!("nats://127.0.0.1:{port}/site/tracks"), board());
     nats.event(&Event { is_status: true, json: "{\"state\":\"running\"}".into() });
@@ -129,7 +98,7 @@ fn a_server_that_is_killed_and_comes_back_gets_what_waited() {
     let began = Instant::now();
     (50..500).for_each(|k| nats.event(&event(k)));
     assert!(began.elapsed() < Duration::from_secs(1), "nobody waits for it");
-    server = Server::start(port, "");
+    server = serving(port, "");
     let second = subscribe(port, "{}");
     // What came in before this subscription was there went to nobody; of the rest everything comes.
     (500..600).for_each(|k| nats.event(&event(k)));
@@ -142,7 +111,7 @@ fn a_server_that_is_killed_and_comes_back_gets_what_waited() {
 /// What is sent when the server dies and was not confirmed is sent again: events come without a gap, whenever it is killed.
 fn nothing_is_lost_on_the_way_when_the_server_is_killed_in_the_middle() {
     let port = port();
-    let mut server = Server::start(port, "");
+    let mut server = serving(port, "");
     let mut nats = start(&format!("nats://127.0.0.1:{port}/site/tracks"), board());
     let mut came = BTreeSet::new();
     for round in 0..3u64 {
@@ -153,7 +122,7 @@ fn nothing_is_lost_on_the_way_when_the_server_is_killed_in_the_middle() {
         std::thread::sleep(Duration::from_millis(round));
         drop(server);
         came.extend(listener.iter().filter_map(|(_, text)| text[5..text.len() - 1].parse::<u64>().ok()));
-        server = Server::start(port, "");
+        server = serving(port, "");
         let late = subscribe(port, "{}");
         nats.event(&event(10_000 + round));
         until_all(&late, [10_000 + round].into());
@@ -173,7 +142,7 @@ fn what_waits_for_a_server_is_bounded_and_comes_when_it_does() {
     let mut nats = start(&format!("nats://127.0.0.1:{port}/site.tracks"), board());
     (0..5000).for_each(|k| nats.event(&event(k)));
     assert_eq!(nats.dropped(), 5000 - 4096, "bounded: the oldest go, and are counted");
-    let _server = Server::start(port, "");
+    let _server = serving(port, "");
     let listener = subscribe(port, "{}");
     (5000..5010).for_each(|k| nats.event(&event(k)));
     until_all(&listener, (5000..5010).collect());
@@ -199,7 +168,7 @@ fn a_password_opens_and_what_the_server_refuses_is_said_and_counted() {
     let port = port();
     let users =
         "{user: me, password: right, permissions: {publish: {allow: [\"site.>\"]}, subscribe: {allow: [\">\"]}}}";
-    let _server = Server::start(port, &format!("max_payload: 1024\nauthorization {{ users: [{users}] }}"));
+    let _server = serving(port, &format!("max_payload: 1024\nauthorization {{ users: [{users}] }}"));
     let speaking = || Arc::new(Board::new("cam", said));
     let _wrong = start(&format!("nats://me:wrong@127.0.0.1:{port}/site.tracks"), speaking());
     until_said("Authorization Violation");
@@ -224,7 +193,7 @@ fn a_run_goes_on_and_its_tracks_come_while_the_server_comes_and_goes() {
     let board = board();
     let target = Target::parse(&format!("nats://127.0.0.1:{port}/site.tracks")).unwrap();
     let mut outputs = vec![publisher(&target, &board).unwrap()];
-    let server = Arc::new(Mutex::new(Some(Server::start(port, ""))));
+    let server = Arc::new(Mutex::new(Some(serving(port, ""))));
     let listener = subscribe(port, "{}");
     let kills = Arc::clone(&server);
     let killer = std::thread::spawn(move || {
@@ -232,7 +201,7 @@ fn a_run_goes_on_and_its_tracks_come_while_the_server_comes_and_goes() {
         let server = kills.lock().unwrap().take();
         drop(server);
         std::thread::sleep(Duration::from_millis(600));
-        *kills.lock().unwrap() = Some(Server::start(port, ""));
+        *kills.lock().unwrap() = Some(serving(port, ""));
         subscribe(port, "{}")
     });
     let options = RunOptions { config: Some(config()), updates_hz: f64::INFINITY, ..RunOptions::default() };

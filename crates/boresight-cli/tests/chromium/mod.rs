@@ -2,21 +2,18 @@
 //!
 //! Source: chromedevtools.github.io/devtools-protocol; `--remote-debugging-pipe` reads from descriptor 3 and writes to 4.
 
+pub mod installed;
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Where a browser is.
-pub fn browser() -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let names = ["chromium", "chromium-browser", "google-chrome", "chrome-headless-shell"];
-    std::env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file())
-}
 
 /// A browser with one page.
 pub struct Browser {
@@ -129,18 +126,7 @@ impl Browser {
     pub fn picture(&mut self, name: &str) {
         let Some(dir) = std::env::var_os("BORESIGHT_SCREENSHOTS") else { return };
         let taken = self.ask("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }));
-        let sixty_four = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        let (mut bytes, mut bits, mut n) = (Vec::new(), 0u32, 0);
-        for digit in taken["data"].as_str().unwrap().bytes() {
-            let Some(value) = sixty_four.iter().position(|d| *d == digit) else { break };
-            bits = bits << 6 | value as u32;
-            n += 6;
-            if n >= 8 {
-                n -= 8;
-                bytes.push((bits >> n) as u8);
-                bits &= (1 << n) - 1;
-            }
-        }
+        let bytes = BASE64_STANDARD.decode(taken["data"].as_str().unwrap()).unwrap();
         std::fs::write(Path::new(&dir).join(name), bytes).unwrap();
     }
 }

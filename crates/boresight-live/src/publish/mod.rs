@@ -1,6 +1,7 @@
 //! The wire: events to standard output, datagrams, a broker.
 
 mod address;
+mod last_words;
 mod lines;
 mod mqtt;
 #[cfg(feature = "nats")]

@@ -6,6 +6,7 @@
 //! Limits: no TLS.
 
 use super::address::Broker;
+use super::last_words::wait_for;
 use crate::board::{Board, unix_s};
 use crate::cbor::Form;
 use crate::event::{Event, status_line};
@@ -17,7 +18,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, SystemTime};
 use tokio::sync::Notify;
 
 /// Events that wait for a broker that is away.
@@ -135,7 +136,7 @@ fn options(broker: &Broker, board: &Board) -> MqttOptions {
     let gone = status_line(&board.source, "gone", "the program ended without a word", unix_s(SystemTime::now()));
     options.set_last_will(LastWill::new(
         format!("{}/status", broker.topic),
-        broker.form.bytes(&gone),
+        broker.form.bytes(&gone).into_owned(),
         QoS::AtLeastOnce,
         true,
     ));
@@ -152,7 +153,7 @@ async fn feed(shared: &Shared, client: &AsyncClient, topic: &str, form: Form) {
         while let Some(event) = shared.next() {
             let to = if event.is_status { &status } else { topic };
             // There is room: the client's queue is twice the window. Were it full all the same, the next connection sends it again.
-            let _ = client.try_publish(to, QoS::AtLeastOnce, event.is_status, form.bytes(&event.json));
+            let _ = client.try_publish(to, QoS::AtLeastOnce, event.is_status, form.bytes(&event.json).into_owned());
         }
         if shared.over.load(Ordering::SeqCst) && shared.is_done() {
             let _ = client.try_disconnect();
@@ -216,11 +217,7 @@ impl LiveOutput for Mqtt {
         self.shared.queue.close();
         self.shared.over.store(true, Ordering::SeqCst);
         self.shared.changed.notify_one();
-        let until = Instant::now() + LAST_WORDS;
-        while self.thread.as_ref().is_some_and(|t| !t.is_finished()) && Instant::now() < until {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        self.thread = None;
+        wait_for(&mut self.thread, LAST_WORDS);
     }
 
     fn dropped(&self) -> u64 {

@@ -8,6 +8,7 @@
 //! Limits: no TLS, no JetStream, one server (not its cluster); NATS itself has neither last will nor retained messages.
 
 use super::address::Broker;
+use super::last_words::wait_for;
 use crate::board::Board;
 use crate::event::Event;
 use crate::output::{LiveOutput, Shown};
@@ -236,11 +237,7 @@ impl LiveOutput for Nats {
 
     fn finish(&mut self) {
         self.shared.queue.close();
-        let until = Instant::now() + LAST_WORDS;
-        while self.thread.as_ref().is_some_and(|t| !t.is_finished()) && Instant::now() < until {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        self.thread = None;
+        wait_for(&mut self.thread, LAST_WORDS);
     }
 
     fn dropped(&self) -> u64 {

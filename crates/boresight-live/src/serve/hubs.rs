@@ -4,21 +4,11 @@ use super::hub::Hub;
 use crate::board::read;
 use axum::http::{StatusCode, Uri};
 use percent_encoding::percent_decode_str;
-use serde::Serialize;
 use std::sync::Arc;
 
 /// The sources, in the order of the command line; at least one.
 #[derive(Clone)]
 pub struct Hubs(Arc<[Arc<Hub>]>);
-
-#[derive(Serialize)]
-struct OneSource<'a> {
-    source: &'a str,
-    state: &'static str,
-    why: String,
-    rate_hz: f64,
-    tracks: u64,
-}
 
 /// Why a request finds no source.
 pub type NoSource = (StatusCode, &'static str);
@@ -38,10 +28,8 @@ impl Hubs {
     /// # Errors
     /// A name that none has.
     pub fn named(&self, uri: &Uri) -> Result<Option<&Arc<Hub>>, NoSource> {
-        let pairs = uri.query().unwrap_or("").split('&').filter_map(|pair| pair.split_once('='));
-        let Some(name) = pairs.filter(|(key, _)| *key == "source").map(|(_, value)| value).next() else {
-            return Ok(None);
-        };
+        let mut pairs = uri.query().unwrap_or("").split('&').filter_map(|pair| pair.split_once('='));
+        let Some((_, name)) = pairs.find(|(key, _)| *key == "source") else { return Ok(None) };
         let spaces = name.replace('+', " ");
         let name = percent_decode_str(&spaces).decode_utf8_lossy();
         let found = self.0.iter().find(|hub| hub.board.source == name);
@@ -68,17 +56,10 @@ impl Hubs {
 
     /// All of them as JSON.
     pub fn json(&self) -> String {
-        let one = |hub: &'_ Arc<Hub>| {
-            let said = hub.board.said();
-            let (rate_hz, tracks) = (hub.board.rate_hz(), read(&hub.board.counts.now));
-            serde_json::to_value(OneSource {
-                source: &hub.board.source,
-                state: said.state.word(),
-                why: said.why,
-                rate_hz,
-                tracks,
-            })
-            .unwrap_or_default()
+        let one = |hub: &Arc<Hub>| {
+            let (said, tracks) = (hub.board.said(), read(&hub.board.counts.now));
+            let (state, rate_hz) = (said.state.word(), hub.board.rate_hz());
+            serde_json::json!({ "source": hub.board.source, "state": state, "why": said.why, "rate_hz": rate_hz, "tracks": tracks })
         };
         let sources: Vec<_> = self.0.iter().map(one).collect();
         serde_json::json!({ "schema": "boresight.sources/1", "sources": sources }).to_string()

@@ -111,7 +111,7 @@ fn answer(headers: &HeaderMap, text: String) -> Response {
     let asked = headers.get(header::ACCEPT).and_then(|v| v.to_str().ok()).unwrap_or_default();
     let wants_cbor =
         asked.split(',').any(|kind| kind.split(';').next().unwrap_or_default().trim() == "application/cbor");
-    match of_json(&text).filter(|_| wants_cbor) {
+    match wants_cbor.then(|| of_json(&text)).flatten() {
         Some(bytes) => ([(header::CONTENT_TYPE, "application/cbor")], bytes).into_response(),
         None => json(text),
     }

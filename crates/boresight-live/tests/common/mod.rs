@@ -1,6 +1,8 @@
 //! What the tests share: scenes as streams, a client by hand.
 #![allow(dead_code)]
 
+pub mod daemon;
+
 use boresight::sim::scene::{Background, Rectangle, SceneConfig, Shape, Target, White};
 use boresight::sim::{SceneSource, Seed};
 use boresight::{Config, FrameSource, Result, SourceInfo};

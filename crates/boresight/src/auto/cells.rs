@@ -8,7 +8,6 @@ use super::digits::round;
 use super::evidence::Evidence;
 use super::ground::Ground;
 use super::looks;
-use super::sightings::Sightings;
 use super::spread::spread;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
@@ -114,8 +113,7 @@ pub fn chains(
     n_threads: usize,
 ) -> Result<Evidence> {
     let scans = looks::scans(&detector(info, least_area(cells)), places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let sightings: Vec<Sightings> = scans.iter().zip(places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
-    Ok(Evidence::of(&sightings, (info.width * info.height) as f64))
+    Ok(Evidence::of_looks(&scans, places, ground, info))
 }
 
 /// Least area of a cell among such, px.

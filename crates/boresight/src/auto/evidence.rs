@@ -6,9 +6,10 @@
 
 use super::chains::{Chain, chains};
 use super::first_scans::first;
+use super::ground::Ground;
 use super::sightings::Sightings;
-use crate::Scan;
 use crate::camera::SteadyGround;
+use crate::{Scan, SourceInfo};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -58,6 +59,12 @@ impl Evidence {
             }
         }
         Self::of(&sightings, area_px2)
+    }
+
+    /// Looks for chains in the scans of the frames at these places; `ground` is the first frame's in each frame, none where it stands.
+    pub fn of_looks(scans: &[Scan], places: &[usize], ground: &[Ground], info: &SourceInfo) -> Self {
+        let sightings: Vec<_> = scans.iter().zip(places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
+        Self::of(&sightings, (info.width * info.height) as f64)
     }
 
     /// Looks for chains in a field of that area, px².

@@ -7,7 +7,6 @@
 use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
-use super::sightings::Sightings;
 use super::spots::{self, Seen};
 use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
@@ -57,13 +56,8 @@ fn look_at(
     n_threads: usize,
 ) -> Result<Faint> {
     let scans = looks::scans(&detector(polarity), places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let mut n = 0usize;
-    let mut sightings = Vec::with_capacity(places.len());
-    for (scan, &k) in scans.iter().zip(places) {
-        n += scan.detections.len();
-        sightings.push(Sightings::of(scan, ground.get(k)));
-    }
-    let chains = Evidence::of(&sightings, (info.width * info.height) as f64);
+    let n: usize = scans.iter().map(|s| s.detections.len()).sum();
+    let chains = Evidence::of_looks(&scans, places, ground, info);
     Ok(Faint { polarity, per_frame: n as f64 / places.len().max(1) as f64, chains })
 }
 

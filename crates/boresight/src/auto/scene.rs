@@ -270,3 +270,35 @@ impl Scene {
         Ok(hits as f64 / n.max(1) as f64)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_size_is_that_of_what_holds_half_of_the_area_however_many_flickers_there_are() {
+        let region = |side: f64| Moved { left: 0.0, top: 0.0, right: side, bottom: 2.0 * side, area: side * side };
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: 320,
+            height: 240,
+            kind: PixelKind::Gray8,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        let size = |frames: &[Vec<Moved>]| {
+            let mut scene = Scene::default();
+            measure(&mut scene, frames, &info);
+            scene.size_px
+        };
+        let among = |n_flickers: usize| {
+            let frame = [vec![region(40.0); 2], vec![region(3.0); n_flickers]].concat();
+            size(&[frame.clone(), Vec::new(), frame])
+        };
+        assert_eq!((among(0), among(100)), ([40.0, 80.0], [40.0, 80.0]));
+        // 400 of 9 px² are more than two of 1600 px².
+        assert_eq!((among(400), size(&[])), ([3.0, 6.0], [0.0; 2]));
+    }
+}

@@ -4,7 +4,6 @@ use super::digits::round;
 use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
-use super::sightings::Sightings;
 use super::spread::growing;
 use crate::camera::CameraConfig;
 use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
@@ -127,9 +126,7 @@ pub fn look_at(
     config.cluster.min_area_px = Some(3);
     let scans = looks::scans(&config, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     let (mut n, mut sum, mut sides) = (0usize, 0.0, Vec::new());
-    let mut sightings = Vec::with_capacity(places.len());
-    for (scan, &k) in scans.iter().zip(places) {
-        sightings.push(Sightings::of(scan, ground.get(k)));
+    for scan in &scans {
         for d in scan.detections.iter().filter(|d| f64::from(d.score) >= SURE) {
             n += 1;
             sum += f64::from(d.score).min(100.0);
@@ -142,7 +139,7 @@ pub fn look_at(
         per_frame: n as f64 / places.len().max(1) as f64,
         mean_score: sum / n.max(1) as f64,
         side_px: [at(0.5), at(0.95)],
-        chains: Evidence::of(&sightings, (info.width * info.height) as f64),
+        chains: Evidence::of_looks(&scans, places, ground, info),
     })
 }
 
@@ -230,7 +227,7 @@ pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reason
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::auto::sightings::Sighting;
+    use crate::auto::sightings::{Sighting, Sightings};
     use nalgebra::Vector2;
 
     /// A side with the chains of one thing that moves along a row from `x0`, px, in steps of so many px.

@@ -28,8 +28,8 @@ pub enum RadarUpdate {
 /// The plots of a scan, where the extended update is asked for; empty otherwise.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plots {
+    /// With the deviations that count.
     of: Vec<Option<RadarPlot>>,
-    scale: f64,
     /// Variance added on both axes, px².
     extra: f64,
     /// The rectangle of the sensors' places, px.
@@ -47,13 +47,22 @@ impl Plots {
         if update == RadarUpdate::Converted || scan.detections.iter().all(|d| d.plot.is_none()) {
             return;
         }
-        self.of.extend(scan.detections.iter().map(|d| d.plot.as_deref().copied()));
-        (self.scale, self.extra) = (scale, extra);
+        let std_scale = scale.sqrt();
+        self.of.extend(scan.detections.iter().map(|d| {
+            let mut plot = *d.plot.as_deref()?;
+            plot.polar.range_std *= std_scale;
+            plot.polar.azimuth_std_rad *= std_scale;
+            Some(plot)
+        }));
+        self.extra = extra;
         self.sensors = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
         (self.std, self.shift) = ([0.0; 2], 0.0);
         for RadarPlot { polar: p, sensor } in self.of.iter().flatten() {
             self.sensors = [self.sensors[0].inf(sensor), self.sensors[1].sup(sensor)];
             self.std = [self.std[0].max(p.range_std), self.std[1].max(p.azimuth_std_rad)];
+        }
+        // Converted when the table was read, with the deviations that it states.
+        for p in scan.detections.iter().filter_map(|d| d.plot.as_deref()).map(|plot| plot.polar) {
             self.shift = self.shift.max(p.range * (0.5 * p.azimuth_std_rad * p.azimuth_std_rad).exp_m1());
         }
     }
@@ -66,17 +75,9 @@ impl Plots {
 
     /// Plot `j` as a position for a track predicted there (px, px²); `None` if it has to count as it was converted.
     pub fn measured(&self, j: u32, predicted: &Gaussian<2>) -> Option<Measurement> {
-        let RadarPlot { polar, sensor } = self.plot(j)?;
+        let RadarPlot { polar, sensor } = (*self.of.get(j as usize)?)?;
         let m = linearised(&polar, &sensor, predicted).ok()?;
         Some(Measurement { cov: m.cov + Matrix2::identity() * self.extra, ..m })
-    }
-
-    /// Plot `j` with its deviations scaled.
-    fn plot(&self, j: u32) -> Option<RadarPlot> {
-        let mut plot = (*self.of.get(j as usize)?)?;
-        plot.polar.range_std *= self.scale.sqrt();
-        plot.polar.azimuth_std_rad *= self.scale.sqrt();
-        Some(plot)
     }
 
     /// Half the side of a square around the prediction that holds the converted positions of all plots in the gate `gate` that are linearised, px.
@@ -85,7 +86,7 @@ impl Plots {
         let far = (predicted.mean - low).abs().sup(&(predicted.mean - high).abs()).norm();
         let p = predicted.cov.trace();
         // Linearised from three deviations on: the second order adds at most (1/18 + 1/18) P, and moves by at most √P/6 along and across.
-        let r = self.scale * (self.std[0].powi(2) + (far * self.std[1]).powi(2)) + 2.0 * self.extra;
+        let r = self.std[0].powi(2) + (far * self.std[1]).powi(2) + 2.0 * self.extra;
         // |z - x̂| is at most what lies between in range and along the arc, and √2 times their root of squares.
         (2.0 * gate * (1.12 * p + r)).sqrt() + p.sqrt() / 3.0 + self.shift
     }

@@ -33,7 +33,9 @@ impl Cov2 {
         Matrix2::new(self.xx, self.xy, self.xy, self.yy)
     }
 
-    fn of(m: &Matrix2<f64>) -> Self {
+    /// The numbers of a matrix.
+    #[inline]
+    pub fn of(m: &Matrix2<f64>) -> Self {
         Self { xx: m[(0, 0)], xy: m[(0, 1)], yy: m[(1, 1)] }
     }
 }
@@ -52,6 +54,12 @@ pub struct Predicted {
 }
 
 impl Predicted {
+    /// What a filter predicts, and how far the target can have come, px.
+    #[inline]
+    pub fn of(p: &Gaussian<2>, reach: f64) -> Self {
+        Self { x: p.mean.x, y: p.mean.y, cov: Cov2::of(&p.cov), reach }
+    }
+
     fn belief(&self) -> Gaussian<2> {
         Gaussian { mean: Vector2::new(self.x, self.y), cov: self.cov.matrix() }
     }

@@ -125,12 +125,7 @@ mod tests {
                 ..Scan::default()
             };
             let p = ConstantVelocityKf::new(&belief(i), AccelerationNoise::Discrete(1.0)).predicted();
-            let track = Predicted {
-                x: p.mean.x,
-                y: p.mean.y,
-                cov: Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
-                reach: f64::INFINITY,
-            };
+            let track = Predicted::of(&p, f64::INFINITY);
             let mut table = ScanTable::default();
             table.read(&scan, 1.0, 0.0, 0.0).unwrap();
             table.sort(&scan);

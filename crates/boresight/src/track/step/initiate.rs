@@ -203,9 +203,7 @@ fn first_filter(
             let mut filter = config.start_filter(&start, height_px).ok()?;
             filter.predict(dt_s).ok()?;
             let p = filter.predicted();
-            let cov = Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] };
-            let at = Predicted { x: p.mean.x, y: p.mean.y, cov, reach: f64::INFINITY };
-            let (position, noise) = context.measured(detection, &at);
+            let (position, noise) = context.measured(detection, &Predicted::of(&p, f64::INFINITY));
             let s = p.cov + noise.matrix();
             let density = (-0.5 * normalised_square(&(position - p.mean), &s)).exp()
                 / (std::f64::consts::TAU * s.determinant().sqrt());

@@ -5,7 +5,7 @@
 
 use super::super::config::TrackerConfig;
 use super::super::filter::TrackedFilter;
-use super::super::scan_table::{Cov2, Predicted};
+use super::super::scan_table::Predicted;
 use super::super::single_track::Track;
 use crate::{Result, Timestamp};
 use boresight_filters::Filter;
@@ -47,10 +47,5 @@ pub(in crate::track) fn predicted_of(
     let [x, y, std] = last_place;
     let far = config.max_speed_px_per_s * elapsed_s + 3.0 * std;
     let off = (p.mean - Vector2::new(x, y)).norm();
-    Predicted {
-        x: p.mean.x,
-        y: p.mean.y,
-        cov: Cov2 { xx: p.cov[(0, 0)], xy: p.cov[(0, 1)], yy: p.cov[(1, 1)] },
-        reach: if config.gate_within_max_speed { far + off } else { f64::INFINITY },
-    }
+    Predicted::of(&p, if config.gate_within_max_speed { far + off } else { f64::INFINITY })
 }
