@@ -190,10 +190,13 @@ impl Observed {
             );
         }
         if all.ended >= SHORT_TRACKS && mean_s < SHORT_S && summary.duration_s > SHORT_TRACKS as f64 * mean_s {
+            // A track that is lost and found again comes in pieces under one number.
+            let tracks = counted(summary.confirmed_tracks.min(all.ended), "track");
+            let pieces =
+                if all.ended > summary.confirmed_tracks { format!("{tracks} in {} pieces", all.ended) } else { tracks };
             return doubt(
                 format!(
-                    "{} of {mean_s:.2} s in the mean: moments of clutter, or targets that are lost again and again.",
-                    counted(all.ended, "track")
+                    "{pieces} of {mean_s:.2} s in the mean: moments of clutter, or targets that are lost again and again."
                 ),
                 another_detector(config),
             );

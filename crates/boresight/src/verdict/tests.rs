@@ -13,6 +13,7 @@ use nalgebra::{Matrix2, SMatrix, SVector};
 fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, bool, f64, f64)>) -> Verdict {
     let mut seen = Observed::of_frames(100, 80);
     let mut sink = seen.sink();
+    let mut confirmed = std::collections::BTreeSet::new();
     let (mut most_at_once, mut nis_sum, mut nis_n) = (0, 0.0, 0);
     for k in 0..100 {
         let (index, time) = (FrameIndex(k), Timestamp::from_secs_f64(0.1 * k as f64));
@@ -22,6 +23,7 @@ fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, b
         let reported: Vec<f64> = tracks(k).iter().filter(|t| t.1).map(|t| t.3).collect();
         most_at_once = most_at_once.max(reported.len() as u64);
         (nis_sum, nis_n) = (nis_sum + reported.iter().sum::<f64>(), nis_n + reported.len() as u64);
+        confirmed.extend(tracks(k).iter().filter(|t| t.1).map(|t| t.0));
         let states: Vec<TrackState> = tracks(k)
             .into_iter()
             .map(|(id, reported, side, nis)| TrackState {
@@ -40,6 +42,7 @@ fn run(config: &Config, n_detections: usize, tracks: impl Fn(u64) -> Vec<(u64, b
         frames: 100,
         duration_s: 9.9,
         detections: 100 * n_detections as u64,
+        confirmed_tracks: confirmed.len() as u64,
         most_at_once,
         mean_nis: (nis_n > 0).then(|| (nis_sum / nis_n as f64, nis_n)),
         ..Summary::default()
@@ -68,6 +71,8 @@ fn each_way_to_fail_is_told_with_what_to_try() {
     doubted(run(&moving, 3, |k| vec![(k, false, 5.0, 2.0)]), "of 3.00 detections a frame none", fast);
     doubted(run(&all, 1, |_| vec![(1, true, 60.0, 2.0)]), "cover more than 25 %", "--detector moving");
     doubted(run(&all, 1, |k| vec![(k / 5, true, 5.0, 2.0)]), "20 tracks of 0.40 s", "--detector moving");
+    let in_pieces = |k| if k % 5 < 3 { vec![(k / 50, true, 5.0, 2.0)] } else { vec![] };
+    doubted(run(&all, 1, in_pieces), "2 tracks in 20 pieces of 0.20 s", "--detector moving");
     let scale = "--set tracker.detection-covariance-scale=14.000";
     doubted(run(&all, 1, |_| vec![(1, true, 5.0, 28.0)]), "too small: mean NIS 28.00", scale);
     doubted(run(&all, 1, |_| vec![(1, true, 5.0, 0.5)]), "too large", "--set tracker.detection-covariance-scale=0.250");

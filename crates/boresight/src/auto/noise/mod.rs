@@ -68,12 +68,17 @@ pub fn learn(
                 continue;
             }
             let d = &on_ground.detections[j as usize];
+            let position = [d.position.x, d.position.y];
+            // A picture that is shown again, or a block that a codec copies, measures nothing anew; taken for measurements without error they would make the noise nothing.
+            if of.steps.last().is_some_and(|before| before.position == position) {
+                continue;
+            }
             let seen_ns = scan.time.ns.saturating_sub_unsigned(d.age_ns);
             let dt_s = if of.steps.is_empty() { 0.0 } else { (seen_ns - of.last_ns).max(0) as f64 * 1e-9 };
             of.last_ns = seen_ns;
             of.sizes[0].push(d.extent.width_px);
             of.sizes[1].push(d.extent.height_px);
-            let [position, variance] = [[d.position.x, d.position.y], [d.cov[(0, 0)], d.cov[(1, 1)]]];
+            let variance = [d.cov[(0, 0)], d.cov[(1, 1)]];
             of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px });
         }
     }
@@ -153,4 +158,35 @@ fn deviation(magnitudes: &mut [f64]) -> f64 {
     }
     let at = (0.683 * magnitudes.len() as f64) as usize;
     *magnitudes.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detection, FrameIndex, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    #[test]
+    fn positions_that_are_copied_from_frame_to_frame_are_measured_once() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (std, mut at) = (0.3, [0.0; 2]);
+        // A target at rest, one picture in five new.
+        let scans: Vec<Scan> = (0..600_u64)
+            .map(|k| {
+                if k % 5 == 0 {
+                    at = [40.0, 30.0].map(|v| v + std * rng.sample::<f64, _>(StandardNormal));
+                }
+                let d = Detection::at(at.into(), nalgebra::Matrix2::identity() * 0.01);
+                let time = Timestamp::from_secs_f64(k as f64 * 0.04);
+                Scan { detections: vec![d], ..Scan::at(FrameIndex(k), time) }
+            })
+            .collect();
+        let mut config = Config::default();
+        learn(&scans, 1e4, LengthUnit::Pixel, &mut config, &mut Vec::new()).unwrap();
+        let t = &config.tracker;
+        let r = 0.01 * t.detection_covariance_scale + t.extra_noise_px.powi(2);
+        assert!((r.sqrt() / std).ln().abs() < 0.3, "{} px, {std} is the truth", r.sqrt());
+    }
 }
