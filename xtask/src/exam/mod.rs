@@ -178,4 +178,4 @@ const INTRODUCTION: &str = "# The exam\n\n\
     the car, 3 for particles). *Targets*: those held in at least half of their rows. *False*: reported tracks that are near a target in fewer than half of their rows. *Contrast*: height of the target over the deviation of \
     its surroundings, median over the clip. *Error*: median distance of the nearest reported track from a held target, box centre or point. *NIS*: mean normalised innovation squared of reported tracks; 2 if the filter's covariances are true. \
     The car's truth holds one car of many, so nothing can be called false there. *Simulated*: three spots (sigma 1.5 px, 100 counts) that move over a textured ground under a camera that stands, pans, \
-    shakes, turns or zooms (numbers per frame; shake: standard deviation), and twenty spots of five deviations of white noise; 120 frames, the truth is exact, near is 3 px, A and B are two seeds.\n\n";
+    shakes, turns or zooms (numbers per frame; shake: standard deviation), twenty spots of five deviations of white noise, and fifty bright ones in a video; 120 frames, the truth is exact, near is 3 px, A and B are two seeds.\n\n";

@@ -1,14 +1,15 @@
 //! Simulated scenes of the exam: a moving camera over a textured ground, and spots near the noise; their truth is exact.
 //!
-//! Each scene is written as YUV4MPEG2 with its truth as a table and then goes the way of every clip. The seeds are fixed; half A and half B are
+//! Each scene is written as YUV4MPEG2, or as H.264, with its truth as a table and then goes the way of every clip. The seeds are fixed; half A and half B are
 //! two seeds of the same scene.
 
 use super::clips::{Clip, Columns, Near};
-use anyhow::Result;
+use anyhow::{Context, Result};
+use boresight::io::video::{Mp4Options, Mp4Writer};
 use boresight::sim::ground::{CameraPathConfig, Ground};
 use boresight::sim::scene::{Background, Shape, Spot, Target, White};
 use boresight::sim::{Purpose, SceneConfig, Seed};
-use boresight::{FrameSource, Pixels};
+use boresight::{FrameSource, Image, Pixels, Timestamp};
 use rand::RngExt;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -21,6 +22,9 @@ const SIZE_PX: [usize; 2] = [320, 240];
 /// Two standard deviations of a spot: what counts as near.
 const NEAR_PX: f64 = 3.0;
 const SEEDS: [u64; 2] = [1, 2];
+/// The kind that an encoder has seen, and its quantiser: some 5 Mbit/s.
+const COMPRESSED: &str = "simulated: 50 spots, 720p, H.264";
+const QUANTISER: u8 = 32;
 
 /// Kind, pan (px a frame), shake (px), turn (degrees a frame), growth (share a frame).
 const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 6] = [
@@ -41,7 +45,8 @@ pub fn clips(folder: &Path, only: &str) -> Result<Vec<Clip>> {
             return Ok(());
         }
         let stem = format!("scene{}", out.len());
-        let (input, truth) = (folder.join(format!("{stem}.y4m")), folder.join(format!("{stem}.csv")));
+        let ending = if kind == COMPRESSED { "mp4" } else { "y4m" };
+        let (input, truth) = (folder.join(format!("{stem}.{ending}")), folder.join(format!("{stem}.csv")));
         write(&scene, seed, &input, &truth)?;
         let near = Near::Px(NEAR_PX);
         out.push(Clip { kind, name, input, truth, columns: Columns::POINTS, near, whole: true, contrast: None });
@@ -54,6 +59,9 @@ pub fn clips(folder: &Path, only: &str) -> Result<Vec<Clip>> {
     }
     for seed in SEEDS {
         add("simulated: spots of SNR 5", seed, spots(seed))?;
+    }
+    for seed in SEEDS {
+        add(COMPRESSED, seed, bright_spots(seed))?;
     }
     Ok(out)
 }
@@ -120,16 +128,79 @@ fn spots(seed: u64) -> SceneConfig {
     }
 }
 
+/// Fifty bright spots in noise before a fixed camera, straight on, some out of the frame: of white noise an encoder makes specks that stay for many frames.
+fn bright_spots(seed: u64) -> SceneConfig {
+    let mut rng = Seed::new(seed).stream(Purpose::Scenario, 1);
+    let sigma = 2.2;
+    let targets = (0..50).map(|_| Target {
+        start_px: [rng.random_range(40.0..1240.0), rng.random_range(40.0..680.0)],
+        velocity_px_per_s: [rng.random_range(-60.0..60.0), rng.random_range(-60.0..60.0)],
+        shape: Shape::Spot(Spot {
+            sigma_px: 0.0,
+            psf_sigma_px: sigma,
+            total: 180.0 * std::f64::consts::TAU * sigma * sigma,
+        }),
+        ..Target::default()
+    });
+    SceneConfig {
+        width_px: 1280,
+        height_px: 720,
+        n_frames: N_FRAMES,
+        rate_hz: RATE_HZ,
+        background: Background::White(White { mean: 30.0, std: 4.0 }),
+        targets: targets.collect(),
+        ..SceneConfig::default()
+    }
+}
+
+/// Where a scene's frames go.
+enum Video {
+    Y4m(std::io::BufWriter<std::fs::File>),
+    H264(Box<Mp4Writer>),
+}
+
+impl Video {
+    /// As the ending of the path says.
+    fn create(path: &Path, [width, height]: [usize; 2]) -> Result<Self> {
+        if path.extension().is_some_and(|e| e == "mp4") {
+            let options = Mp4Options { quantiser: QUANTISER, ..Mp4Options::default() };
+            return Ok(Self::H264(Box::new(Mp4Writer::create(path, width, height, options)?)));
+        }
+        let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
+        writeln!(out, "YUV4MPEG2 W{width} H{height} F{RATE_HZ}:1 Ip A1:1 Cmono")?;
+        Ok(Self::Y4m(out))
+    }
+
+    fn put(&mut self, image: &Image<u8>, time: Timestamp) -> Result<()> {
+        match self {
+            Self::Y4m(out) => {
+                out.write_all(b"FRAME\n")?;
+                out.write_all(image.as_slice())?;
+            }
+            Self::H264(writer) => {
+                let rgb = image.as_slice().iter().map(|v| [*v; 3]).collect();
+                writer.write(Image::from_vec(image.width(), image.height(), rgb).context("a whole image")?, time)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<()> {
+        match self {
+            Self::Y4m(mut out) => Ok(out.flush()?),
+            Self::H264(writer) => Ok(writer.finish()?),
+        }
+    }
+}
+
 /// Writes a scene's frames and truth (frame, id, x, y).
 fn write(scene: &SceneConfig, seed: u64, video: &Path, truth: &Path) -> Result<()> {
     let mut source = scene.build(Seed::new(seed))?;
-    let mut out = std::io::BufWriter::new(std::fs::File::create(video)?);
-    writeln!(out, "YUV4MPEG2 W{} H{} F{RATE_HZ}:1 Ip A1:1 Cmono", scene.width_px, scene.height_px)?;
+    let mut out = Video::create(video, [scene.width_px, scene.height_px])?;
     let mut table = String::from("frame,id,x,y\n");
     while let Some(frame) = source.next_frame()? {
         let Pixels::Gray8(image) = &frame.pixels else { anyhow::bail!("a scene of 8 bits") };
-        out.write_all(b"FRAME\n")?;
-        out.write_all(image.as_slice())?;
+        out.put(image, frame.time)?;
         for t in source.truth() {
             let (x, y) = (t.kinematics.mean[0], t.kinematics.mean[2]);
             let inside = |v: f64, size: usize| (0.0..=size as f64 - 1.0).contains(&v);
@@ -139,6 +210,6 @@ fn write(scene: &SceneConfig, seed: u64, video: &Path, truth: &Path) -> Result<(
         }
         source.recycle(frame);
     }
-    out.flush()?;
+    out.finish()?;
     Ok(std::fs::write(truth, table)?)
 }

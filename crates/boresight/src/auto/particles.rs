@@ -15,7 +15,7 @@ use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, SourceInfo};
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
-/// Least blobs a frame.
+/// Least blobs a frame, beyond those of the other sign.
 const LEAST: f64 = 60.0;
 /// Frames looked at.
 const LOOKS: usize = 4;
@@ -98,9 +98,9 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(P
             most = seen;
         }
     }
-    // Texture is as often dark as bright.
+    // Texture, and what a codec makes of noise, is as often dark as bright.
     let other = counts[0].min(counts[1]);
-    let best = best.filter(|b| b.per_frame >= MOST_SIDED * other);
+    let best = best.filter(|b| b.per_frame >= MOST_SIDED * other && b.per_frame - other >= LEAST);
     Ok((best.unwrap_or(most), best.is_some()))
 }
 
