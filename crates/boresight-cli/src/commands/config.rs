@@ -36,7 +36,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let text = if let Some(path) = &args.check {
         let config = Config::from_file(path)?;
         let unused = super::run_options::unused(&config).map_or(String::new(), |keys| format!("{keys}\n"));
-        format!("{}: a sound configuration\n{unused}", path.display())
+        // What a full disk or a broken copy leaves is sound, too, and is hardly what was meant.
+        let changes =
+            if config == Config::default() { " that changes nothing: every value is the default" } else { "" };
+        format!("{}: a sound configuration{changes}\n{unused}", path.display())
     } else if let Some(key) = &args.explain {
         explain(key)?
     } else if let Some(what) = &args.list {

@@ -9,7 +9,12 @@ fn what_it_prints_it_accepts() {
     let file = dir.path().join("my.toml");
     std::fs::write(&file, &text).unwrap();
     let out = run_ok(["config", "--check", file.to_str().unwrap()]);
-    assert!(stdout(&out).contains("a sound configuration"));
+    assert!(stdout(&out).contains("a sound configuration that changes nothing"));
+    std::fs::write(&file, "").unwrap();
+    let empty = run_ok(["config", "--check", file.to_str().unwrap()]);
+    assert!(stdout(&empty).contains("that changes nothing"), "what a full disk leaves");
+    std::fs::write(&file, "tracker.coast-s = 2.0\n").unwrap();
+    assert!(!stdout(&run_ok(["config", "--check", file.to_str().unwrap()])).contains("changes nothing"));
     for table in ["[input]", "[detector]", "[tracker]", "gate-probability = 0.99"] {
         assert!(text.contains(table), "{table}");
     }
