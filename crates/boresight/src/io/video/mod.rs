@@ -17,4 +17,4 @@ pub use ffmpeg::read_nut;
 #[cfg(feature = "video")]
 pub use open::{open_ffmpeg, open_mp4};
 #[cfg(feature = "encode")]
-pub use write::{MAX_SIZE, Mp4Options, Mp4Writer};
+pub use write::{CodedPicture, H264Coder, MAX_SIZE, Mp4Fragments, Mp4Options, Mp4Writer};

@@ -105,6 +105,10 @@ fn read_movie_inner(file: &mut File) -> Result<Movie> {
     if fragmented {
         let mut reader = fragments::Reader::new(track.id, &defaults, file_len);
         for moof in top.iter().filter(|b| b.name == *b"moof") {
+            // A recording that was killed: what it had finished is whole, and what is lost is said below.
+            if moof.end > file_len && !track.samples.is_empty() {
+                break;
+            }
             let bytes = read_box(file, moof, file_len)?;
             reader.add(&bytes, moof.start, &mut track.samples)?;
         }

@@ -32,6 +32,20 @@ fn chroma(w: [i32; 3], sum: [i32; 3]) -> u8 {
 }
 
 impl I420 {
+    /// Takes a grey picture as it is: luma of full range, no chroma.
+    pub fn fill_gray(&mut self, gray: &Image<u8>) {
+        let (w, h) = (gray.width(), gray.height());
+        (self.width, self.height) = (w.next_multiple_of(2), h.next_multiple_of(2));
+        self.u.clear();
+        self.u.resize(self.width * self.height / 4, 128);
+        self.v.clone_from(&self.u);
+        self.y.clear();
+        for row in (0..self.height).map(|y| gray.row(y.min(h.max(1) - 1))) {
+            self.y.extend_from_slice(row);
+            self.y.extend(row.last().filter(|_| w < self.width));
+        }
+    }
+
     /// Converts a picture into this buffer.
     pub fn fill(&mut self, rgb: &Image<[u8; 3]>) {
         let (w, h) = (rgb.width(), rgb.height());
@@ -90,6 +104,17 @@ widest! {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn grey_keeps_its_values_and_an_odd_border_is_repeated() {
+        let mut planes = I420::default();
+        planes.fill(&Image::filled(5, 5, [200, 0, 0]));
+        planes.fill_gray(&Image::from_vec(3, 1, vec![0, 100, 255]).unwrap());
+        assert_eq!(
+            (planes.y, planes.u, planes.v),
+            (vec![0, 100, 255, 255, 0, 100, 255, 255], vec![128; 2], vec![128; 2])
+        );
+    }
 
     #[test]
     fn the_colours_of_the_standards_bars_come_out() {
