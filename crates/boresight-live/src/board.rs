@@ -11,6 +11,9 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 /// Changes that wait for the run.
 const MOST_CHANGES: usize = 64;
 
+/// Scans over which a mean goes that follows the scene.
+const LATELY: u64 = 300;
+
 /// What the run is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -58,6 +61,8 @@ pub struct Counts {
     pub lost: AtomicU64,
     /// Detections so far.
     pub detections: AtomicU64,
+    /// Of these, beyond those that confirmed tracks took.
+    pub unclaimed: AtomicU64,
     /// Tracks that were confirmed so far.
     pub tracks: AtomicU64,
     /// Confirmed tracks now.
@@ -68,6 +73,10 @@ pub struct Counts {
     pub events_dropped: AtomicU64,
     /// Times that the record could not be written.
     pub record_failures: AtomicU64,
+    /// Frames in the record's video.
+    pub video_frames: AtomicU64,
+    /// Frames that were left out of it.
+    pub video_left_out: AtomicU64,
     /// Viewers of the page now.
     pub viewers: AtomicU64,
 }
@@ -91,6 +100,17 @@ pub struct Said {
     pub why: String,
 }
 
+/// What a scan that was tracked says besides its counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScanNotes {
+    /// Detections beyond those that confirmed tracks took.
+    pub unclaimed: usize,
+    /// False detections a frame that the detector was asked for, where it has such a knob.
+    pub false_alarms_asked: Option<f64>,
+    /// How far the background's middle moved since the scan before, px.
+    pub camera_moved_px: Option<f64>,
+}
+
 #[derive(Debug, Default)]
 struct Told {
     said: Said,
@@ -100,6 +120,9 @@ struct Told {
     rate: Option<(Instant, f64)>,
     changes: VecDeque<Change>,
     only_tracks: bool,
+    notes: ScanNotes,
+    /// Mean of the unclaimed detections lately, and the scans so far.
+    unclaimed: (f64, u64),
 }
 
 /// The board.
@@ -184,9 +207,13 @@ impl Board {
         self.told().changes.pop_front()
     }
 
-    /// Notes the normalised squares of a scan's innovations, and that a scan was tracked now.
-    pub fn scan_done(&self, nis: impl Iterator<Item = f64>) {
+    /// Notes the normalised squares of a scan's innovations, what else it says, and that it was tracked now.
+    pub fn scan_done(&self, nis: impl Iterator<Item = f64>, notes: ScanNotes) {
         let mut told = self.told();
+        let n = told.unclaimed.1 + 1;
+        let share = 1.0 / n.min(LATELY) as f64;
+        told.unclaimed = (told.unclaimed.0 + share * (notes.unclaimed as f64 - told.unclaimed.0), n);
+        told.notes = notes;
         nis.filter(|v| v.is_finite()).for_each(|v| told.nis = (told.nis.0 + v, told.nis.1 + 1));
         let now = Instant::now();
         let rate = match told.rate {
@@ -204,6 +231,17 @@ impl Board {
     /// Scans a second lately; 0 where none came for two seconds.
     pub fn rate_hz(&self) -> f64 {
         self.told().rate.filter(|(at, _)| at.elapsed().as_secs_f64() < 2.0).map_or(0.0, |(_, rate)| rate)
+    }
+
+    /// Detections a scan beyond those that confirmed tracks took: their mean over some 300 scans.
+    pub fn unclaimed_per_scan(&self) -> Option<f64> {
+        let (mean, n) = self.told().unclaimed;
+        (n > 0).then_some(mean)
+    }
+
+    /// What the newest scan says.
+    pub fn notes(&self) -> ScanNotes {
+        self.told().notes
     }
 
     /// Mean of the normalised squared innovations, and their number; 2 where the filters are consistent.

@@ -11,6 +11,9 @@ pub const TRACK_SCHEMA: &str = "boresight.track/1";
 /// Name and version of the run's state.
 pub const STATUS_SCHEMA: &str = "boresight.status/1";
 
+/// The status of a track with a detection in its frame.
+pub const CONFIRMED: &str = "confirmed";
+
 /// A track's state at one time; the same on page, wire and record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackReport {
@@ -44,7 +47,7 @@ impl TrackReport {
     pub fn of(t: &TrackState) -> Option<Self> {
         let status = match t.status {
             TrackStatus::Tentative => return None,
-            TrackStatus::Confirmed => "confirmed",
+            TrackStatus::Confirmed => CONFIRMED,
             TrackStatus::Coasting => "coasting",
         };
         let (m, p) = (&t.kinematics.mean, &t.kinematics.cov);

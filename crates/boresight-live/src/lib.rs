@@ -6,6 +6,7 @@
 mod board;
 mod cbor;
 mod choose;
+mod eight_bits;
 mod event;
 mod histogram;
 mod lives;
@@ -24,7 +25,7 @@ mod stages;
 mod timeline;
 mod tune;
 
-pub use board::{Board, Counts, Said, State};
+pub use board::{Board, Counts, Said, ScanNotes, State};
 pub use cbor::Form;
 pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
 pub use histogram::Histogram;

@@ -4,9 +4,9 @@
 //! dropped and counted; the gap is a gap in time, which the filters know. While the source gives nothing, tracks coast: blind scans carry the
 //! time on, half a second behind the clock, until the budget of the configuration deletes them.
 
-use crate::board::{Board, State, add, read as read_count, unix_s};
+use crate::board::{Board, ScanNotes, State, add, read as read_count, unix_s};
 use crate::choose::{Kept, Ready};
-use crate::event::{Event, TrackReport, When, status_line};
+use crate::event::{CONFIRMED, Event, TrackReport, When, status_line};
 use crate::lives::Lives;
 use crate::output::{LiveOutput, Shown};
 use crate::slot::{Slot, Taken};
@@ -15,7 +15,7 @@ use crate::stages::Stages;
 use crate::tune::Change;
 use boresight::auto::DetectorKind;
 use boresight::io::StopFlag;
-use boresight::{Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View};
+use boresight::{CameraMotion, Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
@@ -226,6 +226,8 @@ impl<'o> Live<'o> {
 
     /// The scan of `stages` through the tracker to the outputs.
     fn track(&mut self, stages: &mut Stages, frame: Option<&Frame>, arrived_unix_s: f64, at: Instant) {
+        let pixels = frame.map(|f| f.pixels.width() * f.pixels.height());
+        let false_alarms_asked = pixels.and_then(|n| stages.false_alarms_asked(n));
         let (scan, tracks) = match stages.track() {
             Ok(tracked) => tracked,
             Err(e) => return self.refuse(&e),
@@ -261,7 +263,13 @@ impl<'o> Live<'o> {
         counts.now.store(self.reports.len() as u64, Ordering::Relaxed);
         counts.events_dropped.store(self.outputs.iter().map(|o| o.dropped()).sum(), Ordering::Relaxed);
         if !scan.blind {
-            self.board.scan_done(self.reports.iter().filter_map(|t| t.nis));
+            let n_claimed = self.reports.iter().filter(|t| t.status == CONFIRMED).count();
+            let unclaimed = scan.detections.len().saturating_sub(n_claimed);
+            let moved = |m: &CameraMotion| (m.now_from_before.apply(m.centre_px) - m.centre_px).norm();
+            let camera_moved_px = scan.camera_motion.as_ref().map(moved).filter(|px| px.is_finite());
+            add(&counts.unclaimed, unclaimed as u64);
+            let notes = ScanNotes { unclaimed, false_alarms_asked, camera_moved_px };
+            self.board.scan_done(self.reports.iter().filter_map(|t| t.nis), notes);
         }
         stages.last = Some((stages.scan.time, at));
         stages.n_steps += 1;

@@ -5,6 +5,7 @@ use crate::choose::{Ready, info_of};
 use crate::tune::Change;
 use boresight::track::Tracking;
 use boresight::vision::Detector;
+use boresight::vision::threshold::ThresholdConfig;
 use boresight::{
     Config, Error, ErrorKind, Frame, PixelKind, Result, Scan, Timestamp, TrackId, TrackState, track, vision,
 };
@@ -84,6 +85,15 @@ impl Stages {
         let tracks = self.tracking.step(&self.scan)?;
         self.n_tracks = tracks.len();
         Ok((&self.scan, numbered(tracks, self.first_id, &mut self.last_id, &mut self.renumbered)))
+    }
+
+    /// False detections that the detector is asked for in a frame of so many pixels; only some have such a knob.
+    pub fn false_alarms_asked(&self, pixels: usize) -> Option<f64> {
+        match &self.config.detector.threshold {
+            ThresholdConfig::Cfar(cfar) => Some(cfar.rate(pixels)),
+            ThresholdConfig::Integrate(integrate) => Some(integrate.false_alarms_per_frame),
+            _ => None,
+        }
     }
 
     /// Takes a changed parameter: the detector or the tracker begins anew.

@@ -72,6 +72,9 @@ pub struct Args {
     /// Record detections and tracks in rolling files in this folder; of several sources each in a folder of its own there.
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
+    /// Record the pictures too, as MP4 beside the tables: a tenth of a core at 1280 x 720 and 30 frames/s, more where pictures are noisy.
+    #[arg(long, requires = "record")]
+    record_video: bool,
     /// The oldest records go when all are larger than this, MB.
     #[arg(long, value_name = "MB", default_value_t = 8192, value_parser = clap::value_parser!(u64).range(1..))]
     record_mb: u64,
@@ -162,7 +165,8 @@ fn outputs(
             most_age: Duration::from_secs_f64(args.record_days * 86_400.0),
             ..RecordOptions::default()
         };
-        outputs.push(Box::new(Record::create(dir, limits)?));
+        let record = Record::create(dir, limits)?;
+        outputs.push(Box::new(if args.record_video { record.with_video(board)? } else { record }));
     }
     for target in targets {
         let target = within.map_or_else(|| target.clone(), |name| target.of_source(name));
@@ -226,8 +230,8 @@ fn serve(address: &str, args: &Args, boards: &[Arc<Board>]) -> anyhow::Result<Pa
             .hint("127.0.0.1:8090 for this machine alone, 0.0.0.0:8090 for others as well")
     };
     let found: SocketAddr = address.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(wrong)?;
-    let page =
-        Page::serve(&PageOptions { names: args.hosts.clone(), tune: args.tune, ..PageOptions::at(found) }, boards)?;
+    let options = PageOptions { names: args.hosts.clone(), tune: args.tune, ..PageOptions::at(found) };
+    let page = Page::serve(&options, boards)?;
     match page.token() {
         None => say!("page: http://{}/", page.address()),
         // The one time that it is shown.

@@ -3,13 +3,16 @@
 //! One run at a time writes a folder (a locked file keeps others out); the next one goes on with the next number. `manifest.json` appears whole at
 //! every change of segments. Only files with the names of segments are ever removed.
 
+use super::film::Film;
 use super::segment::{ENDINGS, Entry, Segment, path};
+use crate::board::Board;
 use crate::output::{LiveOutput, Shown};
-use boresight::{Config, Error, ErrorKind, Result, io};
+use boresight::{Config, Error, ErrorKind, PixelKind, Result, io};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 /// A manifest larger than this is none of ours, bytes.
@@ -59,6 +62,9 @@ pub struct Record {
     /// Closed segments by their number.
     closed: BTreeMap<u64, Entry>,
     rests_until: Option<Instant>,
+    film: Option<Film>,
+    /// Size and kind of the pictures: a video has one.
+    size: Option<(usize, usize, PixelKind)>,
 }
 
 impl Record {
@@ -82,7 +88,26 @@ impl Record {
                 *entry = Entry { bytes: entry.bytes, open: false, ..known };
             }
         }
-        Ok(Self { dir, options, config: String::new(), _lock: lock, open: None, closed, rests_until: None })
+        let (config, open, rests_until, film, size) = (String::new(), None, None, None, None);
+        Ok(Self { dir, options, config, _lock: lock, open, closed, rests_until, film, size })
+    }
+
+    /// Records the pictures too, as a video beside the tables; `board` counts and says what is left out of it.
+    /// # Errors
+    /// A system without threads.
+    pub fn with_video(mut self, board: &Arc<Board>) -> Result<Self> {
+        self.film = Some(Film::start(&self.dir, Arc::clone(board))?);
+        Ok(self)
+    }
+
+    /// What the manifest says of a segment, with its pictures.
+    fn told(&self, entry: &Entry) -> Entry {
+        let filmed =
+            self.film.as_ref().map(|film| film.of(entry.number)).filter(|filmed| *filmed != Default::default());
+        match filmed {
+            Some(filmed) => Entry { bytes: entry.bytes + filmed.bytes, video: Some(filmed), ..entry.clone() },
+            None => entry.clone(),
+        }
     }
 
     fn roll(&mut self) -> Result<()> {
@@ -110,21 +135,22 @@ impl Record {
             let age = modified.ok().and_then(|m| SystemTime::now().duration_since(m).ok());
             age.is_some_and(|age| age > self.options.most_age)
         };
-        let open = self.open.as_ref().map_or(0, |(s, _)| s.entry.bytes);
+        let open = self.open.as_ref().map_or(0, |(s, _)| self.told(&s.entry).bytes);
         while let Some((&oldest, _)) = self.closed.first_key_value() {
-            let bytes = open + self.closed.values().map(|e| e.bytes).sum::<u64>();
+            let bytes = open + self.closed.values().map(|e| self.told(e).bytes).sum::<u64>();
             if bytes <= self.options.most_bytes && !is_old(oldest) {
                 return;
             }
             self.closed.remove(&oldest);
+            self.film.iter().for_each(|film| film.forget(oldest));
             // One that is gone already is as gone as it shall be.
             ENDINGS.iter().for_each(|ending| drop(std::fs::remove_file(path(&self.dir, oldest, ending))));
         }
     }
 
     fn write_manifest(&self) -> Result<()> {
-        let open = self.open.as_ref().map(|(s, _)| s.entry.clone());
-        let segments = self.closed.values().cloned().chain(open).collect();
+        let open = self.open.as_ref().map(|(s, _)| &s.entry);
+        let segments = self.closed.values().chain(open).map(|entry| self.told(entry)).collect();
         let manifest = Manifest { schema: SCHEMA.into(), segments };
         let text = serde_json::to_vec_pretty(&manifest).unwrap_or_default();
         io::write_whole(self.dir.join("manifest.json"), &text)
@@ -132,15 +158,21 @@ impl Record {
 
     fn write(&mut self, shown: &Shown<'_>) -> Result<()> {
         let is_full = |(segment, since): &(Segment, Instant)| {
-            segment.entry.bytes >= self.options.segment_bytes || since.elapsed() >= self.options.segment_age
+            self.told(&segment.entry).bytes >= self.options.segment_bytes || since.elapsed() >= self.options.segment_age
         };
-        if self.open.as_ref().is_none_or(is_full) {
+        let pixels = shown.view.frame.filter(|_| self.film.is_some()).map(|frame| &frame.pixels);
+        let size = pixels.map(|p| (p.width(), p.height(), p.kind()));
+        let is_other = size.is_some() && self.size.is_some() && size != self.size;
+        if is_other || self.open.as_ref().is_none_or(is_full) {
             self.roll()?;
         }
-        match &mut self.open {
-            Some((segment, _)) => segment.put(shown),
-            None => Ok(()),
+        self.size = size.or(self.size);
+        let Some((segment, _)) = &mut self.open else { return Ok(()) };
+        segment.put(shown)?;
+        if let (Some(film), Some(pixels)) = (&mut self.film, pixels) {
+            film.put(segment.entry.number, pixels, shown.when.time);
         }
+        Ok(())
     }
 }
 
@@ -194,6 +226,7 @@ impl LiveOutput for Record {
 
     fn finish(&mut self) {
         self.close();
+        self.film.iter_mut().for_each(Film::finish);
         let _ = self.write_manifest();
     }
 }
@@ -240,5 +273,51 @@ mod tests {
             segments[1].frames.unwrap()[0],
             "no frame is lost between segments"
         );
+    }
+
+    #[test]
+    fn the_pictures_lie_beside_the_tables_of_their_segment_and_go_with_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let board = Arc::new(Board::new("cam", |_| {}));
+        let options = RecordOptions { segment_bytes: 20_000, most_bytes: 60_000, ..RecordOptions::default() };
+        let mut record = Record::create(dir.path(), options).unwrap().with_video(&board).unwrap();
+        for k in 0..400u64 {
+            let side = if k < 300 { 64 } else { 96 };
+            let image =
+                boresight::Image::from_vec(side, side, (0..side * side).map(|i| (i * 7919 % 251) as u8).collect());
+            let time = Timestamp::from_ns(k as i64 * 40_000_000);
+            let frame =
+                boresight::Frame { index: FrameIndex(k), time, pixels: boresight::Pixels::Gray8(image.unwrap()) };
+            let scan = Scan::at(FrameIndex(k), time);
+            let when = When { frame: k, time, arrived_unix_s: 1e9 };
+            let view = View { frame: Some(&frame), scan: &scan, tracks: &[] };
+            record.put(&Shown { view, when, tracks: &[], events: &[] }).unwrap();
+            // The pictures of a run come by the clock; here they wait for the coder.
+            while waits(&record) {
+                std::thread::yield_now();
+            }
+        }
+        record.finish();
+        let segments = read_manifest(&dir.path().join("manifest.json"));
+        assert!(segments[0].number > 1 && segments.len() > 2, "old ones went: {segments:?}");
+        assert!(!path(dir.path(), 1, "mp4").exists());
+        for entry in &segments {
+            let (file, frames) = (path(dir.path(), entry.number, "mp4"), entry.frames.unwrap());
+            let mut video = io::open(file.display().to_string(), &io::OpenOptions::default()).unwrap();
+            let mut n = 0;
+            while let Some(frame) = video.next_frame().unwrap() {
+                assert!((frame.time.ns - (frames[0] + n) as i64 * 40_000_000).abs() < 1000, "{entry:?}");
+                n += 1;
+            }
+            assert_eq!((n, entry.video.unwrap().frames), (frames[1] + 1 - frames[0], n), "{entry:?}");
+            assert_eq!(entry.video.unwrap().left_out, 0);
+        }
+        let bytes: u64 = segments.iter().map(|e| e.bytes).sum();
+        let on_disk: u64 = on_disk(dir.path()).unwrap().values().map(|e| e.bytes).sum();
+        assert_eq!(bytes, on_disk);
+    }
+
+    fn waits(record: &Record) -> bool {
+        record.film.as_ref().is_some_and(|film| film.n_waiting() > 4)
     }
 }

@@ -2,8 +2,9 @@
 //! back to the last whole line.
 //!
 //! `000001.jsonl` holds every scan with its detections and tracks, and can be given to `boresight live` again; `000001.detections.csv` and
-//! `000001.tracks.csv` are the tables of `boresight track`, `000001.config.toml` is the run's configuration.
+//! `000001.tracks.csv` are the tables of `boresight track`, `000001.config.toml` is the run's configuration, `000001.mp4` ([`super::film`]) its pictures.
 
+use super::film::Filmed;
 use crate::motion::MotionLine;
 use crate::output::Shown;
 use boresight::io::{self, DetectionsCsv, JsonLines, Output, TracksCsv};
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Endings of a segment's files.
-pub const ENDINGS: [&str; 4] = ["jsonl", "detections.csv", "tracks.csv", "config.toml"];
+pub const ENDINGS: [&str; 5] = ["jsonl", "detections.csv", "tracks.csv", "config.toml", "mp4"];
 
 /// What the manifest says of a segment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -35,6 +36,9 @@ pub struct Entry {
     /// When its first and last frame arrived, s since 1970.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arrived_unix_s: Option<[f64; 2]>,
+    /// What became of its pictures, where they are recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub video: Option<Filmed>,
 }
 
 /// The file of a segment.

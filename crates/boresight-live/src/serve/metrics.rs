@@ -12,7 +12,7 @@ const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5
 /// A number of a source: its name, its kind, what it is, and how it is had; `None`: it is not known yet.
 type Number = (&'static str, &'static str, &'static str, fn(&Board) -> Option<f64>);
 
-const NUMBERS: [Number; 17] = [
+const NUMBERS: [Number; 23] = [
     ("frames_total", "counter", "Frames or scans that came from the source.", |b| count(&b.counts.arrived)),
     ("frames_tracked_total", "counter", "Frames that went through detector and tracker.", |b| count(&b.counts.tracked)),
     ("frames_dropped_total", "counter", "Frames that a newer one replaced.", |b| count(&b.counts.dropped)),
@@ -20,12 +20,31 @@ const NUMBERS: [Number; 17] = [
     ("bad_lines_total", "counter", "Lines of detections that could not be read.", |b| count(&b.counts.bad_lines)),
     ("source_lost_total", "counter", "Times that the source was lost.", |b| count(&b.counts.lost)),
     ("detections_total", "counter", "Detections.", |b| count(&b.counts.detections)),
+    ("detections_unclaimed_total", "counter", "Detections beyond those that confirmed tracks took.", |b| {
+        count(&b.counts.unclaimed)
+    }),
+    ("false_alarms_asked_per_frame", "gauge", "False detections a frame that the detector was asked for.", |b| {
+        b.notes().false_alarms_asked
+    }),
+    (
+        "false_alarms_seen_per_frame",
+        "gauge",
+        "Detections a frame beyond those that confirmed tracks took, lately.",
+        |b| b.unclaimed_per_scan(),
+    ),
+    ("camera_motion_px", "gauge", "How far the background moved since the frame before.", |b| {
+        b.notes().camera_moved_px
+    }),
     ("tracks_total", "counter", "Tracks that were confirmed.", |b| count(&b.counts.tracks)),
     ("tracks", "gauge", "Confirmed tracks now.", |b| count(&b.counts.now)),
     ("events_total", "counter", "Events for the wire.", |b| count(&b.counts.events)),
     ("events_dropped_total", "counter", "Events that an output could not take.", |b| count(&b.counts.events_dropped)),
     ("output_failures_total", "counter", "Frames that an output could not write.", |b| {
         count(&b.counts.record_failures)
+    }),
+    ("video_frames_total", "counter", "Frames in the record's video.", |b| count(&b.counts.video_frames)),
+    ("video_frames_left_out_total", "counter", "Frames left out of the record's video.", |b| {
+        count(&b.counts.video_left_out)
     }),
     ("viewers", "gauge", "Viewers of the page.", |b| count(&b.counts.viewers)),
     ("rate_hz", "gauge", "Frames tracked a second.", |b| Some(b.rate_hz())),

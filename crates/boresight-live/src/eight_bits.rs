@@ -1,0 +1,92 @@
+//! Frames as a screen and a video take them: 8 bits, levels that follow the scene, reduced by whole factors to a largest size.
+//!
+//! 8-bit pixels keep their values; of others the 0.5 % and the 99.5 % quantile of a sample of the frame become black and white.
+
+use boresight::{Image, Pixels};
+use std::borrow::Cow;
+
+/// Pixels looked at for the levels.
+const SAMPLE: usize = 4096;
+
+/// Brings one frame after another to 8 bits.
+pub struct EightBits {
+    /// Largest longer and shorter side, px.
+    largest: (usize, usize),
+    sample: Vec<f32>,
+}
+
+impl EightBits {
+    /// Frames of at most these longer and shorter sides, px.
+    pub fn at_most(long: usize, short: usize) -> Self {
+        Self { largest: (long, short), sample: Vec::new() }
+    }
+
+    /// The frame in 8 bits, grey or RGB; `None` if it has no pixels.
+    pub fn of<'p>(&mut self, pixels: &'p Pixels) -> Option<Cow<'p, Pixels>> {
+        let (w, h) = (pixels.width(), pixels.height());
+        if w == 0 || h == 0 {
+            return None;
+        }
+        let step = w.max(h).div_ceil(self.largest.0).max(w.min(h).div_ceil(self.largest.1));
+        let (cols, rows) = (w.div_ceil(step), h.div_ceil(step));
+        let gray = |values: Vec<u8>| Image::from_vec(cols, rows, values).map(|i| Cow::Owned(Pixels::Gray8(i)));
+        let mut values = Vec::with_capacity(cols * rows);
+        match pixels {
+            Pixels::Gray8(_) | Pixels::Rgb8(_) if step == 1 => Some(Cow::Borrowed(pixels)),
+            Pixels::Gray8(i) => {
+                reduce(i.as_slice(), w, step, |v| values.push(v));
+                gray(values)
+            }
+            Pixels::Rgb8(i) => {
+                let mut values = Vec::with_capacity(cols * rows);
+                reduce(i.as_slice(), w, step, |v| values.push(v));
+                Image::from_vec(cols, rows, values).map(|i| Cow::Owned(Pixels::Rgb8(i)))
+            }
+            Pixels::Gray16(i) => {
+                let (low, gain) = levels(&mut self.sample, i.as_slice().iter().map(|v| f32::from(*v)));
+                reduce(i.as_slice(), w, step, |v| values.push(((f32::from(v) - low) * gain) as u8));
+                gray(values)
+            }
+            Pixels::GrayF32(i) => {
+                let (low, gain) = levels(&mut self.sample, i.as_slice().iter().copied());
+                reduce(i.as_slice(), w, step, |v| values.push(((v - low) * gain) as u8));
+                gray(values)
+            }
+        }
+    }
+}
+
+/// Every `step`-th pixel of every `step`-th row.
+fn reduce<T: Copy>(pixels: &[T], width: usize, step: usize, mut put: impl FnMut(T)) {
+    pixels.chunks_exact(width).step_by(step).for_each(|row| row.iter().step_by(step).for_each(|v| put(*v)));
+}
+
+/// Black, and the gain to 255: the 0.5 % and 99.5 % quantiles of a sample.
+fn levels(sample: &mut Vec<f32>, pixels: impl ExactSizeIterator<Item = f32>) -> (f32, f32) {
+    // Odd, so that the sample is spread over columns.
+    let stride = (pixels.len() / SAMPLE).max(1) | 1;
+    sample.clear();
+    sample.extend(pixels.step_by(stride).filter(|v| v.is_finite()));
+    sample.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| sample.get((sample.len() as f64 * share) as usize).copied().unwrap_or(0.0);
+    let (low, high) = (at(0.005), at(0.995));
+    (low, 255.0 / (high - low).max(1e-6))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bits_stay_and_others_are_spread_over_the_scene() {
+        let mut eight = EightBits::at_most(1280, 1280);
+        let plain = Pixels::Gray8(Image::filled(64, 48, 9));
+        assert!(matches!(eight.of(&plain), Some(Cow::Borrowed(_))));
+        let ramp = Pixels::Gray16(Image::from_vec(100, 1, (0..100).map(|v| 1000 + 10 * v).collect()).unwrap());
+        let Pixels::Gray8(ramp) = eight.of(&ramp).unwrap().into_owned() else { panic!("grey") };
+        assert!(ramp.as_slice().is_sorted() && ramp.as_slice()[0] == 0 && ramp.as_slice()[99] == 255);
+        let large = Pixels::Rgb8(Image::filled(2561, 10, [1, 2, 3]));
+        let large = eight.of(&large).unwrap();
+        assert_eq!((large.width(), large.height()), (854, 4));
+    }
+}
