@@ -37,5 +37,5 @@ pub use publish::{Broker, Lines, Mqtt, Target, Udp, publisher};
 pub use record::{Record, RecordOptions};
 pub use run::{RunOptions, run};
 pub use run_all::{OneRun, run_all};
-pub use serve::{Page, PageOptions, resident_bytes};
+pub use serve::{Page, PageOptions, TlsFiles, resident_bytes};
 pub use source::{Address, Connect, Content, Feed, Frames, NamedSource, Paced, Pauses, name_sources};

@@ -6,7 +6,7 @@ use boresight::auto::DetectorKind;
 use boresight::{Config, Error, ErrorKind};
 use boresight_live::{
     Address, Board, LiveOutput, NamedSource, OneRun, Page, PageOptions, Pauses, Record, RecordOptions, RunOptions,
-    Target, latency, name_sources, publisher, run_all, soak,
+    Target, TlsFiles, latency, name_sources, publisher, run_all, soak,
 };
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -57,6 +57,12 @@ pub struct Args {
     /// Show a page at this address, such as 127.0.0.1:8090. Any but this machine's own address demands a token, which is printed.
     #[arg(long, value_name = "ADDRESS")]
     serve: Option<String>,
+    /// Serve the page by TLS (https) with this certificate, or chain of them, as PEM.
+    #[arg(long, value_name = "FILE", requires = "serve", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Private key of --tls-cert, as PEM.
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
     /// Let the page change a few parameters while the run goes on; each change is said, and shown as TOML to copy.
     #[arg(long, requires = "serve")]
     tune: bool,
@@ -230,17 +236,19 @@ fn serve(address: &str, args: &Args, boards: &[Arc<Board>]) -> anyhow::Result<Pa
             .hint("127.0.0.1:8090 for this machine alone, 0.0.0.0:8090 for others as well")
     };
     let found: SocketAddr = address.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(wrong)?;
-    let options = PageOptions { names: args.hosts.clone(), tune: args.tune, ..PageOptions::at(found) };
+    let tls = args.tls_cert.clone().zip(args.tls_key.clone()).map(|(cert, key)| TlsFiles { cert, key });
+    let options = PageOptions { names: args.hosts.clone(), tune: args.tune, tls, ..PageOptions::at(found) };
     let page = Page::serve(&options, boards)?;
+    let scheme = page.scheme();
     match page.token() {
-        None => say!("page: http://{}/", page.address()),
+        None => say!("page: {scheme}://{}/", page.address()),
         // The one time that it is shown.
         Some(token) => {
             let (ip, port) = (page.address().ip(), page.address().port());
             // All addresses of this machine are none that a browser opens.
             let host = if ip.is_unspecified() { "THIS-MACHINE".to_string() } else { page.address().ip().to_string() };
             let host = if host.contains(':') { format!("[{host}]") } else { host };
-            say!("page: http://{host}:{port}/?token={token}");
+            say!("page: {scheme}://{host}:{port}/?token={token}");
         }
     }
     Ok(page)

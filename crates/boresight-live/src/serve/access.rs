@@ -32,6 +32,8 @@ pub struct Access {
     secrets: Option<Secrets>,
     /// The token that a change brings, where changes are allowed.
     change: Option<String>,
+    /// Whether it is reached by TLS alone: the cookie then goes no other way.
+    is_tls: bool,
 }
 
 /// The header with the token of a change.
@@ -84,7 +86,13 @@ impl Access {
             true => None,
             false => Some(Secrets { token: random()?, cookie: random()? }),
         };
-        Ok(Self { address, names: names.iter().map(|n| n.to_ascii_lowercase()).collect(), secrets, change: None })
+        Ok(Self {
+            address,
+            names: names.iter().map(|n| n.to_ascii_lowercase()).collect(),
+            secrets,
+            change: None,
+            is_tls: false,
+        })
     }
 
     /// The same, where parameters may be changed.
@@ -92,6 +100,11 @@ impl Access {
     /// A system without randomness.
     pub fn with_changes(self) -> Result<Self> {
         Ok(Self { change: Some(random()?), ..self })
+    }
+
+    /// The same, where the page is served by TLS.
+    pub fn over_tls(self) -> Self {
+        Self { is_tls: true, ..self }
     }
 
     /// The token that a change must bring, where changes are allowed.
@@ -169,7 +182,8 @@ impl Access {
         let mut pairs = uri.query().unwrap_or("").split('&').filter_map(|pair| pair.split_once('='));
         let given = pairs.find(|(key, _)| *key == "token").map(|(_, value)| value);
         if uri.path() == "/" && given.is_some_and(|token| is_same(token.as_bytes(), secrets.token.as_bytes())) {
-            return Verdict::Welcome(format!("{name}={}; Path=/; HttpOnly; SameSite=Strict", secrets.cookie));
+            let secure = if self.is_tls { "; Secure" } else { "" };
+            return Verdict::Welcome(format!("{name}={}; Path=/; HttpOnly; SameSite=Strict{secure}", secrets.cookie));
         }
         Verdict::Refuse(StatusCode::UNAUTHORIZED, "a token is needed: open the address that was printed at the start\n")
     }

@@ -8,7 +8,9 @@ mod page_output;
 mod picture;
 mod routes;
 mod server;
+mod tls;
 mod viewer;
 
 pub use metrics::resident_bytes;
 pub use server::{Page, PageOptions};
+pub use tls::TlsFiles;
