@@ -1,8 +1,9 @@
-//! From what stands on the command line to a source: an address, a camera, a file played by the clock, standard input.
+//! From what stands on the command line to a source: an address, a camera, a file played by the clock, detections by TCP, standard input.
 
 use super::detection_lines::DetectionLines;
 use super::feed::{Connect, Feed, Frames};
 use super::pace::Paced;
+use super::socket::Socket;
 use boresight::config::InputConfig;
 use boresight::io::StopFlag;
 use boresight::{Error, ErrorKind, Result, io};
@@ -18,13 +19,23 @@ pub struct Address {
     has_rate: bool,
     gives_lines: bool,
     stop: StopFlag,
+    /// Where detections come by TCP.
+    socket: Option<Socket>,
 }
 
 impl Address {
     /// A source: `rtsp://..`, `/dev/video0`, a file, or `-`. `pace` plays by the clock; `has_rate` says that the rate of `input` was given, and holds
     /// for a stream without times of its own.
     pub fn new(name: &str, input: InputConfig, pace: bool, has_rate: bool) -> Self {
-        Self { name: name.to_string(), input, pace, has_rate, gives_lines: false, stop: StopFlag::default() }
+        Self {
+            name: name.to_string(),
+            input,
+            pace,
+            has_rate,
+            gives_lines: false,
+            stop: StopFlag::default(),
+            socket: None,
+        }
     }
 
     fn is_stream(&self) -> bool {
@@ -33,6 +44,15 @@ impl Address {
 
     fn open(&mut self) -> Result<Box<dyn Feed>> {
         self.gives_lines = false;
+        if self.socket.is_none()
+            && let Some(socket) = Socket::parse(&self.name, self.stop.clone())
+        {
+            self.socket = Some(socket?);
+        }
+        if let Some(socket) = &mut self.socket {
+            self.gives_lines = true;
+            return Ok(Box::new(DetectionLines::new(BufReader::new(socket.connect()?))));
+        }
         if self.name == "-" {
             if begins_as_json(&mut stdin().lock()) {
                 self.gives_lines = true;

@@ -6,6 +6,7 @@ mod feed;
 mod names;
 mod pace;
 mod reader;
+mod socket;
 
 pub use address::Address;
 pub use feed::{Connect, Content, Feed, Frames};
