@@ -1,15 +1,14 @@
 //! The pictures of a record: a fragmented MP4 beside each segment's tables, coded on a thread of its own that the run never waits for.
 //!
-//! A few frames may wait for the coder; when these places are full a frame is left out of the video, counted and, the first time, said. What was handed to the file stays
+//! Frames wait for the coder, eight or 64 MB of them; when these places are full a frame is left out of the video, counted and, the first time, said. What was handed to the file stays
 //! readable after a kill at any moment: whole fragments of a second, each written at once; what a full disk cuts off is taken back to the last whole one.
 //! Times in the file are those of the tables. 8-bit pixels are coded as they come, others with levels that follow the scene; sizes beyond the coder's are reduced.
 
-use super::segment::path;
+use super::entry::{Filmed, path};
 use crate::board::{Board, add};
 use crate::eight_bits::EightBits;
 use boresight::io::video::{MAX_SIZE, Mp4Fragments, Mp4Options};
 use boresight::{Error, ErrorKind, Pixels, Result, Timestamp};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -20,28 +19,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Frames that wait for the coder.
+/// Frames that wait for the coder, at most, and bytes that may wait where they are more: the first frames come at once when the configuration is chosen.
 const WAITING: usize = 8;
+const WAITING_BYTES: usize = 64 << 20;
 /// Silence after which the fragment that is being made is written out.
 const SILENCE: Duration = Duration::from_secs(1);
 /// How long a file that cannot be written rests.
 const REST: Duration = Duration::from_secs(10);
 
-/// What became of a segment's pictures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Filmed {
-    /// Frames in the file.
-    pub frames: u64,
-    /// Frames that were left out.
-    pub left_out: u64,
-    /// Bytes of the file.
-    #[serde(skip)]
-    pub bytes: u64,
-}
-
 #[derive(Default)]
 struct Shared {
     waiting: AtomicUsize,
+    waiting_bytes: AtomicUsize,
     filmed: Mutex<BTreeMap<u64, Filmed>>,
 }
 
@@ -49,6 +38,16 @@ impl Shared {
     fn note(&self, number: u64, f: impl FnOnce(&mut Filmed)) {
         f(self.filmed.lock().unwrap_or_else(PoisonError::into_inner).entry(number).or_default());
     }
+}
+
+fn bytes_of(pixels: &Pixels) -> usize {
+    let bytes = match pixels {
+        Pixels::Gray8(_) => 1,
+        Pixels::Gray16(_) => 2,
+        Pixels::Rgb8(_) => 3,
+        Pixels::GrayF32(_) => 4,
+    };
+    pixels.width() * pixels.height() * bytes
 }
 
 struct Shot {
@@ -91,7 +90,9 @@ impl Film {
     /// Takes a frame of the segment with this number, if there is room.
     pub fn put(&mut self, number: u64, pixels: &Pixels, time: Timestamp) {
         // Only this thread adds.
-        if self.shared.waiting.load(Ordering::Acquire) >= WAITING {
+        let bytes = bytes_of(pixels);
+        let is_full = self.shared.waiting.load(Ordering::Acquire) >= WAITING;
+        if is_full && self.shared.waiting_bytes.load(Ordering::Acquire) + bytes > WAITING_BYTES {
             self.shared.note(number, |filmed| filmed.left_out += 1);
             add(&self.board.counts.video_left_out, 1);
             if !std::mem::replace(&mut self.has_said, true) {
@@ -103,6 +104,7 @@ impl Film {
             return;
         }
         self.shared.waiting.fetch_add(1, Ordering::AcqRel);
+        self.shared.waiting_bytes.fetch_add(bytes, Ordering::AcqRel);
         if let Some(shots) = &self.shots {
             // The thread takes until the sender is gone.
             let _ = shots.send(Shot { number, pixels: pixels.clone(), time });
@@ -164,6 +166,7 @@ impl Coder {
                 Ok(shot) => {
                     let outcome = self.take(&shot);
                     self.shared.waiting.fetch_sub(1, Ordering::AcqRel);
+                    self.shared.waiting_bytes.fetch_sub(bytes_of(&shot.pixels), Ordering::AcqRel);
                     if let Err(e) = outcome {
                         self.shared.note(shot.number, |filmed| filmed.left_out += 1);
                         add(&self.board.counts.video_left_out, 1);

@@ -3,8 +3,9 @@
 //! One run at a time writes a folder (a locked file keeps others out); the next one goes on with the next number. `manifest.json` appears whole at
 //! every change of segments. Only files with the names of segments are ever removed.
 
+use super::entry::{ENDINGS, Entry, path};
 use super::film::Film;
-use super::segment::{ENDINGS, Entry, Segment, path};
+use super::segment::Segment;
 use crate::board::Board;
 use crate::output::{LiveOutput, Shown};
 use boresight::{Config, Error, ErrorKind, PixelKind, Result, io};

@@ -1,5 +1,6 @@
 //! What is kept of a run: rolling tables and lines.
 
+mod entry;
 mod film;
 mod folder;
 mod segment;

@@ -4,47 +4,15 @@
 //! `000001.jsonl` holds every scan with its detections and tracks, and can be given to `boresight live` again; `000001.detections.csv` and
 //! `000001.tracks.csv` are the tables of `boresight track`, `000001.config.toml` is the run's configuration, `000001.mp4` ([`super::film`]) its pictures.
 
-use super::film::Filmed;
+use super::entry::{ENDINGS, Entry, path};
 use crate::motion::MotionLine;
 use crate::output::Shown;
 use boresight::io::{self, DetectionsCsv, JsonLines, Output, TracksCsv};
 use boresight::{Error, ErrorKind, Result, Sink};
-use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Endings of a segment's files.
-pub const ENDINGS: [&str; 5] = ["jsonl", "detections.csv", "tracks.csv", "config.toml", "mp4"];
-
-/// What the manifest says of a segment.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
-    /// Its number.
-    pub number: u64,
-    /// Bytes of its files.
-    pub bytes: u64,
-    /// Whether it is still written.
-    pub open: bool,
-    /// First and last frame and time of the run; absent if nothing is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub frames: Option<[u64; 2]>,
-    /// See `frames`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub times_s: Option<[f64; 2]>,
-    /// When its first and last frame arrived, s since 1970.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub arrived_unix_s: Option<[f64; 2]>,
-    /// What became of its pictures, where they are recorded.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub video: Option<Filmed>,
-}
-
-/// The file of a segment.
-pub fn path(dir: &Path, number: u64, ending: &str) -> PathBuf {
-    dir.join(format!("{number:06}.{ending}"))
-}
 
 /// Memory that a sink of the library writes to.
 #[derive(Clone, Default)]

@@ -5,8 +5,7 @@
 //! Limits: 8 bits, sides of 16 to [`MAX_SIZE`] pixels.
 
 use super::i420::I420;
-use super::mp4::MAX_SIZE;
-use super::options::Mp4Options;
+use super::options::{MAX_SIZE, Mp4Options};
 use crate::{Error, ErrorKind, Image, Pixels, Result};
 use openh264::OpenH264API;
 use openh264::encoder::{

@@ -9,5 +9,5 @@ mod options;
 
 pub use coder::{CodedPicture, H264Coder};
 pub use fragments::Mp4Fragments;
-pub use mp4::{MAX_SIZE, Mp4Writer};
-pub use options::Mp4Options;
+pub use mp4::Mp4Writer;
+pub use options::{MAX_SIZE, Mp4Options};

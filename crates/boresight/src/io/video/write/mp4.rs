@@ -6,14 +6,11 @@
 //! Limits: 8 bit 4:2:0, at most 3840 x 2160 pixels (level 5.2 of the encoder), one hour between two frames.
 
 use super::encoding::{Encoding, Work};
-use super::options::Mp4Options;
+use super::options::{MAX_SIZE, Mp4Options};
 use crate::{Error, ErrorKind, Image, Result, Timestamp};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
-
-/// Largest picture that the encoder takes, px (longer side, shorter side).
-pub const MAX_SIZE: (usize, usize) = (3840, 2160);
 
 /// A video being written.
 pub struct Mp4Writer {

@@ -1,5 +1,8 @@
 //! How a video is written.
 
+/// Largest picture that the encoder takes, px (longer side, shorter side).
+pub const MAX_SIZE: (usize, usize) = (3840, 2160);
+
 /// How a video is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mp4Options {
