@@ -1,5 +1,5 @@
 //! The page of `boresight live` in a real browser, from the outside: it opens, tracks are drawn where the simulated targets are, a click shows the curves, a slow viewer gets fewer pictures,
-//! and the page comes back when the server does.
+//! H.264 is shown where it is decoded, and the page comes back when the server does.
 //!
 //! Needs Chromium (Debian: `apt-get install chromium`); without it the tests show as ignored. `BORESIGHT_SCREENSHOTS=DIR` keeps pictures of the page.
 
@@ -149,7 +149,7 @@ fn a_viewer_of_one_picture_a_second_gets_the_newest_and_slows_nothing(browser: &
     made(dir.path());
     let live = Live::start(dir.path(), "127.0.0.1:0", &["sim/frames.y4m"]);
     let mut page = Browser::start(browser, &dir.path().join("profile"));
-    page.open(&live.1, [800, 600]);
+    page.open(&format!("{}?jpeg", live.1), [800, 600]);
     page.until("typeof held === 'object' && held.length > 5");
     page.value("window.requestAnimationFrame = (draw) => setTimeout(draw, 1000)");
     std::thread::sleep(Duration::from_millis(1500));
@@ -161,6 +161,65 @@ fn a_viewer_of_one_picture_a_second_gets_the_newest_and_slows_nothing(browser: &
     let (pictures, frames) = (after[0] - before[0], after[1] - before[1]);
     assert!((2..=6).contains(&pictures) && frames > 60, "{pictures} pictures of {frames} frames");
     assert!(after[2] - before[2] < 10, "the tracker dropped {} frames", after[2] - before[2]);
+}
+
+/// Brightness of the canvas at a place of the frame: what lies below the boxes and points, which are left away.
+const BRIGHT: &str = r"(x, y) => {
+    const scale = canvas.width / extent(drawn.shot)[0];
+    return canvas.getContext('2d').getImageData(Math.round((x + 0.5) * scale), Math.round((y + 0.5) * scale), 1, 1).data[1];
+}";
+
+fn pictures_come_as_h264_are_stepped_through_and_give_way_to_jpeg(browser: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    made(dir.path());
+    let live = Live::start(dir.path(), "127.0.0.1:0", &["sim/frames.y4m"]);
+    let mut page = Browser::start(browser, &dir.path().join("profile"));
+    page.open(&live.1, [800, 600]);
+    page.until("typeof held === 'object' && held.length > 60 && held.at(-1).size > 0");
+    if page.value("held.at(-1).chunk === null") == true {
+        assert_eq!(page.value("held.at(-1).jpeg !== null"), true);
+        eprintln!("this Chromium decodes no H.264: JPEG is shown");
+        return;
+    }
+    page.value("for (const id of ['boxes', 'trails', 'ellipses', 'dots']) document.getElementById(id).checked = false; pause(true)");
+    page.until("drawn === held[at]");
+    let shows_both = |page: &mut Browser| {
+        let time_s = page.value("drawn.shot.time_s").as_f64().unwrap();
+        for k in 0..2 {
+            // The lower left of a target: the number stands above its box.
+            let [x, y] = place(k, time_s);
+            let [on, off] =
+                [y + 2.0, y + 12.0].map(|y| page.value(&format!("({BRIGHT})({}, {y})", x - 2.0)).as_f64().unwrap());
+            assert!(on > 110.0 && off < 90.0, "{on} on the target and {off} below it, at {time_s} s");
+        }
+    };
+    shows_both(&mut page);
+    // Back, over more than a key, and on by one: each is decoded after those that it needs.
+    page.value("step(-40)");
+    page.until("drawn === held[at]");
+    shows_both(&mut page);
+    page.value("step(1)");
+    page.until("drawn === held[at]");
+    shows_both(&mut page);
+    page.value("pause(false)");
+    page.until("drawn === held.at(-1) && !paused");
+
+    // A slow one goes on at keys, and shows what is new.
+    page.value("window.requestAnimationFrame = (draw) => setTimeout(draw, 1000)");
+    std::thread::sleep(Duration::from_secs(2));
+    let count = "[held.length, held.at(-1).shot.frame, held.at(-1).shot.dropped]";
+    let before: [u64; 3] = serde_json::from_value(page.value(count)).unwrap();
+    std::thread::sleep(Duration::from_secs(4));
+    let after: [u64; 3] = serde_json::from_value(page.value(count)).unwrap();
+    let (pictures, frames) = (after[0] - before[0], after[1] - before[1]);
+    assert!((2..=14).contains(&pictures) && frames > 50, "{pictures} pictures of {frames} frames");
+    assert!(after[2] - before[2] < 10, "the tracker dropped {} frames", after[2] - before[2]);
+    page.value("window.requestAnimationFrame = (draw) => setTimeout(draw, 10)");
+
+    // What cannot be decoded comes as JPEG.
+    page.value("VideoDecoder.prototype.decode = () => { throw new Error('nothing is decoded here'); }");
+    page.until("held.at(-1).jpeg !== null && drawn === held.at(-1)");
+    assert_eq!(page.value("no_video"), true);
 }
 
 fn the_page_comes_back_with_the_server(browser: &Path) {
@@ -241,7 +300,11 @@ fn sliders_change_the_run_and_show_it_as_toml(browser: &Path) {
 type Test = fn(&Path);
 
 fn main() -> std::process::ExitCode {
-    let tests: [(&str, Test); 5] = [
+    let tests: [(&str, Test); 6] = [
+        (
+            "pictures_come_as_h264_are_stepped_through_and_give_way_to_jpeg",
+            pictures_come_as_h264_are_stepped_through_and_give_way_to_jpeg,
+        ),
         ("sliders_change_the_run_and_show_it_as_toml", sliders_change_the_run_and_show_it_as_toml),
         ("the_page_shows_the_targets_where_they_are", the_page_shows_the_targets_where_they_are),
         (

@@ -5,6 +5,7 @@ use crate::event::TrackReport;
 use crate::output::Shown;
 use axum::body::Bytes;
 use serde::Serialize;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::{broadcast, watch};
 
@@ -110,12 +111,28 @@ impl Seen {
     }
 }
 
+/// A coded picture on its way to viewers, with its text.
+#[derive(Clone)]
+pub struct Coded {
+    /// Length of the JSON (4 bytes, the highest first), JSON, length of the coding's name (1 byte, 0 of what needs the picture before), the name, the picture (may be empty).
+    pub bytes: Bytes,
+    /// Whether decoding can start with the picture; `None`: there is none.
+    pub key: Option<bool>,
+}
+
+/// Coded pictures that a viewer may lag behind before it loses some.
+const CODED: usize = 64;
+
 /// The hub.
 pub struct Hub {
     /// What the run says of itself.
     pub board: Arc<Board>,
     /// The newest message for viewers: length of the JSON (4 bytes, the highest first), JSON, JPEG (may be empty).
     pub message: watch::Sender<Bytes>,
+    /// Coded pictures, for viewers who take H.264; `None` where the frames cannot be coded.
+    pub coded: broadcast::Sender<Option<Coded>>,
+    /// Whether one of them waits for a picture from which decoding can start.
+    pub wants_key: AtomicBool,
     /// Events.
     pub events: broadcast::Sender<Arc<str>>,
     newest: Mutex<Seen>,
@@ -125,7 +142,8 @@ impl Hub {
     /// A hub without viewers.
     pub fn new(board: Arc<Board>) -> Self {
         let message = watch::Sender::new(message(&Seen::default().json(&board), &[]));
-        Self { board, message, events: broadcast::Sender::new(EVENTS), newest: Mutex::default() }
+        let (coded, wants_key) = (broadcast::Sender::new(CODED), AtomicBool::new(false));
+        Self { board, message, coded, wants_key, events: broadcast::Sender::new(EVENTS), newest: Mutex::default() }
     }
 
     fn newest(&self) -> MutexGuard<'_, Seen> {
@@ -150,4 +168,11 @@ impl Hub {
 pub fn message(json: &str, jpeg: &[u8]) -> Bytes {
     let n = u32::try_from(json.len()).unwrap_or(0);
     [&n.to_be_bytes(), json.as_bytes(), jpeg].concat().into()
+}
+
+/// A message for viewers who take H.264: a picture that is a key brings the name of its coding.
+pub fn coded_message(json: &str, codec: &str, picture: &[u8]) -> Bytes {
+    let n = u32::try_from(json.len()).unwrap_or(0);
+    let named = u8::try_from(codec.len()).unwrap_or(0);
+    [&n.to_be_bytes(), json.as_bytes(), &[named], codec.as_bytes(), picture].concat().into()
 }

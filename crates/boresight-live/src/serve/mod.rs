@@ -1,6 +1,7 @@
 //! The page: what a browser sees of the run, and what programs ask of it.
 
 mod access;
+mod coded_pictures;
 mod hub;
 mod hubs;
 mod metrics;

@@ -5,6 +5,7 @@ const rows = new Map();
 const $ = (id) => document.getElementById(id);
 const canvas = $("picture"), shift = $("shift");
 let held = [], bytes = 0, paused = false, at = -1, chosen = null, drawn = null, bitmap = null, socket = null, pause_ms = 500;
+let no_video = false, decoder = null, fed = null, wanted = null, turn = Promise.resolve(), n_chunks = 0, n_decoded = 0;
 let source = new URLSearchParams(location.search).get("source");
 
 const colour = (id) => `hsl(${(id * 137.5) % 360} 85% 60%)`;
@@ -28,20 +29,39 @@ async function look_for_sources() {
   box.value = source;
 }
 
+/** Whether pictures may come as H.264: browsers decode it where the page is by https or on this machine; `?jpeg` behind the page's address leaves it away. */
+async function takes_video() {
+  if (no_video || !window.VideoDecoder || new URLSearchParams(location.search).has("jpeg")) return false;
+  try { return (await VideoDecoder.isConfigSupported({ codec: "avc1.42c028", optimizeForLatency: true })).supported; } catch { return false; }
+}
+
 async function connect() {
-  try { await look_for_sources(); } catch { return again(); }
+  let video;
+  try { await look_for_sources(); video = await takes_video(); } catch { return again(); }
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket = new WebSocket(`${scheme}://${location.host}/api/view?source=${encodeURIComponent(source)}`);
+  socket = new WebSocket(`${scheme}://${location.host}/api/view?source=${encodeURIComponent(source)}${video ? "&video=h264" : ""}`);
   socket.binaryType = "arraybuffer";
   const mine = socket;
   socket.onmessage = async (message) => {
     pause_ms = 500;
-    try { await take(message.data); } catch (error) { console.error(error); }
+    try { await take(message.data, video); } catch (error) { console.error(error); }
     // The next comes when this one is drawn: a slow viewer gets fewer.
     const next = () => { if (mine.readyState === WebSocket.OPEN) mine.send("next"); };
     if (document.hidden) setTimeout(next, 1000); else requestAnimationFrame(next);
   };
-  socket.onclose = again;
+  const before = n_decoded;
+  socket.onclose = () => {
+    // One that never brought a picture: the next try takes JPEG.
+    if (video && n_decoded === before && held.length > 0) no_video = true;
+    if (mine === socket) again();
+  };
+}
+
+/** Goes on with JPEG: this browser cannot decode what comes. */
+function without_video() {
+  no_video = true;
+  for (const one of held) one.chunk = null;
+  if (socket) socket.close();
 }
 
 function again() {
@@ -50,21 +70,22 @@ function again() {
   pause_ms = Math.min(2 * pause_ms, 8000);
 }
 
-async function take(data) {
+async function take(data, video) {
   const n = new DataView(data).getUint32(0);
   const shot = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, n)));
-  const jpeg = data.byteLength > 4 + n ? new Blob([new Uint8Array(data, 4 + n)], { type: "image/jpeg" }) : null;
+  const chunk = video ? coded(data, 4 + n) : null;
+  const jpeg = !video && data.byteLength > 4 + n ? new Blob([new Uint8Array(data, 4 + n)], { type: "image/jpeg" }) : null;
   const last = held[held.length - 1];
   state(shot.state, shot.why);
   numbers(shot);
   // A word about the state has no frame of its own; a run that was started anew counts from 0.
   if (shot.size_px[0] === 0 && shot.tracks.length === 0 && shot.detections.length === 0 && shot.time_s === 0) return;
   if (last && shot.time_s < last.shot.time_s) { held = []; bytes = 0; at = -1; }
-  held.push({ shot, jpeg });
-  bytes += jpeg ? jpeg.size : 0;
+  held.push({ shot, jpeg, chunk, size: jpeg ? jpeg.size : chunk ? chunk.data.byteLength : 0 });
+  bytes += held[held.length - 1].size;
   while (held.length > 1 && (held.length > MOST_HELD || bytes > MOST_BYTES || shot.time_s - held[0].shot.time_s > MINUTE_S)) {
     const gone = held.shift();
-    bytes -= gone.jpeg ? gone.jpeg.size : 0;
+    bytes -= gone.size;
     at = Math.max(0, at - 1);
   }
   if (!paused) at = held.length - 1;
@@ -73,13 +94,63 @@ async function take(data) {
   await show();
 }
 
+/** A coded picture behind the text: the name of its coding, of one from which decoding can start, and its bytes. */
+function coded(data, from) {
+  const n = new DataView(data).getUint8(from), codec = new TextDecoder().decode(new Uint8Array(data, from + 1, n));
+  if (data.byteLength === from + 1 + n) return null;
+  return { codec, number: n_chunks++, data: new Uint8Array(data, from + 1 + n) };
+}
+
+/** The picture of a frame, decoded after those that it needs; one after another, since there is one decoder. */
+function decoded(one) {
+  turn = turn.catch(() => null).then(() => decode(one));
+  return turn;
+}
+
+async function decode(one) {
+  const k = held.indexOf(one);
+  if (k < 0 || !one.chunk) return null;
+  let from = k, before = k - 1;
+  while (before >= 0 && !held[before].chunk) before--;
+  if (!decoder || decoder.state !== "configured" || before < 0 || held[before] !== fed) {
+    // Anew from the last picture that needs none before it.
+    while (from >= 0 && !held[from].chunk?.codec) from--;
+    if (from < 0) return null;
+    if (decoder && decoder.state !== "closed") decoder.close();
+    decoder = new VideoDecoder({
+      output: (frame) => { if (wanted && frame.timestamp === wanted.number) wanted.resolve(frame); else frame.close(); },
+      error: (error) => { if (wanted) wanted.reject(error); },
+    });
+    decoder.configure({ codec: held[from].chunk.codec, optimizeForLatency: true });
+  }
+  const frame = new Promise((resolve, reject) => {
+    wanted = { number: one.chunk.number, resolve, reject };
+    setTimeout(() => reject(new Error("the decoder gives nothing")), 3000);
+  });
+  frame.catch(() => null);
+  for (let i = from; i <= k; i++) {
+    const chunk = held[i].chunk;
+    if (chunk) decoder.decode(new EncodedVideoChunk({ type: chunk.codec ? "key" : "delta", timestamp: chunk.number, data: chunk.data }));
+  }
+  fed = one;
+  const picture = await frame;
+  n_decoded++;
+  return picture;
+}
+
 async function show() {
   const one = held[at];
   if (!one) return;
-  if (one !== drawn && one.jpeg) {
-    const next = await createImageBitmap(one.jpeg);
-    if (bitmap) bitmap.close();
-    bitmap = next;
+  if (one !== drawn && (one.jpeg || one.chunk)) {
+    let next = null;
+    try { next = one.jpeg ? await createImageBitmap(one.jpeg) : await decoded(one); } catch (error) {
+      if (one.jpeg) throw error;
+      without_video();
+    }
+    if (next) {
+      if (bitmap) bitmap.close();
+      bitmap = next;
+    }
   }
   drawn = one;
   $("when").value = paused ? `${fixed(one.shot.time_s - held[held.length - 1].shot.time_s, 1)} s` : "now";
@@ -122,7 +193,7 @@ function history(id, seconds) {
 /** Size of the frame in its own pixels; of detections alone, what they and the tracks span. */
 function extent(s) {
   if (s.size_px[0] > 0) return s.size_px;
-  if (bitmap && drawn && held.some((h) => h.jpeg)) return held.findLast((h) => h.jpeg).shot.size_px;
+  if (bitmap && drawn && held.some((h) => h.size)) return held.findLast((h) => h.size).shot.size_px;
   const all = held.flatMap((h) => [...h.shot.detections, ...h.shot.tracks.map((t) => [t.x_px, t.y_px])]);
   const most = (k) => all.reduce((m, p) => Math.max(m, p[k]), 1) * 1.05;
   return [most(0), most(1)];
@@ -135,7 +206,9 @@ function draw(s) {
   canvas.style.width = `${canvas.width / ratio}px`;
   const g = canvas.getContext("2d");
   g.imageSmoothingEnabled = scale < 4;
-  if (bitmap) g.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+  // A video's sides are even: what an odd one has beyond the frame lies beyond the canvas.
+  const over = (side, n) => (side === n + 1 ? scale : 0);
+  if (bitmap) g.drawImage(bitmap, 0, 0, canvas.width + over(bitmap.displayWidth, w), canvas.height + over(bitmap.displayHeight, h));
   // The centre of the top-left pixel is (0, 0).
   g.setTransform(scale, 0, 0, scale, scale / 2, scale / 2);
   const px = ratio / scale;

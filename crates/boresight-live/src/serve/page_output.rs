@@ -1,5 +1,6 @@
 //! The run's end of the page: notes the newest frame, and lets a thread of its own make text and picture of it while somebody looks.
 
+use super::coded_pictures::CodedPictures;
 use super::hub::{Hub, Seen, message};
 use super::picture::Pictures;
 use crate::event::Event;
@@ -7,6 +8,7 @@ use crate::output::{LiveOutput, Shown};
 use crate::slot::{Slot, Taken};
 use boresight::{Error, ErrorKind, Pixels, Result};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 struct ToShow {
@@ -28,12 +30,19 @@ impl PageOutput {
         let slot = Arc::new(Slot::<ToShow>::default());
         let (from, to) = (Arc::clone(&slot), Arc::clone(&hub));
         let encode = move || {
-            let mut pictures = Pictures::default();
+            let (mut pictures, mut coded) = (Pictures::default(), CodedPictures::default());
             loop {
                 match from.take(Duration::from_secs(3600)) {
                     Taken::Item(show) => {
-                        let jpeg = show.pixels.and_then(|p| pictures.encode(&p)).unwrap_or_default();
-                        to.message.send_replace(message(&show.seen.json(&to.board), &jpeg));
+                        let json = show.seen.json(&to.board);
+                        if to.coded.receiver_count() > 0 {
+                            let wants_key = to.wants_key.swap(false, Ordering::SeqCst);
+                            // The last viewer may have left meanwhile.
+                            let _ = to.coded.send(coded.encode(show.pixels.as_ref(), &json, wants_key));
+                        }
+                        let looked_at = show.pixels.filter(|_| to.message.receiver_count() > 0);
+                        let jpeg = looked_at.and_then(|p| pictures.encode(&p)).unwrap_or_default();
+                        to.message.send_replace(message(&json, &jpeg));
                     }
                     Taken::Nothing => {}
                     Taken::Closed => return,
@@ -49,7 +58,8 @@ impl PageOutput {
 impl LiveOutput for PageOutput {
     fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
         self.hub.see(Some(shown));
-        if self.hub.message.receiver_count() > 0 && self.slot.is_empty() {
+        let n_viewers = self.hub.message.receiver_count() + self.hub.coded.receiver_count();
+        if n_viewers > 0 && self.slot.is_empty() {
             let pixels = shown.view.frame.map(|f| f.pixels.clone());
             self.slot.put(ToShow { pixels, seen: self.hub.seen() });
         }

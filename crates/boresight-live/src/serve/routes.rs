@@ -220,5 +220,11 @@ async fn view(State(shared): State<Shared>, uri: Uri, upgrade: WebSocketUpgrade)
         return (StatusCode::SERVICE_UNAVAILABLE, "all places are taken\n").into_response();
     };
     let upgrade = upgrade.max_message_size(viewer::MAX_WORD).max_frame_size(viewer::MAX_WORD);
-    upgrade.on_upgrade(move |socket| viewer::serve(socket, seat))
+    let wants_video = uri.query().unwrap_or_default().split('&').any(|pair| pair == "video=h264");
+    upgrade.on_upgrade(move |socket| async move {
+        match wants_video {
+            true => viewer::serve_coded(socket, seat).await,
+            false => viewer::serve(socket, seat).await,
+        }
+    })
 }
