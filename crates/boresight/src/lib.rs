@@ -55,6 +55,7 @@
 //! | turn detections into tracks; smooth and stitch them | [`track`], [`TrackerConfig`](track::TrackerConfig), [`associate`] |
 //! | filter by hand, without std or heap | the crate [`boresight_filters`] |
 //! | fuse several sensors | [`fuse`] |
+//! | place tracks on Earth | [`world`] |
 //! | judge tracks against a truth | [`metrics`], [`TrackTable`] |
 //! | make scenes with a known truth | [`sim`] |
 //! | configure all of it from one file | [`Config`], [`config`] |
@@ -77,6 +78,7 @@ pub mod draw;
 mod error;
 mod frame;
 pub mod fuse;
+mod geodesy;
 mod homography;
 mod image;
 pub mod io;
@@ -100,6 +102,7 @@ mod validate;
 pub mod verdict;
 mod view;
 pub mod vision;
+pub mod world;
 
 pub use camera_motion::{CameraMotion, MotionBasis};
 pub use config::Config;

@@ -63,7 +63,7 @@ mod tests {
             }
         }
         let mut bare = Vec::new();
-        ["input", "detector", "tracker"].iter().for_each(|table| walk(table, 0, &mut bare));
+        ["input", "detector", "tracker", "world"].iter().for_each(|table| walk(table, 0, &mut bare));
         assert!(bare.is_empty(), "keys without a meaning: {bare:?}");
         assert!(explain("tracker.gate-probability").unwrap().meaning.contains("χ²"));
         assert!(explain("tracker.filter.form").unwrap().entries.iter().any(|(name, _)| name == "kf"));

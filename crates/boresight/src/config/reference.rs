@@ -17,10 +17,13 @@ pub fn reference() -> String {
     let mut out = String::from(
         "# Parameters\n\nEvery table and key of the configuration. Made by `cargo xtask docs` from the comments in the code; do not edit.\n\n\
          A key with *choices* takes one of the names below it: `clutter = \"given\"` where the name stands alone, or a table\n\
-         `[tracker.filter.form.imm]` where it has parameters of its own. *none* means that the key may be left out.\n",
+         `[tracker.filter.form.imm]` where it has parameters of its own. *none* means that the key may be left out, *needed* that it must stand where its table does.\n",
     );
     for (name, child) in children(&root, &root) {
-        table(&mut out, &root, &name, &child);
+        match is_choice(&root, &child) {
+            true => choice(&mut out, &root, &name, &child),
+            false => table(&mut out, &root, &name, &child),
+        }
     }
     out
 }
@@ -46,7 +49,8 @@ fn table(out: &mut String, root: &Value, path: &str, at: &Value) {
         } else {
             format!("`{name}`")
         };
-        let _ = writeln!(out, "| {named} | {} | {} |", default(&child), cell(&describe(root, &child)));
+        let default = if is_needed(root, at, &name) { "*needed*".to_string() } else { default(&child) };
+        let _ = writeln!(out, "| {named} | {default} | {} |", cell(&describe(root, &child)));
     }
     for (key, child) in choices {
         choice(out, root, &key, &child);
@@ -79,6 +83,12 @@ fn choice(out: &mut String, root: &Value, path: &str, at: &Value) {
 
 fn is_list(root: &Value, at: &Value) -> bool {
     resolve(root, at).get("items").is_some()
+}
+
+/// Whether a key must stand where its table does.
+fn is_needed(root: &Value, table: &Value, name: &str) -> bool {
+    let needed = resolve(root, table).get("required").and_then(Value::as_array);
+    needed.is_some_and(|names| names.iter().any(|n| n == name))
 }
 
 /// The default as it stands in a file; of a choice only the name.

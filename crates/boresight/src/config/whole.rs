@@ -1,4 +1,4 @@
-//! The whole configuration of a run, as it stands in a file: input, detector, tracker.
+//! The whole configuration of a run, as it stands in a file: input, detector, tracker, place on Earth.
 //!
 //! Enums are externally tagged (`[tracker.associator.global-nearest]`), unknown keys are refused with their line. Errors name
 //! the key, its value, what was expected and a mend.
@@ -9,6 +9,7 @@ use crate::io::{Colour, OpenOptions, RawFormat, TableOptions};
 use crate::sensor::SensorConfig;
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
+use crate::world::{World, WorldConfig};
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,9 @@ pub struct Config {
     pub detector: DetectorConfig,
     /// How detections become tracks.
     pub tracker: TrackerConfig,
+    /// Where on Earth tracks are: by a map of the ground or by the camera's pose. The camera must stand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub world: Option<WorldConfig>,
 }
 
 /// How frames are read.
@@ -161,7 +165,8 @@ impl Config {
     pub fn validate(&self) -> Result<()> {
         self.input.validate("input")?;
         self.detector.validate("detector")?;
-        self.tracker.validate("tracker")
+        self.tracker.validate("tracker")?;
+        self.world.as_ref().map_or(Ok(()), |world| World::new(world).map(|_| ()))
     }
 
     /// Writes the configuration as TOML; reading it back gives the same configuration.

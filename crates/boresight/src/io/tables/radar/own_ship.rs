@@ -6,6 +6,7 @@
 //! Limits: a flat earth; what is between two rows is straight.
 
 use super::picture::along;
+use crate::geodesy::radii_m;
 use crate::io::tables::columns::Columns;
 use crate::io::tables::row::Row;
 use crate::io::tables::table::Table;
@@ -14,9 +15,6 @@ use std::path::Path;
 
 /// Most rows: a guard of memory (a day of a hundred a second).
 const MOST_ROWS: usize = 10_000_000;
-/// WGS 84: semi-major axis, m, and squared eccentricity.
-const WGS84_A_M: f64 = 6_378_137.0;
-const WGS84_E2: f64 = 6.694_379_990_14e-3;
 
 /// Positions and headings of own ship.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -91,9 +89,7 @@ impl OwnShip {
 
 /// Metres east and north of `zero`, both latitude and longitude in rad.
 fn metres(place: [f64; 2], zero: [f64; 2]) -> [f64; 2] {
-    let w2 = 1.0 - WGS84_E2 * zero[0].sin().powi(2);
-    let across = WGS84_A_M / w2.sqrt();
-    let along = across * (1.0 - WGS84_E2) / w2;
+    let [along, across] = radii_m(zero[0]);
     // The short way round.
     let turn = std::f64::consts::TAU;
     let east = (place[1] - zero[1] + turn / 2.0).rem_euclid(turn) - turn / 2.0;
