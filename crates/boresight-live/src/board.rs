@@ -71,6 +71,8 @@ pub struct Counts {
     pub events: AtomicU64,
     /// Events that an output could not take.
     pub events_dropped: AtomicU64,
+    /// Events that a wire of places on Earth could not say: it is not known where the track is.
+    pub unplaced: AtomicU64,
     /// Times that the record could not be written.
     pub record_failures: AtomicU64,
     /// Frames in the record's video.

@@ -3,8 +3,11 @@
 //! JSON objects with the name and version of their schema; `docs/live.md` lists the fields. Numbers are the shortest that read back to the
 //! same bits, so page, wire and record can be compared exactly.
 
+use crate::on_earth::{OnEarth, upper_triangle};
+use boresight::world::World;
 use boresight::{Timestamp, TrackState, TrackStatus};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Name and version of a track's events.
 pub const TRACK_SCHEMA: &str = "boresight.track/1";
@@ -40,20 +43,20 @@ pub struct TrackReport {
     /// Normalised squared innovation of this frame's update.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nis: Option<f64>,
+    /// Where on Earth it is, if the configuration says how to tell.
+    #[serde(flatten)]
+    pub on_earth: OnEarth,
 }
 
 impl TrackReport {
     /// The report of a track, `None` while it is tentative.
-    pub fn of(t: &TrackState) -> Option<Self> {
+    pub fn of(t: &TrackState, world: Option<&World>) -> Option<Self> {
         let status = match t.status {
             TrackStatus::Tentative => return None,
             TrackStatus::Confirmed => CONFIRMED,
             TrackStatus::Coasting => "coasting",
         };
         let (m, p) = (&t.kinematics.mean, &t.kinematics.cov);
-        let mut cov = [0.0; 10];
-        let entries = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
-        cov.iter_mut().zip(entries).for_each(|(c, (i, j))| *c = p[(i, j)]);
         Some(Self {
             track: t.id.0,
             status,
@@ -61,11 +64,12 @@ impl TrackReport {
             y_px: m[2],
             vx_px_per_s: m[1],
             vy_px_per_s: m[3],
-            cov,
+            cov: upper_triangle(|i, j| p[(i, j)]),
             width_px: t.extent.width_px,
             height_px: t.extent.height_px,
             score: t.score,
             nis: t.innovation.as_ref().map(|i| i.nis).filter(|n| n.is_finite()),
+            on_earth: OnEarth(world.map(|w| w.locate(&t.kinematics)).unwrap_or_default()),
         })
     }
 }
@@ -115,8 +119,7 @@ struct StatusLine<'a> {
     unix_s: f64,
 }
 
-/// The line of a track's event.
-pub fn track_line(event: What, source: &str, when: When, track: &TrackReport) -> String {
+fn track_line(event: What, source: &str, when: When, track: &TrackReport) -> String {
     let (frame, time_s, arrived_unix_s) = (when.frame, when.time.as_secs_f64(), when.arrived_unix_s);
     let line = TrackLine { schema: TRACK_SCHEMA, event, source, frame, time_s, arrived_unix_s, track };
     serde_json::to_string(&line).unwrap_or_default()
@@ -127,11 +130,37 @@ pub fn status_line(source: &str, state: &str, why: &str, unix_s: f64) -> String 
     serde_json::to_string(&StatusLine { schema: STATUS_SCHEMA, source, state, why, unix_s }).unwrap_or_default()
 }
 
-/// A line for the wire.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What happened to a track, when, and its state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackEvent {
+    /// What happened.
+    pub what: What,
+    /// When and where it had the state.
+    pub when: When,
+    /// The state.
+    pub report: TrackReport,
+}
+
+/// An event for the wire.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Whether it is the run's state, which a broker keeps for those who come later.
     pub is_status: bool,
     /// The JSON object, without an end of line.
-    pub json: std::sync::Arc<str>,
+    pub json: Arc<str>,
+    /// What it says of a track, for wires that do not speak JSON.
+    pub track: Option<Arc<TrackEvent>>,
+}
+
+impl Event {
+    /// The event of a track.
+    pub fn of_track(what: What, source: &str, when: When, report: &TrackReport) -> Self {
+        let track = Some(Arc::new(TrackEvent { what, when, report: report.clone() }));
+        Self { is_status: false, json: track_line(what, source, when, report).into(), track }
+    }
+
+    /// An event that is a line alone; `is_status`: the run's state.
+    pub fn line(is_status: bool, json: impl Into<Arc<str>>) -> Self {
+        Self { is_status, json: json.into(), track: None }
+    }
 }

@@ -12,6 +12,7 @@ mod histogram;
 mod lives;
 mod measure;
 mod motion;
+mod on_earth;
 mod output;
 mod publish;
 mod queue;
@@ -27,13 +28,14 @@ mod tune;
 
 pub use board::{Board, Counts, Said, ScanNotes, State};
 pub use cbor::Form;
-pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackReport, When};
+pub use event::{Event, STATUS_SCHEMA, TRACK_SCHEMA, TrackEvent, TrackReport, What, When};
 pub use histogram::Histogram;
 pub use measure::{Latency, Sample, Soak, latency, soak};
+pub use on_earth::OnEarth;
 pub use output::{LiveOutput, Shown};
 #[cfg(feature = "nats")]
 pub use publish::Nats;
-pub use publish::{Broker, Lines, Mqtt, Target, Udp, publisher};
+pub use publish::{Asterix, AsterixOptions, Broker, Cot, CotOptions, Lines, Mqtt, Target, Udp, publisher};
 pub use record::{Record, RecordOptions};
 pub use run::{RunOptions, run};
 pub use run_all::{OneRun, run_all};

@@ -1,6 +1,6 @@
 //! Starts, updates and ends of tracks from one frame's tracks to the next, with at most so many updates a second of each track.
 
-use crate::event::{TrackReport, What, When, track_line};
+use crate::event::{Event, TrackReport, What, When};
 use boresight::Timestamp;
 use std::collections::BTreeMap;
 
@@ -27,8 +27,8 @@ impl Lives {
         Self { living: BTreeMap::new(), interval_s, started: 0 }
     }
 
-    /// Takes the confirmed tracks of a frame, whose number is none of those before; hands out a line for each event.
-    pub fn step(&mut self, source: &str, when: When, tracks: &[TrackReport], out: &mut Vec<String>) {
+    /// Takes the confirmed tracks of a frame, whose number is none of those before; hands out the events.
+    pub fn step(&mut self, source: &str, when: When, tracks: &[TrackReport], out: &mut Vec<Event>) {
         for t in tracks {
             let event = match self.living.get_mut(&t.track) {
                 None => {
@@ -45,20 +45,20 @@ impl Lives {
                     due.then_some(What::Update)
                 }
             };
-            out.extend(event.map(|event| track_line(event, source, when, t)));
+            out.extend(event.map(|event| Event::of_track(event, source, when, t)));
         }
         self.living.retain(|_, life| {
             let lives = life.when.frame == when.frame;
             if !lives {
-                out.push(track_line(What::End, source, life.when, &life.report));
+                out.push(Event::of_track(What::End, source, life.when, &life.report));
             }
             lives
         });
     }
 
     /// Ends all of them.
-    pub fn end(&mut self, source: &str, out: &mut Vec<String>) {
-        out.extend(self.living.values().map(|life| track_line(What::End, source, life.when, &life.report)));
+    pub fn end(&mut self, source: &str, out: &mut Vec<Event>) {
+        out.extend(self.living.values().map(|life| Event::of_track(What::End, source, life.when, &life.report)));
         self.living.clear();
     }
 }
@@ -66,6 +66,7 @@ impl Lives {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::on_earth::OnEarth;
 
     fn report(track: u64, x_px: f64) -> TrackReport {
         TrackReport {
@@ -80,21 +81,22 @@ mod tests {
             height_px: 3.0,
             score: 1.0,
             nis: None,
+            on_earth: OnEarth::default(),
         }
     }
 
     #[test]
     fn a_track_starts_is_updated_at_its_rate_and_ends_with_its_last_state() {
         let mut lives = Lives::new(10.0);
-        let mut lines = Vec::new();
+        let mut events = Vec::new();
         for k in 0..100u64 {
             let when = When { frame: k, time: Timestamp::from_ns(k as i64 * 10_000_000), arrived_unix_s: 0.0 };
             let tracks = if k < 95 { vec![report(1, k as f64)] } else { vec![] };
-            lives.step("cam", when, &tracks, &mut lines);
+            lives.step("cam", when, &tracks, &mut events);
         }
-        let of = |event: &str| lines.iter().filter(|l| l.contains(&format!("\"event\":\"{event}\""))).count();
+        let of = |event: &str| events.iter().filter(|e| e.json.contains(&format!("\"event\":\"{event}\""))).count();
         assert_eq!((of("start"), of("update"), of("end")), (1, 10, 1), "94 frames of 10 ms, one update in 9 of them");
-        let end: serde_json::Value = serde_json::from_str(lines.last().unwrap()).unwrap();
+        let end: serde_json::Value = serde_json::from_str(&events.last().unwrap().json).unwrap();
         assert_eq!((end["x_px"].as_f64(), end["frame"].as_u64()), (Some(94.0), Some(94)));
         assert_eq!((end["schema"].as_str(), end["time_s"].as_f64()), (Some("boresight.track/1"), Some(0.94)));
     }

@@ -15,6 +15,7 @@ use crate::stages::Stages;
 use crate::tune::Change;
 use boresight::auto::DetectorKind;
 use boresight::io::StopFlag;
+use boresight::world::World;
 use boresight::{CameraMotion, Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -106,7 +107,7 @@ struct Live<'o> {
     board: &'o Arc<Board>,
     outputs: &'o mut [Box<dyn LiveOutput>],
     lives: Lives,
-    lines: Vec<String>,
+    world: Option<World>,
     reports: Vec<TrackReport>,
     events: Vec<Event>,
     said: State,
@@ -117,8 +118,8 @@ impl<'o> Live<'o> {
     fn new(board: &'o Arc<Board>, outputs: &'o mut [Box<dyn LiveOutput>], updates_hz: f64) -> Self {
         let failing = vec![false; outputs.len()];
         let lives = Lives::new(updates_hz);
-        let (lines, reports, events) = (Vec::new(), Vec::new(), Vec::new());
-        Self { board, outputs, lives, lines, reports, events, said: State::Ended, failing }
+        let (reports, events) = (Vec::new(), Vec::new());
+        Self { board, outputs, lives, world: None, reports, events, said: State::Ended, failing }
     }
 
     fn all(&mut self, slot: &Slot<Arrived>, options: &RunOptions, stop: &dyn Fn() -> bool) -> Result<()> {
@@ -172,7 +173,9 @@ impl<'o> Live<'o> {
         None
     }
 
-    fn begin(&mut self, ready: Ready) -> Result<Stages> {
+    fn begin(&mut self, mut ready: Ready) -> Result<Stages> {
+        self.world = ready.config.world.as_ref().map(World::new).transpose()?;
+        ready.reasons.extend(self.world.iter().map(|world| world.says().to_string()));
         let toml = ready.config.to_toml()?;
         // In one piece: those of several sources do not mix.
         let reasons: String = ready.reasons.iter().map(|reason| format!("\n  {reason}")).collect();
@@ -235,11 +238,9 @@ impl<'o> Live<'o> {
         let counts = &self.board.counts;
         let when = When { frame: scan.index.0, time: scan.time, arrived_unix_s };
         self.reports.clear();
-        self.reports.extend(tracks.iter().filter_map(TrackReport::of));
-        self.lines.clear();
-        self.lives.step(&self.board.source, when, &self.reports, &mut self.lines);
+        self.reports.extend(tracks.iter().filter_map(|t| TrackReport::of(t, self.world.as_ref())));
         self.events.clear();
-        self.events.extend(self.lines.iter().map(|l| Event { is_status: false, json: l.as_str().into() }));
+        self.lives.step(&self.board.source, when, &self.reports, &mut self.events);
         let view = View { frame, scan, tracks };
         let shown = Shown { view, when, tracks: &self.reports, events: &self.events };
         for (output, failing) in self.outputs.iter_mut().zip(&mut self.failing) {
@@ -316,10 +317,9 @@ impl<'o> Live<'o> {
     }
 
     fn end_tracks(&mut self) {
-        self.lines.clear();
-        self.lives.end(&self.board.source, &mut self.lines);
-        for line in self.lines.drain(..) {
-            let event = Event { is_status: false, json: line.into() };
+        self.events.clear();
+        self.lives.end(&self.board.source, &mut self.events);
+        for event in self.events.drain(..) {
             self.outputs.iter_mut().for_each(|output| output.event(&event));
         }
     }
@@ -339,7 +339,7 @@ impl<'o> Live<'o> {
         if said.state != self.said {
             self.said = said.state;
             let json = status_line(&self.board.source, said.state.word(), &said.why, unix_s(SystemTime::now()));
-            let event = Event { is_status: true, json: json.into() };
+            let event = Event::line(true, json);
             self.outputs.iter_mut().for_each(|output| output.event(&event));
         }
     }

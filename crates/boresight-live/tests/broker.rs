@@ -51,11 +51,11 @@ fn subscribe(port: u16, id: &str) -> Receiver<(String, String, bool)> {
 }
 
 fn event(k: u64) -> Event {
-    Event { is_status: false, json: format!("{{\"k\":{k}}}").into() }
+    Event::line(false, format!("{{\"k\":{k}}}"))
 }
 
 fn status(state: &str) -> Event {
-    Event { is_status: true, json: format!("{{\"state\":\"{state}\"}}").into() }
+    Event::line(true, format!("{{\"state\":\"{state}\"}}"))
 }
 
 fn target(port: u16) -> boresight_live::Broker {

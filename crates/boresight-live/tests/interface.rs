@@ -3,7 +3,7 @@
 mod common;
 
 use boresight_live::{LiveOutput, Page, PageOptions, RunOptions, Target, publisher, run};
-use common::{ScenePlug, ask, board, config, get, scene};
+use common::{POSE, ScenePlug, ask, board, config, get, scene};
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpStream, UdpSocket};
@@ -102,7 +102,7 @@ fn after_a_run() -> (Page, [Vec<u8>; 2]) {
         let target = Target::parse(&format!("udp://{}{form}", socket.local_addr().unwrap())).unwrap();
         outputs.push(publisher(&target, &board).unwrap());
     }
-    let options = RunOptions { config: Some(config()), updates_hz: 5.0, ..RunOptions::default() };
+    let options = RunOptions { config: Some(config().with(POSE).unwrap()), updates_hz: 5.0, ..RunOptions::default() };
     run(Box::new(ScenePlug::of(scene(30, 25.0), false)), &options, &board, &mut outputs, &|| false).unwrap();
     let last = sockets.map(|(socket, _)| {
         socket.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
@@ -210,6 +210,7 @@ fn every_address_answers_as_it_is_described() {
     }
     assert_eq!(n_fit, 3);
     let event: Value = serde_json::from_slice(&json).unwrap();
+    assert!(event["lat_deg"].is_number() && event["bearing_deg"].is_number(), "the pose gives every field: {event}");
     fits(&event, &document["components"]["schemas"]["Event"], &document).unwrap();
     // And the other way: no address of the interface is left out.
     let routes = include_str!("../src/serve/routes.rs");

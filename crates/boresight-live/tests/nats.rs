@@ -59,7 +59,7 @@ fn subscribe(port: u16, connect: &str) -> Receiver<(String, String)> {
 }
 
 fn event(k: u64) -> Event {
-    Event { is_status: false, json: format!("{{\"k\":{k}}}").into() }
+    Event::line(false, format!("{{\"k\":{k}}}"))
 }
 
 fn start(address: &str, board: Arc<Board>) -> Nats {
@@ -88,7 +88,7 @@ fn a_server_that_is_killed_and_comes_back_gets_what_waited() {
     let mut server = serving(port, "");
     let first = subscribe(port, "{}");
     let mut nats = start(&format!("nats://127.0.0.1:{port}/site/tracks"), board());
-    nats.event(&Event { is_status: true, json: "{\"state\":\"running\"}".into() });
+    nats.event(&Event::line(true, "{\"state\":\"running\"}"));
     (0..50).for_each(|k| nats.event(&event(k)));
     let (subject, text) = first.recv_timeout(PATIENCE).unwrap();
     assert_eq!((subject.as_str(), text.as_str()), ("site.tracks.status", "{\"state\":\"running\"}"));
@@ -176,7 +176,7 @@ fn a_password_opens_and_what_the_server_refuses_is_said_and_counted() {
     let listener = subscribe(port, "{\"user\":\"me\",\"pass\":\"right\"}");
     let mut nats = start(&format!("nats://me:right@127.0.0.1:{port}/site.tracks"), speaking());
     // One that is too large for the server must not end the connection, again and again.
-    nats.event(&Event { is_status: false, json: "x".repeat(2000).into() });
+    nats.event(&Event::line(false, "x".repeat(2000)));
     (0..10).for_each(|k| nats.event(&event(k)));
     until_all(&listener, (0..10).collect());
     assert_eq!(nats.dropped(), 1);

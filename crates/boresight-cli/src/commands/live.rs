@@ -69,7 +69,7 @@ pub struct Args {
     /// A name of this machine by which browsers may call the page, besides its numbers and localhost. Can be repeated.
     #[arg(long = "host", value_name = "NAME", requires = "serve")]
     hosts: Vec<String>,
-    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. Can be repeated.
+    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. With `[world]` in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT (Cursor on Target), asterix+udp://HOST:PORT?sac=N&sic=N. Can be repeated.
     #[arg(long, value_name = "URL")]
     publish: Vec<String>,
     /// Updates of each track a second that are published, at most.
@@ -133,6 +133,7 @@ pub fn run_live(args: &Args) -> anyhow::Result<ExitCode> {
     let is_single = sources.len() == 1;
     let options = sources.iter().map(|source| options(args, &source.name, &sources)).collect::<Result<Vec<_>, _>>()?;
     let targets = args.publish.iter().map(|url| Target::parse(url)).collect::<boresight::Result<Vec<_>>>()?;
+    need_world(&targets, &options)?;
     let say = if args.quiet { warnings_only } else { line };
     let boards: Vec<_> = sources.iter().map(|source| Arc::new(Board::new(&source.name, say))).collect();
     let page = args.serve.as_deref().map(|address| serve(address, args, &boards)).transpose()?;
@@ -175,7 +176,7 @@ fn outputs(
         outputs.push(Box::new(if args.record_video { record.with_video(board)? } else { record }));
     }
     for target in targets {
-        let target = within.map_or_else(|| target.clone(), |name| target.of_source(name));
+        let target = within.map_or_else(|| Ok(target.clone()), |name| target.of_source(name, source))?;
         outputs.push(publisher(&target, board)?);
     }
     if let Some(page) = page {
@@ -214,7 +215,7 @@ fn options(args: &Args, name: &str, sources: &[NamedSource]) -> anyhow::Result<R
     if let Some(rate) = args.rate_hz {
         base = base.with(&format!("input.rate-hz={rate}"))?;
     }
-    for set in args.sets.iter().filter(|s| s.starts_with("input.")) {
+    for set in args.sets.iter().filter(|s| s.starts_with("input.") || s.starts_with("world")) {
         base = base.with(set)?;
     }
     Ok(RunOptions {
@@ -226,6 +227,18 @@ fn options(args: &Args, name: &str, sources: &[NamedSource]) -> anyhow::Result<R
         updates_hz: args.updates_hz,
         pauses: Pauses::default(),
     })
+}
+
+/// Refuses a wire of places on Earth where a configuration does not say how they are found.
+fn need_world(targets: &[Target], options: &[RunOptions]) -> boresight::Result<()> {
+    match targets.iter().find_map(Target::needs_world) {
+        Some(scheme) if options.iter().any(|o| o.base.world.is_none()) => {
+            Err(Error::new(ErrorKind::Config, "places on Earth need a [world] in the configuration, and there is none")
+                .at(format!("--publish {scheme}://"))
+                .hint("say where the camera looks: [world.points], [world.plane] or [world.pinhole] in a file for --config, or --set 'world.pinhole={..}'; `boresight config --explain world.points` says what stands there"))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn serve(address: &str, args: &Args, boards: &[Arc<Board>]) -> anyhow::Result<Page> {

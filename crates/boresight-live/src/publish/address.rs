@@ -1,5 +1,6 @@
 //! Where events go, from what stands on the command line.
 
+use super::earth_address::{AsterixOptions, CotOptions, split};
 use crate::cbor::Form;
 use boresight::{Error, ErrorKind, Result};
 
@@ -11,13 +12,13 @@ const MQTT_PORT: u16 = 1883;
 const NATS_PORT: u16 = 4222;
 /// What is understood.
 const KNOWN: &str = if cfg!(feature = "nats") {
-    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT; ?cbor behind it for CBOR"
+    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT, ?cbor behind it for CBOR; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
 } else {
-    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; ?cbor behind it for CBOR"
+    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC, ?cbor behind it for CBOR; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
 };
 
 /// A place for events.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// JSON lines on standard output.
     Standard,
@@ -33,6 +34,22 @@ pub enum Target {
     /// A NATS server.
     #[cfg(feature = "nats")]
     Nats(Broker),
+    /// Cursor on Target.
+    Cot {
+        /// Over TCP instead of as datagrams.
+        is_tcp: bool,
+        /// Name or number of the host, and the port.
+        address: String,
+        /// How events are written.
+        options: CotOptions,
+    },
+    /// ASTERIX category 062, as datagrams.
+    Asterix {
+        /// Name or number of the host, and the port.
+        address: String,
+        /// Who says it.
+        options: AsterixOptions,
+    },
 }
 
 /// A broker's address.
@@ -104,16 +121,28 @@ impl Target {
             return Ok(Self::Standard);
         }
         let Some((scheme, rest)) = text.split_once("://") else { return Err(wrong("expected an address")) };
+        let only_place = |place: &str| -> Result<String> {
+            let (host, port) =
+                host_and_port(place.trim_end_matches('/'), None).ok_or_else(|| wrong("expected HOST:PORT"))?;
+            Ok(format!("{host}:{port}"))
+        };
+        if let "cot+udp" | "cot+tcp" | "asterix+udp" = scheme {
+            let (place, query) = split(rest);
+            let address = only_place(place)?;
+            return Ok(match scheme {
+                "asterix+udp" => Self::Asterix { address, options: AsterixOptions::parse(query).map_err(wrong)? },
+                _ => {
+                    let options = CotOptions::parse(query).map_err(wrong)?;
+                    Self::Cot { is_tcp: scheme == "cot+tcp", address, options }
+                }
+            });
+        }
         let (rest, form) = match rest.strip_suffix("?cbor") {
             Some(rest) => (rest, Form::Cbor),
             None => (rest, Form::Json),
         };
         match scheme {
-            "udp" => {
-                let (host, port) =
-                    host_and_port(rest.trim_end_matches('/'), None).ok_or_else(|| wrong("expected HOST:PORT"))?;
-                Ok(Self::Udp { address: format!("{host}:{port}"), form })
-            }
+            "udp" => Ok(Self::Udp { address: only_place(rest)?, form }),
             "mqtt" => {
                 let bad = |c: char| c.is_control() || c == '#' || c == '+';
                 let is_topic = |topic: &str| !topic.contains(bad) && !topic.ends_with('/');
@@ -140,13 +169,32 @@ impl Target {
 }
 
 impl Target {
-    /// The same for one of several sources: its topics lie below that of the target, under its name.
-    pub fn of_source(&self, name: &str) -> Self {
-        match self {
+    /// The same for one of several sources, the `k`-th, from 0: its topics lie below that of the target, under its name; of ASTERIX it has a SIC of its own.
+    /// # Errors
+    /// [`ErrorKind::Config`] where there is no SIC for it.
+    pub fn of_source(&self, name: &str, k: usize) -> Result<Self> {
+        Ok(match self {
             Self::Mqtt(broker) => Self::Mqtt(Broker { topic: format!("{}/{name}", broker.topic), ..broker.clone() }),
             #[cfg(feature = "nats")]
             Self::Nats(broker) => Self::Nats(Broker { topic: format!("{}.{name}", broker.topic), ..broker.clone() }),
-            Self::Standard | Self::Udp { .. } => self.clone(),
+            Self::Asterix { address, options } => {
+                let sic = u8::try_from(k).ok().and_then(|k| options.sic.checked_add(k)).ok_or_else(|| {
+                    let e = Error::new(ErrorKind::Config, "the sources' codes go beyond 255: each has the next one");
+                    e.at(format!("--publish asterix+udp://{address}")).hint("give a smaller sic")
+                })?;
+                Self::Asterix { address: address.clone(), options: AsterixOptions { sic, ..*options } }
+            }
+            Self::Standard | Self::Udp { .. } | Self::Cot { .. } => self.clone(),
+        })
+    }
+
+    /// The scheme of a wire that says places on Earth alone, and so needs a configuration with `[world]`.
+    pub fn needs_world(&self) -> Option<&'static str> {
+        match self {
+            Self::Cot { is_tcp: true, .. } => Some("cot+tcp"),
+            Self::Cot { .. } => Some("cot+udp"),
+            Self::Asterix { .. } => Some("asterix+udp"),
+            _ => None,
         }
     }
 }
@@ -191,7 +239,9 @@ mod tests {
         }
         let Target::Mqtt(cbor) = Target::parse("mqtt://b/a?cbor").unwrap() else { panic!("mqtt") };
         assert_eq!((cbor.topic.as_str(), cbor.form), ("a", Form::Cbor));
-        let Target::Mqtt(north) = Target::parse("mqtt://b/a").unwrap().of_source("north") else { panic!("mqtt") };
+        let Target::Mqtt(north) = Target::parse("mqtt://b/a").unwrap().of_source("north", 0).unwrap() else {
+            panic!("mqtt")
+        };
         assert_eq!(north.topic, "a/north");
         let said = format!(
             "{} {:?}",
@@ -199,6 +249,34 @@ mod tests {
             Target::parse("mqtt://u:secret@h/t").unwrap()
         );
         assert!(!said.contains("secret"), "{said}");
+    }
+
+    #[test]
+    fn wires_of_places_on_earth_say_what_they_miss() {
+        let cot = |text: &str| match Target::parse(text) {
+            Ok(Target::Cot { is_tcp, address, options }) => (is_tcp, address, options.kind, options.stale_s),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(cot("cot+udp://239.2.3.1:6969"), (false, "239.2.3.1:6969".into(), "a-u-G".into(), 10.0));
+        assert_eq!(cot("cot+tcp://tak:8087?type=a-n-S-X&stale=3"), (true, "tak:8087".into(), "a-n-S-X".into(), 3.0));
+        let asterix = Target::parse("asterix+udp://[::1]:8600?sac=25&sic=201").unwrap();
+        let Target::Asterix { address, options } = asterix.of_source("south", 2).unwrap() else { panic!("asterix") };
+        assert_eq!((address.as_str(), options.sac, options.sic), ("[::1]:8600", 25, 203));
+        assert!(asterix.of_source("last", 55).unwrap_err().to_string().contains("smaller sic"));
+        for (bad, why) in [
+            ("cot+udp://h", "HOST:PORT"),
+            ("cot+udp://h:1?type=<x>", "type=a-u-G"),
+            ("cot+udp://h:1?type=a--G", "type=a-u-G"),
+            ("cot+tcp://h:1?stale=-1", "stale=S"),
+            ("cot+tcp://h:1?cbor", "behind the ?"),
+            ("asterix+udp://h:1", "?sac=N&sic=N"),
+            ("asterix+udp://h:1?sac=1&sic=256", "0 to 255"),
+            ("cot://h:1", "cot+udp://"),
+        ] {
+            let said = Target::parse(bad).unwrap_err().to_string();
+            assert!(said.contains(why), "{bad}: {said}");
+        }
+        assert_eq!((asterix.needs_world(), Target::Standard.needs_world()), (Some("asterix+udp"), None));
     }
 
     #[test]
@@ -215,7 +293,9 @@ mod tests {
         {
             assert!(Target::parse(bad).unwrap_err().to_string().contains("nats://"), "{bad}");
         }
-        let Target::Nats(north) = Target::parse("nats://b/a").unwrap().of_source("north") else { panic!("nats") };
+        let Target::Nats(north) = Target::parse("nats://b/a").unwrap().of_source("north", 0).unwrap() else {
+            panic!("nats")
+        };
         assert_eq!((north.topic.as_str(), format!("{north:?}").as_str()), ("a.north", "nats://b:4222/a.north"));
     }
 

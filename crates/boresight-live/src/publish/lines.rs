@@ -81,7 +81,7 @@ mod tests {
         let mut lines = Lines::start(write).unwrap();
         let long: Arc<str> = "x".repeat(1000).into();
         // More than a pipe and the queue hold together: this ends only if nobody is waited for.
-        (0..WAITING + 1000).for_each(|_| lines.event(&Event { is_status: false, json: Arc::clone(&long) }));
+        (0..WAITING + 1000).for_each(|_| lines.event(&Event::line(false, Arc::clone(&long))));
         assert!(lines.dropped() > 0);
         let reader = std::thread::spawn(move || {
             let mut text = String::new();

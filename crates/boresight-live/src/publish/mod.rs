@@ -1,6 +1,11 @@
-//! The wire: events to standard output, datagrams, a broker.
+//! The wire: events to standard output, datagrams, a broker; places on Earth as Cursor on Target and ASTERIX.
 
 mod address;
+mod asterix;
+mod cot;
+mod cot_output;
+mod datagrams;
+mod earth_address;
 mod last_words;
 mod lines;
 mod mqtt;
@@ -8,8 +13,12 @@ mod mqtt;
 mod nats;
 mod open;
 mod udp;
+mod unplaced;
 
 pub use address::{Broker, Target};
+pub use asterix::Asterix;
+pub use cot_output::Cot;
+pub use earth_address::{AsterixOptions, CotOptions};
 pub use lines::Lines;
 pub use mqtt::Mqtt;
 #[cfg(feature = "nats")]

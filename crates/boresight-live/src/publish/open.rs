@@ -1,6 +1,8 @@
 //! From a target to what takes its events.
 
 use super::address::Target;
+use super::asterix::Asterix;
+use super::cot_output::Cot;
 use super::lines::Lines;
 use super::mqtt::Mqtt;
 use super::udp::Udp;
@@ -18,6 +20,9 @@ pub fn publisher(target: &Target, board: &Arc<Board>) -> Result<Box<dyn LiveOutp
         Target::Udp { address, form } => Box::new(Udp::open(address, *form)?),
         #[cfg(feature = "nats")]
         Target::Nats(broker) => Box::new(super::nats::Nats::start(broker, Arc::clone(board))?),
+        Target::Cot { is_tcp: true, address, options } => Box::new(Cot::tcp(address, options, board)?),
+        Target::Cot { address, options, .. } => Box::new(Cot::udp(address, options, board)?),
+        Target::Asterix { address, options } => Box::new(Asterix::open(address, *options, board)?),
         Target::Mqtt(broker) => Box::new(Mqtt::start(broker, Arc::clone(board))?),
     })
 }

@@ -1,17 +1,15 @@
-//! Events as datagrams, one each: nobody is waited for, and what the network loses is lost.
+//! Events as datagrams, one each.
 
+use super::datagrams::Datagrams;
 use crate::cbor::Form;
 use crate::event::Event;
 use crate::output::{LiveOutput, Shown};
-use boresight::{Error, ErrorKind, Result};
-use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
+use boresight::Result;
 
 /// Events to one address.
 pub struct Udp {
-    socket: UdpSocket,
-    to: SocketAddr,
+    datagrams: Datagrams,
     form: Form,
-    dropped: u64,
 }
 
 impl Udp {
@@ -19,17 +17,7 @@ impl Udp {
     /// # Errors
     /// A name that is not known.
     pub fn open(address: &str, form: Form) -> Result<Self> {
-        let failed = |e: std::io::Error| {
-            Error::new(ErrorKind::Output, "cannot be sent to").at(format!("udp://{address}")).because(e)
-        };
-        let mut found = address.to_socket_addrs().map_err(failed)?;
-        let Some(to) = found.next() else {
-            return Err(Error::new(ErrorKind::Output, "has no address").at(format!("udp://{address}")));
-        };
-        let any: SocketAddr = if to.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
-        let socket = UdpSocket::bind(any).map_err(failed)?;
-        socket.set_nonblocking(true).map_err(failed)?;
-        Ok(Self { socket, to, form, dropped: 0 })
+        Ok(Self { datagrams: Datagrams::open(address, &format!("udp://{address}"))?, form })
     }
 }
 
@@ -40,11 +28,10 @@ impl LiveOutput for Udp {
     }
 
     fn event(&mut self, event: &Event) {
-        // A full buffer, a network that is down, a listener that is not there: counted, never waited for.
-        self.dropped += u64::from(self.socket.send_to(&self.form.bytes(&event.json), self.to).is_err());
+        self.datagrams.send(&self.form.bytes(&event.json));
     }
 
     fn dropped(&self) -> u64 {
-        self.dropped
+        self.datagrams.lost
     }
 }

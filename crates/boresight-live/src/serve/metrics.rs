@@ -12,7 +12,7 @@ const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5
 /// A number of a source: its name, its kind, what it is, and how it is had; `None`: it is not known yet.
 type Number = (&'static str, &'static str, &'static str, fn(&Board) -> Option<f64>);
 
-const NUMBERS: [Number; 23] = [
+const NUMBERS: [Number; 24] = [
     ("frames_total", "counter", "Frames or scans that came from the source.", |b| count(&b.counts.arrived)),
     ("frames_tracked_total", "counter", "Frames that went through detector and tracker.", |b| count(&b.counts.tracked)),
     ("frames_dropped_total", "counter", "Frames that a newer one replaced.", |b| count(&b.counts.dropped)),
@@ -39,6 +39,9 @@ const NUMBERS: [Number; 23] = [
     ("tracks", "gauge", "Confirmed tracks now.", |b| count(&b.counts.now)),
     ("events_total", "counter", "Events for the wire.", |b| count(&b.counts.events)),
     ("events_dropped_total", "counter", "Events that an output could not take.", |b| count(&b.counts.events_dropped)),
+    ("events_unplaced_total", "counter", "Events without a place on Earth, for wires that need one.", |b| {
+        count(&b.counts.unplaced)
+    }),
     ("output_failures_total", "counter", "Frames that an output could not write.", |b| {
         count(&b.counts.record_failures)
     }),

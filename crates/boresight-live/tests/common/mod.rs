@@ -13,6 +13,9 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+/// A mast 20 m above flat ground that looks half down to the north-east.
+pub const POSE: &str = "world.pinhole={focal-px=200, principal-point-px=[79.5, 59.5], latitude-deg=48.137154, longitude-deg=11.576124, height-m=540, yaw-deg=45, pitch-deg=-40, pitch-sd-deg=0.5, ground-height-m=520}";
+
 /// Two bright squares that cross a dark frame.
 pub fn scene(n_frames: u64, rate_hz: f64) -> SceneConfig {
     let target = |start_px, velocity_px_per_s| Target {

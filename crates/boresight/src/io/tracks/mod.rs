@@ -17,6 +17,7 @@ mod write;
 pub use crate::io::tables::Dialect;
 #[cfg(feature = "parquet")]
 pub use export::parquet::write_parquet;
+pub use export::xml::escaped as escaped_xml;
 pub use format::Format;
 pub use measured::{add_mass, measured_rows};
 pub use options::{BadRows, ReadOptions};

@@ -13,6 +13,6 @@ mod paths;
 mod times;
 pub(super) mod trackmate_xml;
 pub(super) mod vmti;
-mod xml;
+pub(super) mod xml;
 mod zarr;
 mod zip;

@@ -1,7 +1,7 @@
 //! Text in XML.
 
 /// A text with what XML reads as its own written out; what XML cannot hold at all is left out.
-pub(super) fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
