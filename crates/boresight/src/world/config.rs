@@ -24,7 +24,7 @@ pub enum WorldConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PlaneConfig {
-    /// The map from pixels (centre of the top-left pixel: 0, 0) to metres on the plane: 9 numbers, the rows of a homography, or 6, those of an affine map.
+    /// The map from pixels (centre of the top-left pixel: 0, 0) to metres on the plane: 9 numbers, the rows of a homography, or 6, those of an affine map. On the plane y points to the left of x, seen from above. Tracks lie on the side of its horizon that a camera above the ground sees.
     pub homography: Vec<f64>,
     /// Latitude of the plane's origin (WGS 84), degrees, -90..=90, north positive.
     pub latitude_deg: f64,

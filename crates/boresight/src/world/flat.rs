@@ -3,7 +3,9 @@
 //! The plane touches the ellipsoid's shape at its origin; a point of it is taken to Earth exactly, through earth-centred coordinates, and velocity and
 //! covariance are turned into the axes east and north of that point. Position, velocity and their covariance go through the plane map's derivatives
 //! (`fuse/plane.rs`). A map from points is fitted in metres about their middle.
-//! Symbols: e, n metres east and north of the origin; D what a homography divides by.
+//! A homography alone does not say on which side of its horizon the ground is, and the sky may hold the image's corner. A camera above the ground sees it
+//! in one sense of turning: x to the right and y down become east and north with det J = det M / D³ < 0, so the ground is where D has the sign of -det M.
+//! Symbols: e, n metres east and north of the origin; M the map from px about a pixel of the ground; D what it divides by; J its derivative.
 //! Limits: a plane: [`FARTHEST_M`] from its origin it lies 200 m above the ellipsoid, and what is farther has no place; the height is the one given.
 
 use super::config::{PlaneConfig, PointsConfig};
@@ -25,7 +27,9 @@ pub(super) struct Flat {
     origin: Vector3<f64>,
     /// Rows east, north, up at the origin.
     axes: Matrix3<f64>,
-    /// From px to metres east and north of the origin.
+    /// A pixel on the ground's side of the horizon.
+    pixel: Vector2<f64>,
+    /// From px about that pixel to metres east and north of the origin.
     map: PlaneMap,
     height_m: Option<f64>,
     position_sd_m: f64,
@@ -36,6 +40,17 @@ fn for_both(j: &Matrix2<f64>) -> Matrix4<f64> {
     Matrix4::from_fn(|r, c| if r % 2 == c % 2 { j[(r / 2, c / 2)] } else { 0.0 })
 }
 
+/// A pixel on the ground's side of a map's horizon; none where there is no horizon and the map mirrors.
+fn ground_pixel(m: &Matrix3<f64>) -> Option<Vector2<f64>> {
+    let (side, c, d) = (-m.determinant().signum(), Vector2::new(m[(2, 0)], m[(2, 1)]), m[(2, 2)]);
+    if d * side > 0.0 {
+        return Some(Vector2::zeros());
+    }
+    // As far beyond the horizon as the corner is before it, a pixel at least.
+    let there = side * d.abs().max(c.norm());
+    (c.norm() > 0.0).then(|| c * ((there - d) / c.norm_squared()))
+}
+
 impl Flat {
     /// Of a map that is given.
     /// # Errors
@@ -44,9 +59,15 @@ impl Flat {
         let map = PlaneMap::from_rows(&c.homography).map_err(|e| e.at("world.plane.homography"))?;
         let (sin, cos) = c.bearing_deg.to_radians().sin_cos();
         let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let map = PlaneMap::from_rows((turn * map.matrix()).transpose().as_slice())?;
+        let m = turn * map.matrix();
+        let pixel = ground_pixel(&m).ok_or_else(|| {
+            let e = Error::new(ErrorKind::Config, "the map mirrors: no camera above the ground sees it so");
+            e.at("world.plane.homography").hint("seen from above the plane's y axis must point to the left of its x axis; turn the sign of y (the second row)")
+        })?;
+        let about = Matrix3::new(1.0, 0.0, pixel.x, 0.0, 1.0, pixel.y, 0.0, 0.0, 1.0);
+        let map = PlaneMap::from_rows((m * about).transpose().as_slice())?;
         let origin = Geodetic::of_degrees(c.latitude_deg, c.longitude_deg, c.height_m.unwrap_or(0.0));
-        Ok(Self::at(&origin, map, c.height_m, c.position_sd_m))
+        Ok(Self::at(&origin, pixel, map, c.height_m, c.position_sd_m))
     }
 
     /// Fitted to points; also the root mean square of their distances from it, m.
@@ -59,7 +80,10 @@ impl Flat {
         let origin = Geodetic { height_m, ..middle };
         let (axes, zero) = (origin.local_axes(), origin.ecef());
         let local = places.iter().map(|p| (axes * (p - zero)).xy());
-        let pairs: Vec<_> = c.points.iter().map(|p| Vector2::new(p[0], p[1])).zip(local).collect();
+        // About their middle, which is on the ground's side of the horizon as they are.
+        let pixels: Vec<_> = c.points.iter().map(|p| Vector2::new(p[0], p[1])).collect();
+        let pixel = pixels.iter().sum::<Vector2<f64>>() / pixels.len().max(1) as f64;
+        let pairs: Vec<_> = pixels.iter().map(|p| p - pixel).zip(local).collect();
         let refuse = |what: &str| {
             let e = Error::new(ErrorKind::Config, what).at("world.points.points");
             e.hint("four points or more, spread over the ground that is seen, no three of four on a line, each [x, y, latitude, longitude] of one and the same spot")
@@ -78,14 +102,19 @@ impl Flat {
         if !is_a_view {
             return Err(refuse("the points do not determine where the ground is: three of them lie on a line"));
         }
+        if fit.map.matrix().determinant() * fit.map.matrix()[(2, 2)] > 0.0 {
+            return Err(refuse(
+                "the points are mirrored: no camera above the ground sees them so. Are latitude and longitude, or x and y, changed over?",
+            ));
+        }
         // Each point has two residuals; eight of them the map takes up.
         let n_free = 2 * pairs.len() - 8;
         let residual_sd_m = if n_free > 0 { fit.rms * (pairs.len() as f64 / n_free as f64).sqrt() } else { 0.0 };
-        Ok((Self::at(&origin, fit.map, c.height_m, c.position_sd_m.unwrap_or(residual_sd_m)), fit.rms))
+        Ok((Self::at(&origin, pixel, fit.map, c.height_m, c.position_sd_m.unwrap_or(residual_sd_m)), fit.rms))
     }
 
-    fn at(origin: &Geodetic, map: PlaneMap, height_m: Option<f64>, position_sd_m: f64) -> Self {
-        Self { origin: origin.ecef(), axes: origin.local_axes(), map, height_m, position_sd_m }
+    fn at(origin: &Geodetic, pixel: Vector2<f64>, map: PlaneMap, height_m: Option<f64>, position_sd_m: f64) -> Self {
+        Self { origin: origin.ecef(), axes: origin.local_axes(), pixel, map, height_m, position_sd_m }
     }
 
     /// The place of a belief `[x, vx, y, vy]` (px, px/s); none beyond the horizon or too far away.
@@ -94,7 +123,9 @@ impl Flat {
     }
 
     fn place(&self, belief: &Gaussian<4>) -> Option<Place> {
-        let on_plane = self.map.belief(belief)?;
+        let mut about = *belief;
+        (about.mean[0], about.mean[2]) = (belief.mean[0] - self.pixel.x, belief.mean[2] - self.pixel.y);
+        let on_plane = self.map.belief(&about)?;
         let [e, n] = [on_plane.mean[0], on_plane.mean[2]];
         let is_near = e.hypot(n) <= FARTHEST_M;
         if !is_near {
@@ -127,7 +158,8 @@ mod tests {
 
     fn plane() -> PlaneConfig {
         PlaneConfig {
-            homography: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            // y of an image points down.
+            homography: vec![1.0, 0.0, 0.0, 0.0, -1.0, 0.0],
             latitude_deg: 48.137154,
             longitude_deg: 11.576124,
             height_m: Some(519.0),
@@ -143,7 +175,7 @@ mod tests {
     #[test]
     fn metres_of_a_plane_are_placed_as_pymap3d_does() {
         // pymap3d 3.2.0: enu2geodetic(1234.5, -678.9, 0, 48.137154, 11.576124, 519).
-        let place = Flat::of_plane(&plane()).unwrap().locate(&belief(1234.5, 3.0, -678.9, 4.0)).place.unwrap();
+        let place = Flat::of_plane(&plane()).unwrap().locate(&belief(1234.5, 3.0, 678.9, -4.0)).place.unwrap();
         assert!((place.latitude_deg - 48.13104769702107).abs() < 1e-10);
         assert!((place.longitude_deg - 11.592707333608951).abs() < 1e-10);
         assert_eq!((place.height_m, place.height_sd_m), (Some(519.0), 0.0));
@@ -156,7 +188,7 @@ mod tests {
     fn a_plane_is_turned_by_its_bearing_and_its_own_error_is_added() {
         let turned = PlaneConfig { bearing_deg: 90.0, position_sd_m: 2.0, ..plane() };
         // y points east, x south.
-        let place = Flat::of_plane(&turned).unwrap().locate(&belief(0.0, 3.0, 0.0, 4.0)).place.unwrap();
+        let place = Flat::of_plane(&turned).unwrap().locate(&belief(0.0, 3.0, 0.0, -4.0)).place.unwrap();
         assert!((place.velocity_m_per_s - Vector2::new(4.0, -3.0)).norm() < 1e-9);
         let variances = [0, 1, 2, 3].map(|k| place.cov[(k, k)]);
         [9.0 + 4.0, 2.0, 4.0 + 4.0, 1.0].iter().zip(variances).for_each(|(a, b)| assert!((a - b).abs() < 1e-9));
@@ -198,6 +230,55 @@ mod tests {
         assert!((flat.position_sd_m - rms * 2.5f64.sqrt()).abs() < 1e-12);
     }
 
+    /// A camera 8 m above flat ground, 30 degrees down, whose horizon crosses the image: px to metres to the right and ahead.
+    fn road() -> [f64; 9] {
+        let (f, (sin, cos)) = (600.0, 30f64.to_radians().sin_cos());
+        // The ray of (x, y) about the middle of 1280 x 960: right x, ahead f cos - y sin, up -(f sin + y cos); it meets the ground at 8 / -up.
+        let (cx, cy) = (640.0, 480.0);
+        let row = |x: f64, y: f64, one: f64| [x, y, one - x * cx - y * cy];
+        let (right, ahead, down) = (row(8.0, 0.0, 0.0), row(0.0, -8.0 * sin, 8.0 * f * cos), row(0.0, cos, f * sin));
+        [right, ahead, down].concat().try_into().unwrap()
+    }
+
+    #[test]
+    fn the_ground_is_found_where_the_sky_holds_the_images_corner() {
+        let ahead = |y: f64| {
+            let down = (30f64.to_radians()) + ((y - 480.0) / 600.0).atan();
+            8.0 / down.tan()
+        };
+        // The horizon is at row 480 - 600 tan(30 degrees) = 133.6.
+        for scale in [1.0, -1.0, 1e-3] {
+            let homography = road().map(|v| v * scale).to_vec();
+            let flat = Flat::of_plane(&PlaneConfig { homography, ..plane() }).unwrap();
+            let zero = Geodetic::of_degrees(48.137154, 11.576124, 519.0);
+            for y in [300.0, 480.0, 900.0] {
+                let place = flat.locate(&belief(640.0, 0.0, y, 0.0)).place.unwrap();
+                let at = Geodetic::of_degrees(place.latitude_deg, place.longitude_deg, 519.0);
+                let local = zero.local_axes() * (at.ecef() - zero.ecef());
+                assert!((local.xy() - Vector2::new(0.0, ahead(y))).norm() < 1e-3, "{y}: {local}");
+            }
+            assert!(flat.locate(&belief(640.0, 0.0, 100.0, 0.0)).place.is_none(), "the sky");
+        }
+        // And through points of the same ground.
+        let map = Flat::of_plane(&PlaneConfig { homography: road().to_vec(), ..plane() }).unwrap();
+        let spots = [[200.0, 300.0], [1000.0, 320.0], [1200.0, 900.0], [30.0, 800.0]];
+        let points = spots.map(|[x, y]| {
+            let place = map.locate(&belief(x, 0.0, y, 0.0)).place.unwrap();
+            [x, y, place.latitude_deg, place.longitude_deg]
+        });
+        let (flat, _) = of(points.to_vec()).unwrap();
+        let [a, b] = [&map, &flat].map(|m| m.locate(&belief(500.0, 9.0, 450.0, 4.0)).place.unwrap());
+        assert!((a.latitude_deg - b.latitude_deg).abs() < 1e-8 && (a.longitude_deg - b.longitude_deg).abs() < 1e-8);
+        assert!((a.velocity_m_per_s - b.velocity_m_per_s).norm() < 1e-3, "the heights differ by 349 m: 5e-5");
+        assert!(flat.locate(&belief(640.0, 0.0, 100.0, 0.0)).place.is_none(), "the sky");
+    }
+
+    #[test]
+    fn a_map_that_mirrors_is_refused() {
+        let mirrored = PlaneConfig { homography: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0], ..plane() };
+        assert!(Flat::of_plane(&mirrored).unwrap_err().to_string().contains("the sign of y"));
+    }
+
     #[test]
     fn points_that_determine_nothing_are_refused() {
         let all = points();
@@ -217,6 +298,8 @@ mod tests {
             [0.0, 9.0, all[3][2], all[3][3]],
         ];
         assert!(of(crossed).is_err());
+        let swapped = all.iter().map(|p| [p[0], p[1], p[3], p[2]]).collect();
+        assert!(said(swapped).contains("changed over"));
         let mut far = all;
         far[0][2] -= 5.0;
         assert!(said(far).contains("50 km"));
@@ -227,7 +310,7 @@ mod tests {
         fn a_place_leads_back_to_the_metres_of_its_plane(x in -5e3..5e3f64, y in -5e3..5e3f64, lat in -85.0..85.0f64, lon in -180.0..180.0f64, bearing in -180.0..180.0f64) {
             let config = PlaneConfig { latitude_deg: lat, longitude_deg: lon, height_m: None, bearing_deg: bearing, ..plane() };
             let flat = Flat::of_plane(&config).unwrap();
-            let place = flat.locate(&belief(x, 0.0, y, 0.0)).place.unwrap();
+            let place = flat.locate(&belief(x, 0.0, -y, 0.0)).place.unwrap();
             prop_assert_eq!(place.height_m, None);
             // Straight down to the plane from the place's latitude and longitude.
             let at = Geodetic::of_degrees(place.latitude_deg, place.longitude_deg, 0.0);
