@@ -3,62 +3,79 @@
 //! 8-bit pixels keep their values; of others the 0.5 % and the 99.5 % quantile of a sample of the frame become black and white.
 
 use boresight::{Image, Pixels};
-use std::borrow::Cow;
 
 /// Pixels looked at for the levels.
 const SAMPLE: usize = 4096;
 
-/// Brings one frame after another to 8 bits.
+/// Brings one frame after another to 8 bits; keeps its memory between frames.
 pub struct EightBits {
     /// Largest longer and shorter side, px.
     largest: (usize, usize),
     sample: Vec<f32>,
+    small: Pixels,
 }
 
 impl EightBits {
     /// Frames of at most these longer and shorter sides, px.
     pub fn at_most(long: usize, short: usize) -> Self {
-        Self { largest: (long, short), sample: Vec::new() }
+        Self { largest: (long, short), sample: Vec::new(), small: Pixels::Gray8(Image::default()) }
     }
 
     /// The frame in 8 bits, grey or RGB; `None` if it has no pixels.
-    pub fn of<'p>(&mut self, pixels: &'p Pixels) -> Option<Cow<'p, Pixels>> {
+    pub fn of<'a>(&'a mut self, pixels: &'a Pixels) -> Option<&'a Pixels> {
         let (w, h) = (pixels.width(), pixels.height());
         if w == 0 || h == 0 {
             return None;
         }
         let step = w.max(h).div_ceil(self.largest.0).max(w.min(h).div_ceil(self.largest.1));
-        let (cols, rows) = (w.div_ceil(step), h.div_ceil(step));
-        let gray = |values: Vec<u8>| Image::from_vec(cols, rows, values).map(|i| Cow::Owned(Pixels::Gray8(i)));
-        let mut values = Vec::with_capacity(cols * rows);
+        if step == 1 && matches!(pixels, Pixels::Gray8(_) | Pixels::Rgb8(_)) {
+            return Some(pixels);
+        }
+        let size = (w.div_ceil(step), h.div_ceil(step));
+        let (sample, small) = (&mut self.sample, &mut self.small);
         match pixels {
-            Pixels::Gray8(_) | Pixels::Rgb8(_) if step == 1 => Some(Cow::Borrowed(pixels)),
-            Pixels::Gray8(i) => {
-                reduce(i.as_slice(), w, step, |v| values.push(v));
-                gray(values)
-            }
-            Pixels::Rgb8(i) => {
-                let mut values = Vec::with_capacity(cols * rows);
-                reduce(i.as_slice(), w, step, |v| values.push(v));
-                Image::from_vec(cols, rows, values).map(|i| Cow::Owned(Pixels::Rgb8(i)))
-            }
+            Pixels::Gray8(i) => reduce(i, step, gray(small, size), |v| v),
+            Pixels::Rgb8(i) => reduce(i, step, colour(small, size), |v| v),
             Pixels::Gray16(i) => {
-                let (low, gain) = levels(&mut self.sample, i.as_slice().iter().map(|v| f32::from(*v)));
-                reduce(i.as_slice(), w, step, |v| values.push(((f32::from(v) - low) * gain) as u8));
-                gray(values)
+                let (low, gain) = levels(sample, i.as_slice().iter().map(|v| f32::from(*v)));
+                reduce(i, step, gray(small, size), |v| ((f32::from(v) - low) * gain) as u8);
             }
             Pixels::GrayF32(i) => {
-                let (low, gain) = levels(&mut self.sample, i.as_slice().iter().copied());
-                reduce(i.as_slice(), w, step, |v| values.push(((v - low) * gain) as u8));
-                gray(values)
+                let (low, gain) = levels(sample, i.as_slice().iter().copied());
+                reduce(i, step, gray(small, size), |v| ((v - low) * gain) as u8);
             }
         }
+        Some(&self.small)
+    }
+}
+
+/// Grey pixels of that size, columns and rows, in the memory of those before.
+fn gray(small: &mut Pixels, (cols, rows): (usize, usize)) -> &mut [u8] {
+    if !matches!(small, Pixels::Gray8(i) if (i.width(), i.height()) == (cols, rows)) {
+        *small = Pixels::Gray8(Image::filled(cols, rows, 0));
+    }
+    match small {
+        Pixels::Gray8(i) => i.as_mut_slice(),
+        _ => &mut [],
+    }
+}
+
+/// As [`gray`], in colour.
+fn colour(small: &mut Pixels, (cols, rows): (usize, usize)) -> &mut [[u8; 3]] {
+    if !matches!(small, Pixels::Rgb8(i) if (i.width(), i.height()) == (cols, rows)) {
+        *small = Pixels::Rgb8(Image::filled(cols, rows, [0; 3]));
+    }
+    match small {
+        Pixels::Rgb8(i) => i.as_mut_slice(),
+        _ => &mut [],
     }
 }
 
 /// Every `step`-th pixel of every `step`-th row.
-fn reduce<T: Copy>(pixels: &[T], width: usize, step: usize, mut put: impl FnMut(T)) {
-    pixels.chunks_exact(width).step_by(step).for_each(|row| row.iter().step_by(step).for_each(|v| put(*v)));
+fn reduce<T: Copy, U>(image: &Image<T>, step: usize, into: &mut [U], of: impl Fn(T) -> U) {
+    let rows = image.as_slice().chunks_exact(image.width()).step_by(step);
+    let pixels = rows.flat_map(|row| row.iter().step_by(step));
+    into.iter_mut().zip(pixels).for_each(|(out, v)| *out = of(*v));
 }
 
 /// Black, and the gain to 255: the 0.5 % and 99.5 % quantiles of a sample.
@@ -81,12 +98,14 @@ mod tests {
     fn eight_bits_stay_and_others_are_spread_over_the_scene() {
         let mut eight = EightBits::at_most(1280, 1280);
         let plain = Pixels::Gray8(Image::filled(64, 48, 9));
-        assert!(matches!(eight.of(&plain), Some(Cow::Borrowed(_))));
+        assert!(eight.of(&plain).is_some_and(|p| std::ptr::eq(p, &plain)));
         let ramp = Pixels::Gray16(Image::from_vec(100, 1, (0..100).map(|v| 1000 + 10 * v).collect()).unwrap());
-        let Pixels::Gray8(ramp) = eight.of(&ramp).unwrap().into_owned() else { panic!("grey") };
+        let Some(Pixels::Gray8(ramp)) = eight.of(&ramp) else { panic!("grey") };
         assert!(ramp.as_slice().is_sorted() && ramp.as_slice()[0] == 0 && ramp.as_slice()[99] == 255);
         let large = Pixels::Rgb8(Image::filled(2561, 10, [1, 2, 3]));
         let large = eight.of(&large).unwrap();
         assert_eq!((large.width(), large.height()), (854, 4));
+        let Pixels::Rgb8(large) = large else { panic!("colour") };
+        assert!(large.as_slice().iter().all(|p| *p == [1, 2, 3]));
     }
 }

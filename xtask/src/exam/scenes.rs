@@ -58,10 +58,10 @@ pub fn clips(folder: &Path, only: &str) -> Result<Vec<Clip>> {
         }
     }
     for seed in SEEDS {
-        add("simulated: spots of SNR 5", seed, spots(seed))?;
+        add("simulated: spots of SNR 5", seed, DIM.scene(seed))?;
     }
     for seed in SEEDS {
-        add(COMPRESSED, seed, bright_spots(seed))?;
+        add(COMPRESSED, seed, BRIGHT.scene(seed))?;
     }
     Ok(out)
 }
@@ -103,53 +103,61 @@ fn over_ground(pan: [f64; 2], shake_px: f64, turn_deg: f64, growth: f64) -> Scen
     }
 }
 
-/// Twenty spots of a peak of five deviations of the noise before a fixed camera, slow and straight.
-fn spots(seed: u64) -> SceneConfig {
-    let mut rng = Seed::new(seed).stream(Purpose::Scenario, 1);
-    let (sigma, noise) = (1.3, 8.0);
-    let targets = (0..20).map(|_| Target {
-        start_px: [rng.random_range(40.0..280.0), rng.random_range(40.0..200.0)],
-        velocity_px_per_s: [rng.random_range(-12.0..12.0), rng.random_range(-12.0..12.0)],
-        shape: Shape::Spot(Spot {
-            sigma_px: 0.0,
-            psf_sigma_px: sigma,
-            total: 5.0 * noise * std::f64::consts::TAU * sigma * sigma,
-        }),
-        ..Target::default()
-    });
-    SceneConfig {
-        width_px: SIZE_PX[0],
-        height_px: SIZE_PX[1],
-        n_frames: N_FRAMES,
-        rate_hz: RATE_HZ,
-        background: Background::White(White { mean: 60.0, std: noise }),
-        targets: targets.collect(),
-        ..SceneConfig::default()
-    }
+/// Spots in white noise before a fixed camera, straight on.
+struct Spots {
+    size_px: [usize; 2],
+    n: usize,
+    /// Deviation, px, and height of their peak, counts.
+    sigma_px: f64,
+    height: f64,
+    background: White,
+    /// Largest speed along each axis, px/s.
+    speed_px_per_s: f64,
 }
 
-/// Fifty bright spots in noise before a fixed camera, straight on, some out of the frame: of white noise an encoder makes specks that stay for many frames.
-fn bright_spots(seed: u64) -> SceneConfig {
-    let mut rng = Seed::new(seed).stream(Purpose::Scenario, 1);
-    let sigma = 2.2;
-    let targets = (0..50).map(|_| Target {
-        start_px: [rng.random_range(40.0..1240.0), rng.random_range(40.0..680.0)],
-        velocity_px_per_s: [rng.random_range(-60.0..60.0), rng.random_range(-60.0..60.0)],
-        shape: Shape::Spot(Spot {
+/// Twenty of five deviations of the noise, slow.
+const DIM: Spots = Spots {
+    size_px: SIZE_PX,
+    n: 20,
+    sigma_px: 1.3,
+    height: 40.0,
+    background: White { mean: 60.0, std: 8.0 },
+    speed_px_per_s: 12.0,
+};
+/// Fifty bright ones, some out of the frame: of white noise an encoder makes specks that stay for many frames.
+const BRIGHT: Spots = Spots {
+    size_px: [1280, 720],
+    n: 50,
+    sigma_px: 2.2,
+    height: 180.0,
+    background: White { mean: 30.0, std: 4.0 },
+    speed_px_per_s: 60.0,
+};
+
+impl Spots {
+    fn scene(&self, seed: u64) -> SceneConfig {
+        let mut rng = Seed::new(seed).stream(Purpose::Scenario, 1);
+        let shape = Shape::Spot(Spot {
             sigma_px: 0.0,
-            psf_sigma_px: sigma,
-            total: 180.0 * std::f64::consts::TAU * sigma * sigma,
-        }),
-        ..Target::default()
-    });
-    SceneConfig {
-        width_px: 1280,
-        height_px: 720,
-        n_frames: N_FRAMES,
-        rate_hz: RATE_HZ,
-        background: Background::White(White { mean: 30.0, std: 4.0 }),
-        targets: targets.collect(),
-        ..SceneConfig::default()
+            psf_sigma_px: self.sigma_px,
+            total: self.height * std::f64::consts::TAU * self.sigma_px * self.sigma_px,
+        });
+        let v = self.speed_px_per_s;
+        let targets = (0..self.n).map(|_| Target {
+            start_px: self.size_px.map(|side| rng.random_range(40.0..side as f64 - 40.0)),
+            velocity_px_per_s: [rng.random_range(-v..v), rng.random_range(-v..v)],
+            shape: shape.clone(),
+            ..Target::default()
+        });
+        SceneConfig {
+            width_px: self.size_px[0],
+            height_px: self.size_px[1],
+            n_frames: N_FRAMES,
+            rate_hz: RATE_HZ,
+            background: Background::White(self.background.clone()),
+            targets: targets.collect(),
+            ..SceneConfig::default()
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use super::unplaced::Unplaced;
 use crate::event::{TrackEvent, What};
 use boresight::Config;
 use boresight::io::tracks::escaped_xml;
-use boresight::world::{Bearing, Place, Site, World};
+use boresight::world::{Bearing, Place, Site, WorldConfig};
 use std::fmt::Write;
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -58,8 +58,7 @@ impl CotWriter {
 
     /// Takes the camera's place.
     pub fn configured(&mut self, config: &Config) {
-        let world = config.world.as_ref().and_then(|w| World::new(w).ok());
-        self.camera = world.and_then(|w| w.camera());
+        self.camera = config.world.as_ref().and_then(WorldConfig::camera);
     }
 
     /// The XML of an event; `None` where nothing is known of the place.

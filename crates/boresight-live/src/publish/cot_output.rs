@@ -3,6 +3,7 @@
 //! TCP: a server that is away is connected again with growing pauses; up to [`WAITING`] events wait for it, older ones go and are counted. What a server sends
 //! of others is read and thrown away. Limits: no TLS; the protocol acknowledges nothing, so what a connection that breaks had not passed on is lost.
 
+use super::connection::{again_and_again, open};
 use super::cot::CotWriter;
 use super::datagrams::Datagrams;
 use super::earth_address::CotOptions;
@@ -14,16 +15,14 @@ use crate::output::{LiveOutput, Shown};
 use crate::queue::{Closed, Queue};
 use boresight::{Config, Error, ErrorKind, Result};
 use std::io::{self, Write};
-use std::net::{Shutdown, TcpStream, ToSocketAddrs};
+use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Events that wait for a server that is away: places are of little worth when they are old.
 const WAITING: usize = 256;
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(10);
 /// How long the server may take to connect and to take bytes.
 const ANSWER: Duration = Duration::from_secs(5);
 /// After as long without events one looks whether the connection still stands.
@@ -77,37 +76,12 @@ fn writer(shown: String, options: &CotOptions, board: &Arc<Board>) -> CotWriter 
 
 /// Connects again and again until everything is said.
 fn work(shared: &Shared, address: &str, name: &str, board: &Board) {
-    let (mut pause, mut said, mut unsent) = (FIRST_PAUSE, false, None);
-    while !shared.abandoned.load(Ordering::SeqCst) {
-        let outcome = connect(address).and_then(|stream| {
-            if std::mem::take(&mut said) {
-                board.say(&format!("{name}: connected again"));
-            }
-            pause = FIRST_PAUSE;
-            serve(shared, stream, &mut unsent)
-        });
-        let Err(e) = outcome else { return };
-        if !std::mem::replace(&mut said, true) {
-            board.say(&format!("warning: {name}: {e}; events wait, at most {WAITING}"));
-        }
-        let until = Instant::now() + pause;
-        while Instant::now() < until && !shared.abandoned.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        pause = (pause * 2).min(LONGEST_PAUSE);
-    }
-}
-
-fn connect(address: &str) -> io::Result<TcpStream> {
-    let mut last = io::Error::other("the host has no address");
-    let mut opened =
-        address.to_socket_addrs()?.filter_map(|to| TcpStream::connect_timeout(&to, ANSWER).map_err(|e| last = e).ok());
-    let stream = opened.next();
-    drop(opened);
-    let stream = stream.ok_or(last)?;
-    stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(ANSWER))?;
-    Ok(stream)
+    let mut unsent = None;
+    again_and_again(name, WAITING, board, &shared.abandoned, |stands| {
+        let stream = open(address, ANSWER)?;
+        stands();
+        serve(shared, stream, &mut unsent)
+    });
 }
 
 /// Sends events until there are no more; the one that could not be sent stays in `unsent`.

@@ -2,6 +2,7 @@
 
 mod address;
 mod asterix;
+mod connection;
 mod cot;
 mod cot_output;
 mod datagrams;

@@ -8,6 +8,7 @@
 //! Limits: no TLS, no JetStream, one server (not its cluster); NATS itself has neither last will nor retained messages.
 
 use super::address::Broker;
+use super::connection::{again_and_again, open};
 use super::last_words::wait_for;
 use crate::board::Board;
 use crate::event::Event;
@@ -17,7 +18,7 @@ use boresight::{Error, ErrorKind, Result};
 use serde::Deserialize;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -27,8 +28,6 @@ use std::time::{Duration, Instant};
 const WAITING: usize = 4096;
 /// Events sent before their arrival is asked for.
 const BATCH: usize = 256;
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(10);
 /// How long an answer may take; after as long without events one is asked for, so that a dead connection is noticed.
 const ANSWER: Duration = Duration::from_secs(5);
 /// How long the end waits for the server.
@@ -65,26 +64,12 @@ impl Nats {
 
 /// Connects again and again until everything is said.
 fn work(shared: &Shared, broker: &Broker, board: &Board) {
-    let (mut pause, mut said) = (FIRST_PAUSE, false);
     let mut unanswered = VecDeque::new();
-    while !shared.abandoned.load(Ordering::SeqCst) {
-        let outcome = Connection::open(broker, board).and_then(|mut connection| {
-            if std::mem::take(&mut said) {
-                board.say(&format!("{broker:?}: connected again"));
-            }
-            pause = FIRST_PAUSE;
-            connection.serve(shared, &mut unanswered)
-        });
-        let Err(e) = outcome else { return };
-        if !std::mem::replace(&mut said, true) {
-            board.say(&format!("warning: {broker:?}: {e}; events wait, at most {WAITING}"));
-        }
-        let until = Instant::now() + pause;
-        while Instant::now() < until && !shared.abandoned.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        pause = (pause * 2).min(LONGEST_PAUSE);
-    }
+    again_and_again(&format!("{broker:?}"), WAITING, board, &shared.abandoned, |stands| {
+        let mut connection = Connection::open(broker, board)?;
+        stands();
+        connection.serve(shared, &mut unanswered)
+    });
 }
 
 /// What a server says of itself.
@@ -117,15 +102,8 @@ fn refusal(why: impl Into<String>) -> io::Error {
 
 impl<'b> Connection<'b> {
     fn open(broker: &'b Broker, board: &'b Board) -> io::Result<Self> {
-        let mut last = refusal("the host has no address");
-        let found = (broker.host.as_str(), broker.port).to_socket_addrs()?;
-        let mut opened = found.filter_map(|to| TcpStream::connect_timeout(&to, ANSWER).map_err(|e| last = e).ok());
-        let stream = opened.next();
-        drop(opened);
-        let stream = stream.ok_or(last)?;
-        stream.set_nodelay(true)?;
+        let stream = open((broker.host.as_str(), broker.port), ANSWER)?;
         stream.set_read_timeout(Some(ANSWER))?;
-        stream.set_write_timeout(Some(ANSWER))?;
         let (reader, writer) = (BufReader::new(stream.try_clone()?), stream);
         let mut new =
             Self { reader, writer, broker, board, max_payload: usual_payload(), text: Vec::new(), n_denied: 0 };

@@ -198,7 +198,7 @@ impl Coder {
         }
         let (Some(open), Some(pixels)) = (&mut self.open, self.eight.of(&shot.pixels)) else { return Ok(()) };
         self.bytes.clear();
-        let pushed = open.made.push(&pixels, shot.time, &mut self.bytes);
+        let pushed = open.made.push(pixels, shot.time, &mut self.bytes);
         // A fragment that became whole is, whatever became of this frame.
         self.write();
         pushed

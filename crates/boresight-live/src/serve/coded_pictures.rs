@@ -37,11 +37,11 @@ impl CodedPictures {
         };
         let since = self.last_key.map(|at| at.elapsed());
         let is_due = since.is_none_or(|s| s >= KEY_EVERY || (wants_key && s >= KEY_AT_MOST));
-        let mut outcome = self.coder.code(&pixels, is_due);
+        let mut outcome = self.coder.code(pixels, is_due);
         if outcome.is_err() {
             // Frames of another size or kind begin anew.
             self.coder = coder();
-            outcome = self.coder.code(&pixels, true);
+            outcome = self.coder.code(pixels, true);
         }
         let coded = outcome.ok()?;
         if coded.is_key {

@@ -21,7 +21,7 @@ impl Pictures {
     /// The frame as a JPEG; `None` if it has no pixels.
     pub fn encode(&mut self, pixels: &Pixels) -> Option<Vec<u8>> {
         let small = self.0.of(pixels)?;
-        let (bytes, colour) = match &*small {
+        let (bytes, colour) = match small {
             Pixels::Gray8(i) => (i.as_slice(), ColorType::Luma),
             Pixels::Rgb8(i) => (i.as_slice().as_flattened(), ColorType::Rgb),
             Pixels::Gray16(_) | Pixels::GrayF32(_) => return None,

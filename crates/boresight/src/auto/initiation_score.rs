@@ -4,7 +4,7 @@
 //! chains of the first pass ([`super::evidence`]), which know of no such score: those count of which each gains surely more than any in another order of the scans.
 //! How: the score is lowered to what three of four detections of every such chain reach, of those that gain a tenth of what the surest gains. Where one of them is clear, a
 //! faint one counts only if in most of its time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target.
-//! Where targets are many and all that stands is reported, it is raised instead ([`raise`]).
+//! Where targets are many and all that stands is reported, it is raised instead ([`raised`]).
 //! Limits: a faint target beside a clear one is not looked for.
 
 use super::chains::Chain;
@@ -51,27 +51,22 @@ pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, rea
     true
 }
 
-/// Raises the least score that starts a track to where false detections are at most [`FALSE_STARTS`] of those that start one, and says whether it did; `per_scan` detections a
+/// The score from which on false detections are at most [`FALSE_STARTS`] of those that start a track, with the reason, if it is higher than the one configured; `per_scan` detections a
 /// scan are targets', of a field of `area_px2`. Where all that stands is reported, nothing else tells what a codec makes of noise, which lasts for many frames, from a target.
-pub fn raise(per_scan: f64, area_px2: f64, config: &mut Config, reasons: &mut Vec<String>) -> bool {
-    let t = &mut config.tracker;
-    let Some(law) = t.score_likelihood.as_ref().filter(|_| t.report == Report::All && t.min_initiation_score > 0.0)
-    else {
-        return false;
-    };
+pub fn raised(per_scan: f64, area_px2: f64, config: &Config) -> Option<(f64, String)> {
+    let t = &config.tracker;
+    let law = t.score_likelihood.as_ref().filter(|_| t.report == Report::All && t.min_initiation_score > 0.0)?;
     // Of n false ones of a scan n (s / least)^-k score more than s.
     let n_false = t.clutter_density_per_px2 * area_px2;
     let score = round(law.least_score * (n_false / (FALSE_STARTS * per_scan)).powf(1.0 / law.clutter_exponent));
-    if !(score > t.min_initiation_score && score.is_finite()) {
-        return false;
-    }
-    reasons.push(format!(
-        "Detections of {score} start tracks, not of {}: of {n_false:.0} false ones a scan so few score more that they are {} % of all.",
-        t.min_initiation_score,
-        100.0 * FALSE_STARTS,
-    ));
-    t.min_initiation_score = score;
-    true
+    let reason = || {
+        format!(
+            "Detections of {score} start tracks, not of {}: of {n_false:.0} false ones a scan so few score more that they are {} % of all.",
+            t.min_initiation_score,
+            100.0 * FALSE_STARTS,
+        )
+    };
+    (score > t.min_initiation_score && score.is_finite()).then(|| (score, reason()))
 }
 
 /// The score that all but [`MISSED_SHARE`] of a chain's detections reach.
@@ -131,18 +126,17 @@ mod tests {
         config.tracker.min_initiation_score = 4.0;
         config.tracker.report = Report::All;
         config.tracker.clutter_density_per_px2 = 1e-4;
-        let raised = |per_scan: f64, exponent: f64, report: Report| {
+        let from = |per_scan: f64, exponent: f64, report: Report| {
             let mut c = config.clone();
             c.tracker.report = report;
             c.tracker.score_likelihood =
                 Some(ScoreLikelihoodConfig { least_score: 2.5, clutter_exponent: exponent, ..Default::default() });
-            raise(per_scan, 1e6, &mut c, &mut Vec::new());
-            c.tracker.min_initiation_score
+            raised(per_scan, 1e6, &c).map(|(score, _)| score)
         };
         // Of 100 false ones 0.5 score more than 2.5 * 200^(1/5), a hundredth of 50.
-        assert!((raised(50.0, 5.0, Report::All) - 7.21).abs() < 0.01);
-        assert_eq!(raised(50.0, 20.0, Report::All), 4.0, "hardly any scores more than 4");
-        assert_eq!(raised(50.0, 5.0, Report::Moving), 4.0, "the test of motion decides");
-        assert_eq!(raised(0.0, 5.0, Report::All), 4.0, "no target, nothing to compare with");
+        assert!((from(50.0, 5.0, Report::All).unwrap() - 7.21).abs() < 0.01);
+        assert_eq!(from(50.0, 20.0, Report::All), None, "hardly any scores more than 4");
+        assert_eq!(from(50.0, 5.0, Report::Moving), None, "the test of motion decides");
+        assert_eq!(from(0.0, 5.0, Report::All), None, "no target, nothing to compare with");
     }
 }

@@ -150,15 +150,13 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
     speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
-    if let Some(f) = &found {
-        let (mut clearer, mut reasons) = (assumed.clone(), Vec::new());
-        if initiation_score::raise(f.per_scan, area_px2, &mut choice.config, &mut reasons) {
-            clearer.config.tracker.min_initiation_score = choice.config.tracker.min_initiation_score;
-            clearer.reasons.append(&mut reasons);
-            statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut clearer)?;
-            *choice = clearer;
-            return Ok(Box::new(pass));
-        }
+    let raised = found.as_ref().and_then(|f| initiation_score::raised(f.per_scan, area_px2, &choice.config));
+    if let Some((score, reason)) = raised {
+        *choice = assumed;
+        choice.config.tracker.min_initiation_score = score;
+        choice.reasons.push(reason);
+        statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
+        return Ok(Box::new(pass));
     }
     let mut fainter = assumed.clone();
     let clear_s = found.as_ref().map_or(&[][..], |f| &f.spans_s);

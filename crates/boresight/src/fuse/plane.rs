@@ -5,6 +5,7 @@
 //! Estimated from points known in both frames: the linear solution (DLT: R. Hartley, A. Zisserman, *Multiple View Geometry*, 2nd
 //! ed., 2004, 4.1, with their normalisation 4.4.4), then Gauss-Newton on the distances in the second frame.
 //! Symbols: M 3 x 3, scale fixed by m33 = 1 (affine) or the largest entry (homography). Units: of the two frames (px, m).
+//! A homography has a horizon, D = 0, and sees one side of it: that of the points it is estimated from; of one that is given that of the image's corner, (0, 0).
 //! Limits: points must not lie on one line; a homography must not bring them near its horizon.
 
 use super::timeline::Timeline;
@@ -16,6 +17,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix4, Vector2, Vector3, Ve
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneMap {
     m: Matrix3<f64>,
+    /// Sign of D on the side of the horizon that is seen.
+    side: f64,
 }
 
 /// Which map is estimated.
@@ -46,7 +49,7 @@ impl Default for PlaneMap {
 
 impl PlaneMap {
     /// Leaves everything as it is.
-    pub const IDENTITY: Self = Self { m: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) };
+    pub const IDENTITY: Self = Self { m: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), side: 1.0 };
 
     /// Takes the rows of the matrix: 6 numbers (affine) or 9 (homography).
     /// # Errors
@@ -69,7 +72,17 @@ impl PlaneMap {
                 Error::new(ErrorKind::Config, "the map has no inverse, or a number is not finite").at("plane map")
             );
         }
-        Ok(Self { m })
+        Ok(Self { m, side: m[(2, 2)].signum() })
+    }
+
+    /// The same map, seen where D has this sign.
+    pub(crate) fn on_side(self, side: f64) -> Self {
+        Self { side, ..self }
+    }
+
+    /// Sign of D on the side of the horizon that is seen.
+    pub(crate) fn side(&self) -> f64 {
+        self.side
     }
 
     /// The matrix.
@@ -81,8 +94,7 @@ impl PlaneMap {
     fn at(&self, p: &Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>, f64)> {
         let h = self.m * Vector3::new(p.x, p.y, 1.0);
         let d = h.z;
-        // The side of the horizon on which the origin's image side lies is the side that is seen.
-        if !(d.is_finite() && d * self.m[(2, 2)].signum() > 0.0) {
+        if !(d.is_finite() && d * self.side > 0.0) {
             return None;
         }
         let q = Vector2::new(h.x / d, h.y / d);
@@ -95,6 +107,11 @@ impl PlaneMap {
     /// Maps a point; none beyond the horizon.
     pub fn point(&self, p: &Vector2<f64>) -> Option<Vector2<f64>> {
         self.at(p).map(|(q, _, _)| q)
+    }
+
+    /// Derivative of the map at a point, 2×2; none beyond the horizon.
+    pub(crate) fn derivative(&self, p: &Vector2<f64>) -> Option<Matrix2<f64>> {
+        self.at(p).map(|(_, j, _)| j)
     }
 
     /// Maps a belief `[x, vx, y, vy]` with its covariance; none beyond the horizon.
@@ -139,7 +156,8 @@ impl PlaneMap {
 
     /// Length scale of the map where it led to this belief.
     fn scale_back(&self, b: &Gaussian<4>) -> Option<f64> {
-        let back = Self { m: self.m.try_inverse()? };
+        // M⁻¹ [p'; 1] = [p; 1] / D.
+        let back = Self { m: self.m.try_inverse()?, side: self.side };
         let (_, j, _) = back.at(&Vector2::new(b.mean[0], b.mean[2]))?;
         Some(1.0 / j.determinant().abs().sqrt())
     }
@@ -174,17 +192,8 @@ impl PlaneMap {
         let back = to.try_inverse().ok_or_else(|| refuse("the points are one point".into()))?;
         let mut m = back * m * from;
         m /= if kind == MapKind::Affine { m[(2, 2)] } else { m[(2, 2)].signum() * m.amax() };
-        let map = Self::from_rows(&[
-            m[(0, 0)],
-            m[(0, 1)],
-            m[(0, 2)],
-            m[(1, 0)],
-            m[(1, 1)],
-            m[(1, 2)],
-            m[(2, 0)],
-            m[(2, 1)],
-            m[(2, 2)],
-        ])?;
+        let seen = (m * Vector3::new(pairs[0].0.x, pairs[0].0.y, 1.0)).z.signum();
+        let map = Self::from_rows(m.transpose().as_slice())?.on_side(seen);
         let mut sum = 0.0;
         for (a, b) in pairs {
             let q = map.point(a).ok_or_else(|| refuse("the map's horizon runs between the points".into()))?;
@@ -272,6 +281,20 @@ mod tests {
 
     fn grid() -> Vec<Vector2<f64>> {
         (0..25).map(|i| Vector2::new(f64::from(i % 5) * 60.0, f64::from(i / 5) * 45.0)).collect()
+    }
+
+    #[test]
+    fn a_map_of_points_sees_their_side_of_the_horizon_where_the_corner_is_beyond_it() {
+        // Row 100 is the horizon; the corner of the image is sky.
+        let road = PlaneMap::from_rows(&[1.0, 0.0, -300.0, 0.0, 0.0, 900.0, 0.0, 0.01, -1.0]).unwrap().on_side(1.0);
+        let pixels = [[50.0, 200.0], [600.0, 220.0], [580.0, 470.0], [20.0, 450.0], [300.0, 320.0]].map(Vector2::from);
+        let pairs: Vec<_> = pixels.iter().map(|p| (*p, road.point(p).unwrap())).collect();
+        let found = PlaneMap::estimate(&pairs, MapKind::Homography).unwrap();
+        assert!(found.rms < 1e-8, "{}", found.rms);
+        let b = Gaussian { mean: Vector4::new(400.0, 3.0, 300.0, -2.0), cov: Matrix4::identity() };
+        let [want, got] = [road, found.map].map(|m| m.belief(&b).unwrap());
+        assert!((want.mean - got.mean).amax() < 1e-6 && (want.cov - got.cov).amax() < 1e-6);
+        assert_eq!(found.map.point(&Vector2::new(300.0, 50.0)), None, "the sky");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What is known of the camera's place on Earth: the configuration's table `[world]`.
 
+use super::located::Site;
 use crate::Result;
 use crate::validate::{check, check_shown, not_negative, positive};
 use schemars::JsonSchema;
@@ -124,6 +125,16 @@ fn angle(at: &str, key: &str, deg: f64, most: f64) -> Result<()> {
 }
 
 impl WorldConfig {
+    /// Where the camera is, if that is said.
+    pub fn camera(&self) -> Option<Site> {
+        match self {
+            Self::Pinhole(c) => {
+                Some(Site { latitude_deg: c.latitude_deg, longitude_deg: c.longitude_deg, height_m: c.height_m })
+            }
+            Self::Plane(_) | Self::Points(_) => None,
+        }
+    }
+
     /// Checks every value by itself; `at`: the table's name.
     /// # Errors
     /// The first value out of its range.

@@ -5,14 +5,14 @@
 //! (`fuse/plane.rs`). A map from points is fitted in metres about their middle.
 //! A homography alone does not say on which side of its horizon the ground is, and the sky may hold the image's corner. A camera above the ground sees it
 //! in one sense of turning: x to the right and y down become east and north with det J = det M / D³ < 0, so the ground is where D has the sign of -det M.
-//! Symbols: e, n metres east and north of the origin; M the map from px about a pixel of the ground; D what it divides by; J its derivative.
+//! Symbols: e, n metres east and north of the origin; M the map from px to them; D what it divides by; J its derivative.
 //! Limits: a plane: [`FARTHEST_M`] from its origin it lies 200 m above the ellipsoid, and what is farther has no place; the height is the one given.
 
 use super::config::{PlaneConfig, PointsConfig};
 use super::located::{Located, Place};
 use crate::fuse::{MapKind, PlaneMap};
 use crate::geodesy::Geodetic;
-use crate::{Error, ErrorKind, Homography, Result};
+use crate::{Error, ErrorKind, Result};
 use boresight_filters::Gaussian;
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 
@@ -27,9 +27,7 @@ pub(super) struct Flat {
     origin: Vector3<f64>,
     /// Rows east, north, up at the origin.
     axes: Matrix3<f64>,
-    /// A pixel on the ground's side of the horizon.
-    pixel: Vector2<f64>,
-    /// From px about that pixel to metres east and north of the origin.
+    /// From px to metres east and north of the origin.
     map: PlaneMap,
     height_m: Option<f64>,
     position_sd_m: f64,
@@ -38,17 +36,6 @@ pub(super) struct Flat {
 /// A 4×4 matrix on `[x, vx, y, vy]` that does the same to positions and velocities.
 fn for_both(j: &Matrix2<f64>) -> Matrix4<f64> {
     Matrix4::from_fn(|r, c| if r % 2 == c % 2 { j[(r / 2, c / 2)] } else { 0.0 })
-}
-
-/// A pixel on the ground's side of a map's horizon; none where there is no horizon and the map mirrors.
-fn ground_pixel(m: &Matrix3<f64>) -> Option<Vector2<f64>> {
-    let (side, c, d) = (-m.determinant().signum(), Vector2::new(m[(2, 0)], m[(2, 1)]), m[(2, 2)]);
-    if d * side > 0.0 {
-        return Some(Vector2::zeros());
-    }
-    // As far beyond the horizon as the corner is before it, a pixel at least.
-    let there = side * d.abs().max(c.norm());
-    (c.norm() > 0.0).then(|| c * ((there - d) / c.norm_squared()))
 }
 
 impl Flat {
@@ -60,14 +47,15 @@ impl Flat {
         let (sin, cos) = c.bearing_deg.to_radians().sin_cos();
         let turn = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
         let m = turn * map.matrix();
-        let pixel = ground_pixel(&m).ok_or_else(|| {
+        let map = PlaneMap::from_rows(m.transpose().as_slice())?.on_side(-m.determinant().signum());
+        // An affine map has no other side.
+        let is_affine = m[(2, 0)] == 0.0 && m[(2, 1)] == 0.0;
+        if is_affine && m[(2, 2)] * map.side() <= 0.0 {
             let e = Error::new(ErrorKind::Config, "the map mirrors: no camera above the ground sees it so");
-            e.at("world.plane.homography").hint("seen from above the plane's y axis must point to the left of its x axis; turn the sign of y (the second row)")
-        })?;
-        let about = Matrix3::new(1.0, 0.0, pixel.x, 0.0, 1.0, pixel.y, 0.0, 0.0, 1.0);
-        let map = PlaneMap::from_rows((m * about).transpose().as_slice())?;
+            return Err(e.at("world.plane.homography").hint("seen from above the plane's y axis must point to the left of its x axis; turn the sign of y (the second row)"));
+        }
         let origin = Geodetic::of_degrees(c.latitude_deg, c.longitude_deg, c.height_m.unwrap_or(0.0));
-        Ok(Self::at(&origin, pixel, map, c.height_m, c.position_sd_m))
+        Ok(Self::at(&origin, map, c.height_m, c.position_sd_m))
     }
 
     /// Fitted to points; also the root mean square of their distances from it, m.
@@ -80,10 +68,7 @@ impl Flat {
         let origin = Geodetic { height_m, ..middle };
         let (axes, zero) = (origin.local_axes(), origin.ecef());
         let local = places.iter().map(|p| (axes * (p - zero)).xy());
-        // About their middle, which is on the ground's side of the horizon as they are.
-        let pixels: Vec<_> = c.points.iter().map(|p| Vector2::new(p[0], p[1])).collect();
-        let pixel = pixels.iter().sum::<Vector2<f64>>() / pixels.len().max(1) as f64;
-        let pairs: Vec<_> = pixels.iter().map(|p| p - pixel).zip(local).collect();
+        let pairs: Vec<_> = c.points.iter().map(|p| Vector2::new(p[0], p[1])).zip(local).collect();
         let refuse = |what: &str| {
             let e = Error::new(ErrorKind::Config, what).at("world.points.points");
             e.hint("four points or more, spread over the ground that is seen, no three of four on a line, each [x, y, latitude, longitude] of one and the same spot")
@@ -93,16 +78,14 @@ impl Flat {
         }
         let fit = PlaneMap::estimate(&pairs, MapKind::Homography)
             .map_err(|e| refuse("the points do not determine where the ground is").because(e))?;
-        let is_a_view = Homography::of_matrix(*fit.map.matrix() / fit.map.matrix().amax()).is_some_and(|h| {
-            pairs.iter().all(|(p, _)| {
-                let s = h.linear_at(*p).singular_values();
-                s.min() > LEAST_SPREAD * s.max()
-            })
+        let is_a_view = pairs.iter().all(|(p, _)| {
+            let s = fit.map.derivative(p).map(|j| j.singular_values());
+            s.is_some_and(|s| s.min() > LEAST_SPREAD * s.max())
         });
         if !is_a_view {
             return Err(refuse("the points do not determine where the ground is: three of them lie on a line"));
         }
-        if fit.map.matrix().determinant() * fit.map.matrix()[(2, 2)] > 0.0 {
+        if fit.map.matrix().determinant() * fit.map.side() > 0.0 {
             return Err(refuse(
                 "the points are mirrored: no camera above the ground sees them so. Are latitude and longitude, or x and y, changed over?",
             ));
@@ -110,11 +93,11 @@ impl Flat {
         // Each point has two residuals; eight of them the map takes up.
         let n_free = 2 * pairs.len() - 8;
         let residual_sd_m = if n_free > 0 { fit.rms * (pairs.len() as f64 / n_free as f64).sqrt() } else { 0.0 };
-        Ok((Self::at(&origin, pixel, fit.map, c.height_m, c.position_sd_m.unwrap_or(residual_sd_m)), fit.rms))
+        Ok((Self::at(&origin, fit.map, c.height_m, c.position_sd_m.unwrap_or(residual_sd_m)), fit.rms))
     }
 
-    fn at(origin: &Geodetic, pixel: Vector2<f64>, map: PlaneMap, height_m: Option<f64>, position_sd_m: f64) -> Self {
-        Self { origin: origin.ecef(), axes: origin.local_axes(), pixel, map, height_m, position_sd_m }
+    fn at(origin: &Geodetic, map: PlaneMap, height_m: Option<f64>, position_sd_m: f64) -> Self {
+        Self { origin: origin.ecef(), axes: origin.local_axes(), map, height_m, position_sd_m }
     }
 
     /// The place of a belief `[x, vx, y, vy]` (px, px/s); none beyond the horizon or too far away.
@@ -123,9 +106,7 @@ impl Flat {
     }
 
     fn place(&self, belief: &Gaussian<4>) -> Option<Place> {
-        let mut about = *belief;
-        (about.mean[0], about.mean[2]) = (belief.mean[0] - self.pixel.x, belief.mean[2] - self.pixel.y);
-        let on_plane = self.map.belief(&about)?;
+        let on_plane = self.map.belief(belief)?;
         let [e, n] = [on_plane.mean[0], on_plane.mean[2]];
         let is_near = e.hypot(n) <= FARTHEST_M;
         if !is_near {

@@ -2,7 +2,7 @@
 
 use super::config::WorldConfig;
 use super::flat::Flat;
-use super::located::{Located, Site};
+use super::located::Located;
 use super::pinhole::Pinhole;
 use crate::Result;
 use boresight_filters::Gaussian;
@@ -41,7 +41,6 @@ enum Way {
 #[derive(Clone, Debug)]
 pub struct World {
     way: Way,
-    camera: Option<Site>,
     says: String,
 }
 
@@ -51,9 +50,9 @@ impl World {
     /// A value out of its range, a map without an inverse, points that do not determine one.
     pub fn new(config: &WorldConfig) -> Result<Self> {
         config.validate("world")?;
-        let none = |way, says: &str| Self { way, camera: None, says: says.to_string() };
+        let of = |way, says: &str| Self { way, says: says.to_string() };
         Ok(match config {
-            WorldConfig::Plane(c) => none(Way::Flat(Flat::of_plane(c)?), "Places on Earth: by the map of a plane."),
+            WorldConfig::Plane(c) => of(Way::Flat(Flat::of_plane(c)?), "Places on Earth: by the map of a plane."),
             WorldConfig::Points(c) => {
                 let (flat, rms_m) = Flat::of_points(c)?;
                 let n = c.points.len();
@@ -61,10 +60,7 @@ impl World {
                     4 => "which leave no residual: nothing checks them".to_string(),
                     _ => format!("which deviate from it by {rms_m:.2} m (root mean square)"),
                 };
-                none(
-                    Way::Flat(flat),
-                    &format!("Places on Earth: by a map of the ground through {n} points, {residual}."),
-                )
+                of(Way::Flat(flat), &format!("Places on Earth: by a map of the ground through {n} points, {residual}."))
             }
             WorldConfig::Pinhole(c) => {
                 let says = match c.ground_height_m {
@@ -73,8 +69,7 @@ impl World {
                         "Places on Earth: by the camera's pose, directions only: no ground-height-m is given.".into()
                     }
                 };
-                let site = Site { latitude_deg: c.latitude_deg, longitude_deg: c.longitude_deg, height_m: c.height_m };
-                Self { way: Way::Pinhole(Box::new(Pinhole::new(c))), camera: Some(site), says }
+                of(Way::Pinhole(Box::new(Pinhole::new(c))), &says)
             }
         })
     }
@@ -85,11 +80,6 @@ impl World {
             Way::Flat(flat) => flat.locate(belief),
             Way::Pinhole(pinhole) => pinhole.locate(belief),
         }
-    }
-
-    /// Where the camera is, if that is known.
-    pub fn camera(&self) -> Option<Site> {
-        self.camera
     }
 
     /// A sentence for people: how places are found, and how well the map fits its points.

@@ -2,7 +2,7 @@
 //!
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
 //! series whose innovations are made as probable as possible.
-//! Limits: constant velocity only, since what one model calls noise another calls motion; detections that several tracks share tell nothing; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
+//! Limits: constant velocity only, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position equal to the one before to the bit; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 mod fit;
 
