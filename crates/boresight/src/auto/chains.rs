@@ -54,6 +54,20 @@ impl Chain {
 /// Scan and number of a detection of a chain, and the place of the one before it among all that were taken.
 type Taken = (usize, usize, Option<usize>);
 
+/// A sighting, when it was, and how dense such are where it lies, per px² and scan.
+struct Place {
+    time_s: f64,
+    seen: Sighting,
+    density: f64,
+}
+
+impl Place {
+    /// Squared distance of the farthest neighbour with which a chain begins, px².
+    fn reach2(&self) -> f64 {
+        MOST_FIRST_COST.exp() / (std::f64::consts::PI * self.density)
+    }
+}
+
 /// A chain that may go on: place and velocity with the covariance of one axis (the axes are alike).
 struct Open {
     /// Its last detection among all that were taken: most chains end with their second, and need no memory of their own.
@@ -69,21 +83,22 @@ struct Open {
 }
 
 impl Open {
-    /// From two sightings where the density is so; none if chance gives many as near as the second.
-    fn begin(scans: &[Sightings], k: [usize; 2], i: [usize; 2], density: f64, taken: &mut Vec<Taken>) -> Option<Self> {
-        let (a, b) = (scans[k[0]].all[i[0]], scans[k[1]].all[i[1]]);
-        let dt = scans[k[1]].time_s - scans[k[0]].time_s;
+    /// From two sightings with these numbers; none if chance gives many as near as the second.
+    fn begin(at: [(usize, usize); 2], first: &Place, second: &Place, taken: &mut Vec<Taken>) -> Option<Self> {
+        let (a, b) = (first.seen, second.seen);
+        let dt = second.time_s - first.time_s;
         let step = b.at - a.at;
         // What a neighbour as near, or one within the errors, costs by chance.
         let reach2 = step.norm_squared() + a.variance + b.variance;
-        let gain = -(density * std::f64::consts::PI * reach2).ln();
-        if !(dt > 0.0 && gain > -MOST_FIRST_COST) {
+        if !(dt > 0.0 && reach2 < first.reach2()) {
             return None;
         }
+        let gain = -(first.density * std::f64::consts::PI * reach2).ln();
         let p = [b.variance, b.variance / dt, (a.variance + b.variance) / (dt * dt)];
-        taken.extend([(k[0], i[0], None), (k[1], i[1], Some(taken.len()))]);
-        let (last, time_s) = (taken.len() - 1, scans[k[1]].time_s);
-        Some(Self { last, n_hits: 2, at: b.at, velocity: step / dt, p, time_s, gain, missed: false })
+        let [(k, i), (l, j)] = at;
+        taken.extend([(k, i, None), (l, j, Some(taken.len()))]);
+        let last = taken.len() - 1;
+        Some(Self { last, n_hits: 2, at: b.at, velocity: step / dt, p, time_s: second.time_s, gain, missed: false })
     }
 
     /// Scan and number of its detections, in the order of time.
@@ -108,93 +123,127 @@ impl Open {
     }
 
     /// Takes a sighting whose d² and S are known.
-    fn update(&mut self, s: &Sighting, d2: f64, variance: f64, density: f64) {
+    fn update(&mut self, s: &Place, d2: f64, variance: f64) {
         let gain = [self.p[0] / variance, self.p[1] / variance];
-        let innovation = s.at - self.at;
+        let innovation = s.seen.at - self.at;
         self.at += innovation * gain[0];
         self.velocity += innovation * gain[1];
         let [a, b, c] = self.p;
         self.p = [a - gain[0] * a, b - gain[0] * b, c - gain[1] * b];
-        self.gain += -0.5 * d2 - (std::f64::consts::TAU * variance * density).ln();
+        self.gain += -0.5 * d2 - (std::f64::consts::TAU * variance * s.density).ln();
         self.missed = false;
     }
 }
 
-/// All chains, none sharing a detection with another.
-pub fn chains(scans: &[Sightings], area_px2: f64) -> Vec<Chain> {
-    let n_all: usize = scans.iter().map(|s| s.all.len()).sum();
-    let map = Density::of(scans, area_px2);
-    let by_x: Vec<Vec<(f64, usize)>> = scans.iter().map(sorted).collect();
-    // As many starts as there are detections; each may be of clutter.
-    let start = -(n_all.max(1) as f64 / FALSE_CHAINS).ln();
-    let (mut open, mut next, mut done) = (Vec::<Open>::new(), Vec::new(), Vec::new());
-    let mut taken: Vec<Taken> = Vec::new();
-    for k in 1..scans.len() {
-        let widest = scans[k].all.iter().map(|s| s.variance).fold(0.0, f64::max);
-        for mut c in open.drain(..) {
-            c.predict(scans[k].time_s);
-            let far = (GATE * (c.p[0] + widest)).sqrt();
-            let (x, y) = (c.at.x, c.at.y);
-            let from = by_x[k].partition_point(|e| e.0 < x - far);
-            let mut best: Option<(f64, f64, usize)> = None;
-            for &(_, i) in by_x[k][from..].iter().take_while(|e| e.0 <= x + far) {
-                let s = &scans[k].all[i];
-                let variance = c.p[0] + s.variance;
-                let d2 = (s.at - Vector2::new(x, y)).norm_squared() / variance;
-                let cost = d2 + 2.0 * variance.ln();
-                if d2 <= GATE && best.is_none_or(|b| cost < b.0 + 2.0 * b.1.ln()) {
-                    best = Some((d2, variance, i));
-                }
-            }
-            match best {
-                Some((d2, variance, i)) => {
-                    let s = scans[k].all[i];
-                    c.update(&s, d2, variance, map.at(s.at));
-                    taken.push((k, i, Some(c.last)));
-                    (c.last, c.n_hits) = (taken.len() - 1, c.n_hits + 1);
-                    next.push(c);
-                }
-                None if c.n_hits < LEAST_HITS => {}
-                None if c.missed => done.push(c),
-                None => {
-                    c.missed = true;
-                    next.push(c);
-                }
-            }
+/// Scans looked at for chains, in any order of their times: what is known of each sighting whatever the order.
+pub struct Field<'a> {
+    scans: &'a [Sightings],
+    /// Of each sighting of each scan, where it lies: sightings per px² and scan.
+    density: Vec<Vec<f64>>,
+    /// Each scan's sightings by x, px.
+    by_x: Vec<Vec<(f64, usize)>>,
+    /// The largest variance of each scan, px².
+    widest: Vec<f64>,
+}
+
+impl<'a> Field<'a> {
+    /// Of scans in a field of that area, px².
+    pub fn new(scans: &'a [Sightings], area_px2: f64) -> Self {
+        let map = Density::of(scans, area_px2);
+        Self {
+            scans,
+            density: scans.iter().map(|s| s.all.iter().map(|s| map.at(s.at)).collect()).collect(),
+            by_x: scans.iter().map(sorted).collect(),
+            widest: scans.iter().map(|s| s.all.iter().map(|s| s.variance).fold(0.0, f64::max)).collect(),
         }
-        for (i, first) in scans[k - 1].all.iter().enumerate() {
-            let density = map.at(first.at);
-            let far = (MOST_FIRST_COST.exp() / (std::f64::consts::PI * density)).sqrt();
-            let from = by_x[k].partition_point(|e| e.0 < first.at.x - far);
-            for &(_, j) in by_x[k][from..].iter().take_while(|e| e.0 <= first.at.x + far) {
-                next.extend(Open::begin(scans, [k - 1, k], [i, j], density, &mut taken));
-            }
-        }
-        std::mem::swap(&mut open, &mut next);
     }
-    done.append(&mut open);
-    done.retain(|c| c.n_hits >= LEAST_HITS && c.gain + start > 0.0);
-    let mut done: Vec<_> = done.into_iter().map(|c| (c.gain, c.hits(&taken))).collect();
-    done.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-    let mut used: Vec<Vec<bool>> = scans.iter().map(|s| vec![false; s.all.len()]).collect();
-    let mut out = Vec::new();
-    for (gain, hits) in done {
-        if hits.iter().any(|h| used[h.0][h.1]) {
-            continue;
+
+    /// All chains, none sharing a detection with another, if the scan at each place is that of this number; times stay.
+    pub fn chains(&self, order: &[usize]) -> Vec<Chain> {
+        let n_all: usize = self.scans.iter().map(|s| s.all.len()).sum();
+        let place = |(k, i): (usize, usize)| Place {
+            time_s: self.scans[k].time_s,
+            seen: self.scans[order[k]].all[i],
+            density: self.density[order[k]][i],
+        };
+        // As many starts as there are detections; each may be of clutter.
+        let start = -(n_all.max(1) as f64 / FALSE_CHAINS).ln();
+        let (mut open, mut next, mut done) = (Vec::<Open>::new(), Vec::new(), Vec::new());
+        let mut taken: Vec<Taken> = Vec::new();
+        for k in 1..self.scans.len() {
+            let (now, by_x, widest) = (&self.scans[order[k]].all, &self.by_x[order[k]], self.widest[order[k]]);
+            for mut c in open.drain(..) {
+                c.predict(self.scans[k].time_s);
+                let far = (GATE * (c.p[0] + widest)).sqrt();
+                let from = by_x.partition_point(|e| e.0 < c.at.x - far);
+                let mut best: Option<(f64, f64, usize)> = None;
+                for &(_, i) in by_x[from..].iter().take_while(|e| e.0 <= c.at.x + far) {
+                    let s = &now[i];
+                    if (s.at.y - c.at.y).abs() > far {
+                        continue;
+                    }
+                    let variance = c.p[0] + s.variance;
+                    let d2 = (s.at - c.at).norm_squared() / variance;
+                    if d2 > GATE {
+                        continue;
+                    }
+                    let cost = d2 + 2.0 * variance.ln();
+                    if best.is_none_or(|b| cost < b.0 + 2.0 * b.1.ln()) {
+                        best = Some((d2, variance, i));
+                    }
+                }
+                match best {
+                    Some((d2, variance, i)) => {
+                        c.update(&place((k, i)), d2, variance);
+                        taken.push((k, i, Some(c.last)));
+                        (c.last, c.n_hits) = (taken.len() - 1, c.n_hits + 1);
+                        next.push(c);
+                    }
+                    None if c.n_hits < LEAST_HITS => {}
+                    None if c.missed => done.push(c),
+                    None => {
+                        c.missed = true;
+                        next.push(c);
+                    }
+                }
+            }
+            for i in 0..self.scans[order[k - 1]].all.len() {
+                let first = place((k - 1, i));
+                let far = first.reach2().sqrt();
+                let from = by_x.partition_point(|e| e.0 < first.seen.at.x - far);
+                for &(_, j) in by_x[from..].iter().take_while(|e| e.0 <= first.seen.at.x + far) {
+                    if (now[j].at.y - first.seen.at.y).abs() <= far {
+                        next.extend(Open::begin([(k - 1, i), (k, j)], &first, &place((k, j)), &mut taken));
+                    }
+                }
+            }
+            std::mem::swap(&mut open, &mut next);
         }
-        hits.iter().for_each(|h| used[h.0][h.1] = true);
-        let hits: Vec<(usize, Sighting)> = hits.iter().map(|h| (h.0, scans[h.0].all[h.1])).collect();
-        let [a, b] = [hits[0].1, hits[hits.len() - 1].1];
-        let speed =
-            |w: &[(usize, Sighting)]| (w[1].1.at - w[0].1.at).norm() / (scans[w[1].0].time_s - scans[w[0].0].time_s);
-        out.push(Chain {
-            gain: gain + start,
-            speeds_px_per_s: hits.windows(2).map(speed).collect(),
-            moves: (b.at - a.at).norm_squared() > MOVED * (a.variance + b.variance),
-            hits,
-        });
+        done.append(&mut open);
+        done.retain(|c| c.n_hits >= LEAST_HITS && c.gain + start > 0.0);
+        let mut done: Vec<_> = done.into_iter().map(|c| (c.gain, c.hits(&taken))).collect();
+        done.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        let mut used: Vec<Vec<bool>> = order.iter().map(|&from| vec![false; self.scans[from].all.len()]).collect();
+        let mut out = Vec::new();
+        for (gain, hits) in done {
+            if hits.iter().any(|h| used[h.0][h.1]) {
+                continue;
+            }
+            hits.iter().for_each(|h| used[h.0][h.1] = true);
+            let hits: Vec<(usize, Sighting)> = hits.into_iter().map(|h| (h.0, place(h).seen)).collect();
+            let [a, b] = [hits[0].1, hits[hits.len() - 1].1];
+            let speed = |w: &[(usize, Sighting)]| {
+                (w[1].1.at - w[0].1.at).norm() / (self.scans[w[1].0].time_s - self.scans[w[0].0].time_s)
+            };
+            out.push(Chain {
+                gain: gain + start,
+                speeds_px_per_s: hits.windows(2).map(speed).collect(),
+                moves: (b.at - a.at).norm_squared() > MOVED * (a.variance + b.variance),
+                hits,
+            });
+        }
+        out
     }
-    out
 }
 
 fn sorted(s: &Sightings) -> Vec<(f64, usize)> {

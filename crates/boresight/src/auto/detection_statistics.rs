@@ -39,6 +39,8 @@ const LEAST_LIFE_S: f64 = 2.0;
 const MOST_FALSE_MOTION: f64 = 0.01;
 /// A target may be hidden for so long and keep its id, s: now that it is known how long targets stay, likelihoods decide, and this bounds memory alone.
 const LONGEST_HIDDEN_S: f64 = 3600.0;
+/// Share of the targets' detections that may be given up with what scores less.
+const FAINT_SHARE: f64 = 0.01;
 /// Fewer scans than this tell nothing.
 const LEAST_SCANS: usize = 8;
 
@@ -55,6 +57,8 @@ pub struct Found {
     pub per_scan: f64,
     /// From when to when each target was followed, s.
     pub spans_s: Vec<[f64; 2]>,
+    /// The score that all but [`FAINT_SHARE`] of their detections reach; 0 of none.
+    pub least_score: f64,
 }
 
 /// What is known of one track.
@@ -111,7 +115,14 @@ pub fn learn(
         }
         let time_s = |k: usize| scans[k].time.ns as f64 * 1e-9;
         let spans_s = targets().map(|t| [time_s(t.first), time_s(t.last)]).collect();
-        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64, spans_s };
+        let mut scores: Vec<f32> = held.iter().map(|h| scans[h.scan].detections[h.detection as usize].score).collect();
+        scores.sort_unstable_by(f32::total_cmp);
+        found = Found {
+            n_targets: targets().count(),
+            per_scan: own as f64 / n_scans as f64,
+            spans_s,
+            least_score: scores.get((FAINT_SHARE * scores.len() as f64) as usize).map_or(0.0, |s| f64::from(*s)),
+        };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;
@@ -284,5 +295,22 @@ mod tests {
         let mut config = Config::default();
         learn(&scans(0.1, 0.9, 3)[..5], 3.6e5, None, &mut config, &mut Vec::new()).unwrap();
         assert_eq!(config, Config::default());
+    }
+    #[test]
+    fn the_least_score_is_what_all_but_one_in_a_hundred_of_the_targets_detections_reach() {
+        // Targets score evenly between 10 and 20, false ones 4.
+        let mut scans = scans(0.05, 0.9, 5);
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        for d in scans.iter_mut().flat_map(|s| {
+            let n = s.detections.len() - 5;
+            s.detections.iter_mut().enumerate().map(move |(i, d)| (i < n, d))
+        }) {
+            d.1.score = if d.0 { 10.0 + 10.0 * rng.random::<f32>() } else { 4.0 };
+        }
+        let mut config = Config::default();
+        config.tracker.extra_noise_px = 0.0;
+        config.tracker.acceleration_density_px2_per_s3 = 1.0;
+        let found = learn(&scans, SIDE_PX * SIDE_PX, None, &mut config, &mut Vec::new()).unwrap();
+        assert!((found.least_score - 10.1).abs() < 0.05, "{}", found.least_score);
     }
 }

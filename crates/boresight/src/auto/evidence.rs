@@ -4,7 +4,7 @@
 //! comes and goes, and lose what moves. A gain in nats is the logarithm of a likelihood ratio: by chance one larger than g comes once in e^g choices.
 //! Limits: those of [`super::chains`].
 
-use super::chains::{Chain, chains};
+use super::chains::{Chain, Field};
 use super::first_scans::first;
 use super::ground::Ground;
 use super::sightings::Sightings;
@@ -70,18 +70,15 @@ impl Evidence {
     /// Looks for chains in a field of that area, px².
     pub fn of(scans: &[Sightings], area_px2: f64) -> Self {
         let times_s = scans.iter().map(|s| s.time_s).collect();
-        let mut out = Self { moving: chains(scans, area_px2), times_s, ..Self::default() };
+        let field = Field::new(scans, area_px2);
+        let mut order: Vec<usize> = (0..scans.len()).collect();
+        let mut out = Self { moving: field.chains(&order), times_s, ..Self::default() };
         out.moving.retain(|c| c.moves);
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         for _ in 0..SURROGATES {
-            let mut order: Vec<usize> = (0..scans.len()).collect();
+            order.sort_unstable();
             order.shuffle(&mut rng);
-            let shuffled: Vec<Sightings> = scans
-                .iter()
-                .zip(order)
-                .map(|(s, from)| Sightings { time_s: s.time_s, all: scans[from].all.clone() })
-                .collect();
-            for chain in chains(&shuffled, area_px2).into_iter().filter(|c| c.moves) {
+            for chain in field.chains(&order).into_iter().filter(|c| c.moves) {
                 out.most_by_chance = out.most_by_chance.max(chain.gain);
                 out.by_chance[0] += 1.0 / SURROGATES as f64;
                 out.by_chance[1] += chain.gain / SURROGATES as f64;

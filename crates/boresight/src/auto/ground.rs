@@ -33,6 +33,8 @@ const SOLID_PX: f64 = 0.25;
 const SOLID_FRAMES: usize = 3;
 /// Distances below this are the patches' own noise, px.
 const NOISE_PX: f64 = 0.1;
+/// Frames in none of which a plane was seen, after which it is looked for no more: a sky, or noise, where the search for it costs most.
+const MOST_WITHOUT: usize = 12;
 /// The median of Rayleigh's distribution in deviations of an axis.
 const MEDIAN_SD: f64 = 1.1774;
 
@@ -90,12 +92,17 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
     // In working px.
     let (mut image_from_first, mut spread) = (Homography::identity(), Vec::new());
     let (mut residuals, mut solid) = (Vec::new(), Vec::new());
+    let (mut factor, mut ever_seen) = (1, false);
     for (k, (frame, similar)) in frames.iter().zip(similar).enumerate() {
-        let factor = plane_image(&frame.pixels, &mut line, &mut now);
+        let looks = ever_seen || k < MOST_WITHOUT;
+        if looks {
+            factor = plane_image(&frame.pixels, &mut line, &mut now);
+        }
         let grow = Homography::of_blocks(factor);
         let shrink = grow.inverse();
-        match plane.step(&now).filter(|step| step.is_clear()) {
+        match looks.then(|| plane.step(&now)).flatten().filter(|step| step.is_clear()) {
             Some(step) => {
+                ever_seen = true;
                 image_from_first = image_from_first.then(&step.to_from);
                 if let Some(direct) = first_patches.register(&first, &now, &image_from_first) {
                     image_from_first = direct.to_from;
@@ -119,7 +126,9 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
                 image_from_first = image_from_first.then(&grow.then(&Homography::of_similarity(similar)).then(&shrink))
             }
         }
-        plane.keep(&mut now);
+        if looks {
+            plane.keep(&mut now);
+        }
         let in_px = shrink.then(&image_from_first).then(&grow);
         let (w, h) = (frame.pixels.width() as f64, frame.pixels.height() as f64);
         out.push(Ground {
@@ -129,4 +138,55 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
         });
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameIndex, Pixels, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Frames of 480 x 360 px: noise, and from frame `from` on a view of many waves before which the camera goes 2 px to the left a frame.
+    fn frames(n: u64, from: u64) -> Vec<Frame> {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let waves: Vec<[f64; 4]> = (0..40)
+            .map(|_| {
+                let (angle, length) = (6.3 * rng.random::<f64>(), 0.05 + 0.4 * rng.random::<f64>());
+                [6.0 * rng.random::<f64>(), length * angle.cos(), length * angle.sin(), 6.3 * rng.random::<f64>()]
+            })
+            .collect();
+        let view = |x: f64, y: f64| waves.iter().map(|[a, kx, ky, phase]| a * (kx * x + ky * y + phase).sin()).sum();
+        (0..n)
+            .map(|k| {
+                let mut image = Image::filled(480, 360, 0u8);
+                for y in 0..360 {
+                    for (x, v) in image.row_mut(y).iter_mut().enumerate() {
+                        let seen: f64 = if k < from { 0.0 } else { view(x as f64 - 2.0 * k as f64, y as f64) };
+                        *v = (120.0 + seen + 4.0 * (rng.random::<f64>() - 0.5)).round() as u8;
+                    }
+                }
+                Frame { index: FrameIndex(k), time: Timestamp::from_ns(k as i64), pixels: Pixels::Gray8(image) }
+            })
+            .collect()
+    }
+
+    /// How far the ground's origin has gone, px.
+    fn gone(n: u64, from: u64, similar: Similarity) -> f64 {
+        let frames = frames(n, from);
+        let ground = follow(&frames, &vec![similar; frames.len()]);
+        -ground[frames.len() - 1].of(Vector2::zeros()).x
+    }
+
+    #[test]
+    fn a_plane_that_is_seen_within_the_first_frames_is_followed_and_later_ones_are_not_looked_for() {
+        let nothing = Similarity::identity();
+        let late = MOST_WITHOUT as u64;
+        assert!((gone(late + 8, late - 4, nothing) - 2.0 * 11.0).abs() < 0.5);
+        assert!(gone(late + 8, late + 2, nothing).abs() < 1e-9);
+        // The similarity of the frames says it then, each on the one before.
+        let shift = Similarity::shift(Vector2::new(2.0, 0.0));
+        let n = late + 8;
+        assert!((gone(n, late + 2, shift) - 2.0 * (n - 1) as f64).abs() < 1e-9);
+    }
 }

@@ -4,7 +4,7 @@
 //! chains of the first pass ([`super::evidence`]), which know of no such score: those count of which each gains surely more than any in another order of the scans.
 //! How: the score is lowered to what three of four detections of every such chain reach, of those that gain a tenth of what the surest gains. Where one of them is clear, a
 //! faint one counts only if in most of its time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target.
-//! Where targets are many and all that stands is reported, it is raised instead ([`raised`]).
+//! Where targets are many and all that stands is reported, it is raised instead ([`raised`]), and what scores less than the targets do is not looked for ([`kept`]).
 //! Limits: a faint target beside a clear one is not looked for.
 
 use super::chains::Chain;
@@ -12,6 +12,7 @@ use super::digits::round;
 use super::evidence::Evidence;
 use crate::Config;
 use crate::track::Report;
+use crate::vision::threshold::ThresholdConfig;
 
 /// Share of a chain's detections that start a track, less what comes back by following it backward: three of four.
 const MISSED_SHARE: f64 = 0.25;
@@ -67,6 +68,17 @@ pub fn raised(per_scan: f64, area_px2: f64, config: &Config) -> Option<(f64, Str
         )
     };
     (score > t.min_initiation_score && score.is_finite()).then(|| (score, reason()))
+}
+
+/// The least score that the detector then keeps, with the reason, if it keeps less now: what hardly a detection of a target falls short of (`least_score`), and no more than
+/// starts a track. What is not found costs nothing, neither time nor a wrong choice of the tracker.
+pub fn kept(least_score: f64, config: &Config) -> Option<(f64, String)> {
+    let ThresholdConfig::Isolated(isolated) = &config.detector.threshold else { return None };
+    let score = round(least_score.min(config.tracker.min_initiation_score));
+    (score > isolated.min_score).then(|| {
+        let before = isolated.min_score;
+        (score, format!("Detections of less than {score} (not {before}) are left out: 99 % of the targets' reach it."))
+    })
 }
 
 /// The score that all but [`MISSED_SHARE`] of a chain's detections reach.
@@ -138,5 +150,18 @@ mod tests {
         assert_eq!(from(50.0, 20.0, Report::All), None, "hardly any scores more than 4");
         assert_eq!(from(50.0, 5.0, Report::Moving), None, "the test of motion decides");
         assert_eq!(from(0.0, 5.0, Report::All), None, "no target, nothing to compare with");
+    }
+    #[test]
+    fn what_hardly_a_target_scores_is_not_kept_and_nothing_that_starts_a_track_goes() {
+        let mut config = Config::default();
+        config.tracker.min_initiation_score = 7.0;
+        assert_eq!(kept(20.0, &config), None, "a detector without such a score");
+        config.detector.threshold =
+            ThresholdConfig::Isolated(crate::vision::isolated::IsolatedConfig { min_score: 2.5, ..Default::default() });
+        let score = |least: f64| kept(least, &config).map(|(score, _)| score);
+        assert_eq!(score(5.0), Some(5.0));
+        assert_eq!(score(20.0), Some(7.0));
+        assert_eq!(score(2.0), None);
+        assert_eq!(score(0.0), None, "no target");
     }
 }

@@ -155,7 +155,17 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
         *choice = assumed;
         choice.config.tracker.min_initiation_score = score;
         choice.reasons.push(reason);
-        statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
+        let assumed = choice.clone();
+        let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
+        if let Some((score, reason)) = found.and_then(|f| initiation_score::kept(f.least_score, &assumed.config)) {
+            *choice = assumed;
+            if let ThresholdConfig::Isolated(isolated) = &mut choice.config.detector.threshold {
+                isolated.min_score = score;
+            }
+            choice.reasons.push(reason);
+            pass.go_on_with(crate::vision::build(&choice.config.detector, &info)?, score);
+            statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
+        }
         return Ok(Box::new(pass));
     }
     let mut fainter = assumed.clone();
