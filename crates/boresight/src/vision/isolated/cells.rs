@@ -25,19 +25,8 @@ pub struct Cells {
     spreads: Vec<f32>,
     /// Summed-area table with a row and a column of zeros before it: pixels, values, squared deviations about each cell's plane.
     sums: Vec<[f64; 3]>,
-    lanes: Lanes,
-}
-
-/// Sums of the columns of one row of cells.
-#[derive(Debug, Default)]
-struct Lanes {
-    base: Vec<f32>,
-    low: Vec<f32>,
-    high: Vec<f32>,
-    sum: Vec<f32>,
-    /// Weighted with the row's place about the middle.
-    slope: Vec<f32>,
-    square: Vec<f32>,
+    /// The cells of one row.
+    row: Vec<Part>,
 }
 
 /// What one cell holds.
@@ -62,17 +51,17 @@ impl Cells {
         }
         self.sums.clear();
         self.sums.resize(stride * (self.rows + 1), [0.0; 3]);
-        let mut lanes = std::mem::take(&mut self.lanes);
+        let mut parts = std::mem::take(&mut self.row);
         for r in 0..self.rows {
             let tall = CELL.min(image.height() - r * CELL);
-            lanes.start(image.row(r * CELL));
-            for y in 0..tall {
-                lanes.add(image.row(r * CELL + y), y as f32 - 3.5);
-            }
+            let mut rows = [image.row(r * CELL); CELL];
+            rows.iter_mut().enumerate().take(tall).for_each(|(y, row)| *row = image.row(r * CELL + y));
+            parts.clear();
+            row_of_cells(&rows[..tall], &mut parts);
             let mut before = [0.0; 3];
-            for c in 0..self.columns {
+            for (c, part) in parts.iter().enumerate() {
                 let wide = CELL.min(image.width() - c * CELL);
-                let cell = lanes.cell(c * CELL, wide, tall).unwrap_or_else(|| slow(image, c, r));
+                let cell = part.cell(wide, tall).unwrap_or_else(|| slow(image, c, r));
                 self.lowest[r * self.columns + c] = cell.low;
                 self.highest[r * self.columns + c] = cell.high;
                 // NaN where no pixel is finite.
@@ -86,7 +75,7 @@ impl Cells {
                 self.sums[at] = [above[0] + before[0], above[1] + before[1], above[2] + before[2]];
             }
         }
-        self.lanes = lanes;
+        self.row = parts;
     }
 
     /// Columns and rows of cells.
@@ -123,71 +112,147 @@ impl Cells {
     }
 }
 
-impl Lanes {
-    /// Begins a row of cells; differences are taken from each cell's first pixel, so that f32 holds their squares.
-    fn start<T: Pixel>(&mut self, row: &[T]) {
-        self.base.clear();
-        self.base.extend(row.iter().map(|p| p.value_f32()));
-        for cell in self.base.chunks_mut(CELL) {
-            let first = cell[0];
-            cell.fill(first);
-        }
-        for (v, with) in [
-            (&mut self.low, f32::INFINITY),
-            (&mut self.high, f32::NEG_INFINITY),
-            (&mut self.sum, 0.0),
-            (&mut self.slope, 0.0),
-            (&mut self.square, 0.0),
-        ] {
-            v.clear();
-            v.resize(row.len(), with);
-        }
-    }
+/// Sums over the pixels of a cell; differences are taken from its first pixel, so that f32 holds their squares.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    base: f32,
+    low: f32,
+    high: f32,
+    sum: f32,
+    /// Weighted with the pixel's place about the middle.
+    along: f32,
+    down: f32,
+    square: f32,
+}
 
-    fn add<T: Pixel>(&mut self, row: &[T], place: f32) {
-        add(row, place, &self.base, [&mut self.low, &mut self.high, &mut self.sum, &mut self.slope, &mut self.square]);
-    }
-
-    /// The cell of the columns from `x` on; `None` if a pixel of it is not finite.
-    fn cell(&self, x: usize, wide: usize, tall: usize) -> Option<Cell> {
-        let part = |v: &[f32]| -> [f32; CELL] { std::array::from_fn(|i| if i < wide { v[x + i] } else { 0.0 }) };
-        let sums = part(&self.sum);
-        let sum: f32 = sums.iter().sum();
-        let mut squares: f32 = part(&self.square).iter().sum();
-        if !squares.is_finite() {
+impl Part {
+    /// The cell; `None` if a pixel of it is not finite.
+    fn cell(&self, wide: usize, tall: usize) -> Option<Cell> {
+        if !self.square.is_finite() {
             return None;
         }
         let n = (wide * tall) as f32;
-        squares -= sum * sum / n;
+        let mut squares = self.square - self.sum * self.sum / n;
         if wide == CELL && tall == CELL {
-            let along: f32 = sums.iter().enumerate().map(|(i, s)| (i as f32 - 3.5) * s).sum();
-            let down: f32 = part(&self.slope).iter().sum();
-            squares -= (along * along + down * down) / PLACES2;
+            squares -= (self.along * self.along + self.down * self.down) / PLACES2;
         }
-        let columns = x..x + wide;
         Some(Cell {
-            low: self.low[columns.clone()].iter().copied().fold(f32::INFINITY, f32::min),
-            high: self.high[columns].iter().copied().fold(f32::NEG_INFINITY, f32::max),
+            low: self.low,
+            high: self.high,
             pixels: f64::from(n),
-            values: f64::from(sum) + f64::from(n) * f64::from(self.base[x]),
+            values: f64::from(self.sum) + f64::from(n) * f64::from(self.base),
             squares: f64::from(squares.max(0.0)),
         })
     }
 }
 
+/// Columns that are summed side by side: two cells, as many as the widest vectors hold. The order of adding is the same on every machine.
+const LANES: usize = 2 * CELL;
+
+/// The sums of so many columns.
+struct Columns<const N: usize> {
+    base: [f32; N],
+    low: [f32; N],
+    high: [f32; N],
+    sum: [f32; N],
+    down: [f32; N],
+    square: [f32; N],
+}
+
+impl<const N: usize> Columns<N> {
+    /// No pixel yet, about these values.
+    #[inline(always)]
+    fn about(base: [f32; N]) -> Self {
+        let (low, high) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
+        Self { base, low, high, sum: [0.0; N], down: [0.0; N], square: [0.0; N] }
+    }
+
+    /// Adds a pixel to column `l`, that far below the middle.
+    #[inline(always)]
+    fn add(&mut self, l: usize, v: f32, place: f32) {
+        let d = v - self.base[l];
+        self.low[l] = if v < self.low[l] { v } else { self.low[l] };
+        self.high[l] = if v > self.high[l] { v } else { self.high[l] };
+        self.sum[l] += d;
+        self.down[l] += place * d;
+        self.square[l] += d * d;
+    }
+
+    /// Adds a row of pixels.
+    #[inline(always)]
+    fn add_row(&mut self, v: &[f32; N], place: f32) {
+        for l in 0..N {
+            self.add(l, v[l], place);
+        }
+    }
+
+    /// The cell of the eight columns from `at` on.
+    #[inline(always)]
+    fn part(&self, at: usize) -> Part {
+        let sum = eight(&self.sum, at);
+        let mut along = sum;
+        for i in 0..CELL {
+            along[i] *= i as f32 - 3.5;
+        }
+        let (mut low, mut high) = (self.low[at], self.high[at]);
+        for i in at + 1..at + CELL {
+            low = if self.low[i] < low { self.low[i] } else { low };
+            high = if self.high[i] > high { self.high[i] } else { high };
+        }
+        Part {
+            base: self.base[at],
+            low,
+            high,
+            sum: sum_of(sum),
+            along: sum_of(along),
+            down: sum_of(eight(&self.down, at)),
+            square: sum_of(eight(&self.square, at)),
+        }
+    }
+}
+
+/// Eight of some values.
+#[inline(always)]
+fn eight(v: &[f32], at: usize) -> [f32; CELL] {
+    let mut out = [0.0; CELL];
+    out.copy_from_slice(&v[at..at + CELL]);
+    out
+}
+
+/// The sum of eight values: of pairs, pairs of these, and the last two.
+#[inline(always)]
+fn sum_of(v: [f32; CELL]) -> f32 {
+    ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
+}
+
 widest! {
-    fn add<T: Pixel>(row: &[T], place: f32, base: &[f32], lanes: [&mut [f32]; 5]) {
-        let n = row.len();
-        let [low, high, sum, slope, square] = lanes.map(|l| &mut l[..n]);
-        let base = &base[..n];
-        for x in 0..n {
-            let v = row[x].value_f32();
-            let d = v - base[x];
-            low[x] = if v < low[x] { v } else { low[x] };
-            high[x] = if v > high[x] { v } else { high[x] };
-            sum[x] += d;
-            slope[x] += place * d;
-            square[x] += d * d;
+    /// Appends the cells of up to eight rows of pixels.
+    fn row_of_cells<T: Pixel>(rows: &[&[T]], out: &mut Vec<Part>) {
+        let width = rows[0].len();
+        let whole = width / LANES * LANES;
+        for x in (0..whole).step_by(LANES) {
+            let mut base = [rows[0][x].value_f32(); LANES];
+            base[CELL..].fill(rows[0][x + CELL].value_f32());
+            let mut columns = Columns::about(base);
+            for (y, row) in rows.iter().enumerate() {
+                let Some(row) = row[x..].first_chunk::<LANES>() else { continue };
+                let mut values = [0.0; LANES];
+                for l in 0..LANES {
+                    values[l] = row[l].value_f32();
+                }
+                columns.add_row(&values, y as f32 - 3.5);
+            }
+            out.extend([columns.part(0), columns.part(CELL)]);
+        }
+        // A cell and a part of one, or less.
+        for x in (whole..width).step_by(CELL) {
+            let mut columns = Columns::<CELL>::about([rows[0][x].value_f32(); CELL]);
+            for (y, row) in rows.iter().enumerate() {
+                for (l, v) in row[x..].iter().take(CELL).enumerate() {
+                    columns.add(l, v.value_f32(), y as f32 - 3.5);
+                }
+            }
+            out.push(columns.part(0));
         }
     }
 }
