@@ -32,6 +32,14 @@ struct Spot {
     peak: (usize, usize),
 }
 
+/// Sums of the positive response over a disc.
+struct Moments {
+    sum: f64,
+    moment: Vector2<f64>,
+    /// Of half the response times the distance, where the disc's edge is soft.
+    edge: f64,
+}
+
 /// A spot of one sign as a detection, before the signs are compared.
 #[derive(Clone, Debug)]
 struct Found {
@@ -51,6 +59,8 @@ pub struct SpotDetector {
     radius: usize,
     /// Offsets inside the disc, row by row.
     disc: Vec<(i32, i32)>,
+    /// The same by rows: each one's offset and how far it reaches to both sides.
+    spans: Vec<(i32, i32)>,
     /// Σ_j (K * p_x)_j², px².
     noise_gain: f64,
     frame: Image<f32>,
@@ -93,6 +103,8 @@ impl SpotDetector {
             .flat_map(|y| (-r - 1..=r + 1).map(move |x| (x, y)))
             .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
             .collect();
+        let reach = |y: i32| disc.iter().filter(|o| o.1 == y).map(|o| o.0).max();
+        let spans = (-r - 1..=r + 1).filter_map(|y| Some((y, reach(y)?))).collect();
         let cell = (4.0 * config.size_px).max(32.0) as usize;
         let noise_gain = noise_gain(&disc, radius, smooth, surround);
         Self {
@@ -101,6 +113,7 @@ impl SpotDetector {
             surround,
             radius,
             disc,
+            spans,
             noise_gain,
             frame: Image::default(),
             smoothed: Image::default(),
@@ -183,18 +196,29 @@ impl SpotDetector {
     }
 
     fn find_peaks(&mut self) {
-        self.spots.clear();
+        let mut spots = std::mem::take(&mut self.spots);
+        spots.clear();
         let (w, h) = (self.response.width(), self.response.height());
         for y in 0..h {
             self.grid.level_row(y, self.config.k as f32, self.config.min_contrast as f32, 1.0, &mut self.level);
-            for x in 0..w {
-                let v = self.response.row(y)[x];
-                if v >= self.level[x] && v > 0.0 && self.is_peak(x, y, v) {
-                    let spot = self.centre(x, y, v);
-                    self.spots.push(spot);
+            let row = self.response.row(y);
+            let above = if y > 0 { self.response.row(y - 1) } else { &[] };
+            let below = if y + 1 < h { self.response.row(y + 1) } else { &[] };
+            for (x, (&v, level)) in row.iter().zip(&self.level).enumerate().take(w) {
+                if !(v >= *level && v > 0.0) {
+                    continue;
+                }
+                // Most pixels have a larger one beside them.
+                let is_beside = (x > 0 && row[x - 1] >= v)
+                    || row.get(x + 1).is_some_and(|o| *o > v)
+                    || above.get(x).is_some_and(|o| *o >= v)
+                    || below.get(x).is_some_and(|o| *o > v);
+                if !is_beside && self.is_peak(x, y, v) {
+                    spots.push(self.centre(x, y, v));
                 }
             }
         }
+        self.spots = spots;
     }
 
     /// Whether no pixel of the disc around (x, y) is larger; of equals the first in raster order is the peak.
@@ -216,21 +240,7 @@ impl SpotDetector {
         let mut c = Vector2::new(x as f64, y as f64);
         let (mut mass, mut pull) = (0.0, 0.0);
         for _ in 0..30 {
-            let (mut sum, mut moment, mut edge) = (0.0f64, Vector2::zeros(), 0.0);
-            let (cx, cy) = (c.x.round(), c.y.round());
-            for &(dx, dy) in &self.disc {
-                let Some(d) = self.at(cx as i64 + i64::from(dx), cy as i64 + i64::from(dy)) else { continue };
-                let p = Vector2::new(cx + f64::from(dx), cy + f64::from(dy)) - c;
-                let r = p.norm();
-                // A soft edge one pixel wide: what enters and leaves as the disc moves does so steadily.
-                let window = (self.radius as f64 + 0.5 - r).clamp(0.0, 1.0);
-                let d = f64::from(d.max(0.0));
-                sum += window * d;
-                moment += p * (window * d);
-                if window > 0.0 && window < 1.0 {
-                    edge += 0.5 * d * r;
-                }
-            }
+            let Moments { sum, moment, edge } = self.moments(c);
             if sum <= 0.0 {
                 break;
             }
@@ -249,6 +259,43 @@ impl SpotDetector {
         // A response without spread (an empty frame but for the target) is as sure as f32 can say.
         let score = ((f64::from(v) - median) / deviation.max(1e-6)).min(1e9) as f32;
         Spot { position: c, mass, pull, score, peak: (x, y) }
+    }
+
+    /// The sums over the disc around the pixel nearest to `c`, about `c`.
+    fn moments(&self, c: Vector2<f64>) -> Moments {
+        let mut m = Moments { sum: 0.0, moment: Vector2::zeros(), edge: 0.0 };
+        let (cx, cy) = (c.x.round(), c.y.round());
+        let outer = self.radius as f64 + 0.5;
+        let (inner2, outer2) = ((outer - 1.0).powi(2), outer.powi(2));
+        let (w, h) = (self.response.width() as i64, self.response.height() as i64);
+        for &(dy, reach) in &self.spans {
+            let y = cy as i64 + i64::from(dy);
+            if !(0..h).contains(&y) {
+                continue;
+            }
+            let (from, to) = ((cx as i64 - i64::from(reach)).max(0), (cx as i64 + i64::from(reach) + 1).min(w));
+            let Some(row) = self.response.row(y as usize).get(from as usize..to.max(from) as usize) else { continue };
+            let py = cy + f64::from(dy) - c.y;
+            for (i, d) in row.iter().enumerate() {
+                let px = (from + i as i64) as f64 - c.x;
+                let d = f64::from(d.max(0.0));
+                let r2 = px * px + py * py;
+                if r2 >= outer2 {
+                    continue;
+                }
+                // A soft edge one pixel wide: what enters and leaves as the disc moves does so steadily.
+                let window = if r2 <= inner2 {
+                    1.0
+                } else {
+                    let r = r2.sqrt();
+                    m.edge += 0.5 * d * r;
+                    outer - r
+                };
+                m.sum += window * d;
+                m.moment += Vector2::new(px, py) * (window * d);
+            }
+        }
+        m
     }
 
     /// Of spots closer than size / 2 the strongest stays.
