@@ -16,6 +16,8 @@ pub(super) const PATCH: usize = 12;
 pub(super) const MIN_PATCHES: usize = 6;
 /// Cells of the key frame in x and y, each with one patch.
 const CELLS: (usize, usize) = (8, 6);
+/// From one place that a patch is looked for at to the next, reduced px.
+const STEP: usize = 4;
 /// Texture below this many times that of the image's quiet quarter does not stand out.
 const QUIET_TIMES: f32 = 2.0;
 
@@ -58,6 +60,8 @@ pub(super) struct KeyFrame {
     pub proven: bool,
     chosen: bool,
     textures: Vec<f32>,
+    /// By column, the sums of the absolute gradients along x and y over the rows of a patch.
+    gradients: Vec<[f32; 2]>,
     best: Vec<Textured>,
 }
 
@@ -127,39 +131,49 @@ impl KeyFrame {
             return;
         }
         for cy in 0..CELLS.1 {
-            for cx in 0..CELLS.0 {
-                let (x0, x1) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
-                let (y0, y1) = (h * cy / CELLS.1, h * (cy + 1) / CELLS.1);
-                let mut top: Option<Textured> = None;
-                for y in (y0..y1).step_by(4) {
-                    for x in (x0..x1).step_by(4) {
-                        if x + PATCH + 1 >= w || y + PATCH + 1 >= h {
-                            continue;
-                        }
-                        let texture = texture(image, x, y);
+            let mut tops: [Option<Textured>; CELLS.0] = [None; CELLS.0];
+            for y in (h * cy / CELLS.1..h * (cy + 1) / CELLS.1).step_by(STEP).take_while(|y| y + PATCH + 1 < h) {
+                self.gradients.clear();
+                self.gradients.resize(w - 1, [0.0; 2]);
+                for r in y..y + PATCH {
+                    add_gradients(image.row(r), image.row(r + 1), &mut self.gradients);
+                }
+                for (cx, top) in tops.iter_mut().enumerate() {
+                    let columns = (w * cx / CELLS.0..w * (cx + 1) / CELLS.0).step_by(STEP);
+                    for x in columns.take_while(|x| x + PATCH + 1 < w) {
+                        let texture = texture(&self.gradients[x..x + PATCH]);
                         if texture.is_finite() {
                             self.textures.push(texture);
                             if top.as_ref().is_none_or(|t| texture > t.texture) {
-                                top = Some(Textured { texture, cell: cy * CELLS.0 + cx, x, y });
+                                *top = Some(Textured { texture, cell: cy * CELLS.0 + cx, x, y });
                             }
                         }
                     }
                 }
-                self.best.extend(top);
             }
+            self.best.extend(tops.into_iter().flatten());
         }
     }
 }
 
-/// The smaller of the mean absolute gradients along x and y.
-pub(super) fn texture(image: &Image<f32>, x: usize, y: usize) -> f32 {
-    let (mut gx, mut gy) = (0.0, 0.0);
-    for r in y..y + PATCH {
-        let (row, below) = (image.row(r), image.row(r + 1));
-        for c in x..x + PATCH {
-            gx += (row[c + 1] - row[c]).abs();
-            gy += (below[c] - row[c]).abs();
+widest! {
+    /// Adds the absolute gradients along x and y of a row to those of each column.
+    fn add_gradients(row: &[f32], below: &[f32], sums: &mut [[f32; 2]]) {
+        let n = sums.len();
+        let (left, right, below) = (&row[..n], &row[1..][..n], &below[..n]);
+        for x in 0..n {
+            sums[x][0] += (right[x] - left[x]).abs();
+            sums[x][1] += (below[x] - left[x]).abs();
         }
+    }
+}
+
+/// The smaller of the mean absolute gradients along x and y of a patch, from the sums of its columns.
+fn texture(columns: &[[f32; 2]]) -> f32 {
+    let (mut gx, mut gy) = (0.0, 0.0);
+    for [x, y] in columns {
+        gx += x;
+        gy += y;
     }
     gx.min(gy) / (PATCH * PATCH) as f32
 }
