@@ -59,6 +59,11 @@ impl Browser {
 
     /// Asks the browser for something and waits for its answer.
     pub fn ask(&mut self, method: &str, params: Value) -> Value {
+        self.answer(method, params).unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    /// As [`Self::ask`], or what the browser has against it.
+    fn answer(&mut self, method: &str, params: Value) -> Result<Value, Value> {
         self.n_asked += 1;
         let mut message = json!({ "id": self.n_asked, "method": method, "params": params });
         if let Some(session) = &self.session {
@@ -78,16 +83,23 @@ impl Browser {
                 _ => {}
             }
             if answer["id"] == self.n_asked {
-                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
-                return answer["result"].clone();
+                let error = &answer["error"];
+                return if error.is_null() { Ok(answer["result"].clone()) } else { Err(error.clone()) };
             }
         }
     }
 
-    /// What an expression gives in the page.
+    /// What an expression gives in the page; where the page is left while it is asked, in the one that comes.
     pub fn value(&mut self, expression: &str) -> Value {
         let params = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
-        let answer = self.ask("Runtime.evaluate", params);
+        let end = Instant::now() + PATIENCE;
+        let answer = loop {
+            match self.answer("Runtime.evaluate", params.clone()) {
+                Ok(answer) => break answer,
+                Err(error) if is_left(&error) && Instant::now() < end => std::thread::sleep(Duration::from_millis(30)),
+                Err(error) => panic!("{expression}: {error}"),
+            }
+        };
         assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
         answer["result"]["value"].clone()
     }
@@ -129,6 +141,14 @@ impl Browser {
         let bytes = BASE64_STANDARD.decode(taken["data"].as_str().unwrap()).unwrap();
         std::fs::write(Path::new(&dir).join(name), bytes).unwrap();
     }
+}
+
+/// Whether the browser says that the page was left, and nothing else.
+fn is_left(error: &Value) -> bool {
+    let message = error["message"].as_str().unwrap_or_default();
+    ["navigated or closed", "context was destroyed", "Cannot find context", "Cannot find default execution context"]
+        .iter()
+        .any(|said| message.contains(said))
 }
 
 impl Drop for Browser {
