@@ -83,14 +83,19 @@ struct Open {
 }
 
 impl Open {
-    /// From two sightings with these numbers; none if chance gives many as near as the second.
-    fn begin(at: [(usize, usize); 2], first: &Place, second: &Place, taken: &mut Vec<Taken>) -> Option<Self> {
+    /// From two sightings with these numbers; none if chance gives many as near as the second, from that squared distance on.
+    fn begin(
+        at: [(usize, usize); 2],
+        [first, second]: [&Place; 2],
+        farthest2: f64,
+        taken: &mut Vec<Taken>,
+    ) -> Option<Self> {
         let (a, b) = (first.seen, second.seen);
         let dt = second.time_s - first.time_s;
         let step = b.at - a.at;
         // What a neighbour as near, or one within the errors, costs by chance.
         let reach2 = step.norm_squared() + a.variance + b.variance;
-        if !(dt > 0.0 && reach2 < first.reach2()) {
+        if !(dt > 0.0 && reach2 < farthest2) {
             return None;
         }
         let gain = -(first.density * std::f64::consts::PI * reach2).ln();
@@ -209,11 +214,12 @@ impl<'a> Field<'a> {
             }
             for i in 0..self.scans[order[k - 1]].all.len() {
                 let first = place((k - 1, i));
-                let far = first.reach2().sqrt();
+                let far2 = first.reach2();
+                let far = far2.sqrt();
                 let from = by_x.partition_point(|e| e.0 < first.seen.at.x - far);
                 for &(_, j) in by_x[from..].iter().take_while(|e| e.0 <= first.seen.at.x + far) {
                     if (now[j].at.y - first.seen.at.y).abs() <= far {
-                        next.extend(Open::begin([(k - 1, i), (k, j)], &first, &place((k, j)), &mut taken));
+                        next.extend(Open::begin([(k - 1, i), (k, j)], [&first, &place((k, j))], far2, &mut taken));
                     }
                 }
             }

@@ -116,13 +116,12 @@ pub fn learn(
         let time_s = |k: usize| scans[k].time.ns as f64 * 1e-9;
         let spans_s = targets().map(|t| [time_s(t.first), time_s(t.last)]).collect();
         let mut scores: Vec<f32> = held.iter().map(|h| scans[h.scan].detections[h.detection as usize].score).collect();
-        scores.sort_unstable_by(f32::total_cmp);
-        found = Found {
-            n_targets: targets().count(),
-            per_scan: own as f64 / n_scans as f64,
-            spans_s,
-            least_score: scores.get((FAINT_SHARE * scores.len() as f64) as usize).map_or(0.0, |s| f64::from(*s)),
+        let faint = (FAINT_SHARE * scores.len() as f64) as usize;
+        let least_score = match scores.is_empty() {
+            true => 0.0,
+            false => f64::from(*scores.select_nth_unstable_by(faint, f32::total_cmp).1),
         };
+        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64, spans_s, least_score };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;

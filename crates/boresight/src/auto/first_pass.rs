@@ -32,14 +32,6 @@ impl FirstPass {
         taken
     }
 
-    /// Goes on with another detector, of the same kind but without what scores less than `min_score`: that goes from the scans made ahead too.
-    pub fn go_on_with(&mut self, detector: Box<dyn Detector>, min_score: f64) {
-        self.detector = detector;
-        for scan in &mut self.scans {
-            scan.detections.retain(|d| f64::from(d.score) >= min_score);
-        }
-    }
-
     /// The scans made ahead.
     pub fn scans(&mut self) -> &[Scan] {
         self.scans.make_contiguous()
@@ -112,31 +104,5 @@ mod tests {
             assert!(f.index.0 == 3 || scan.index == f.index);
         }
         assert_eq!(*seen.lock().unwrap(), [0, 1, 2, 3, 4]);
-    }
-    #[test]
-    fn what_is_not_kept_any_more_goes_from_the_scans_made_ahead_too() {
-        /// Two detections in each frame.
-        struct Two(f32);
-        impl Detector for Two {
-            fn detect(&mut self, frame: &Frame, scan: &mut Scan) -> Result<()> {
-                let scored = |score: f32| crate::Detection::point(0.0, 0.0, 1.0).with_score(score);
-                *scan = Scan::at(frame.index, frame.time).with_detections(vec![scored(3.0), scored(self.0)]);
-                Ok(())
-            }
-        }
-        let frames: Vec<Frame> = (0..4).map(frame).collect();
-        let mut pass = FirstPass::new(Box::new(Two(9.0)));
-        let mut at_once = pass.at_once(1);
-        assert!(pass.take(&frames[..2], &mut at_once));
-        drop(at_once);
-        pass.go_on_with(Box::new(Two(8.0)), 5.0);
-        let mut scan = Scan::default();
-        let mut scores = |f: &Frame| {
-            pass.detect(f, &mut scan).unwrap();
-            scan.detections.iter().map(|d| d.score).collect::<Vec<_>>()
-        };
-        assert_eq!(scores(&frames[0]), [9.0]);
-        assert_eq!(scores(&frames[1]), [9.0]);
-        assert_eq!(scores(&frames[2]), [3.0, 8.0], "the new detector's own");
     }
 }

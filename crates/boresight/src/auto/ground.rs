@@ -33,7 +33,8 @@ const SOLID_PX: f64 = 0.25;
 const SOLID_FRAMES: usize = 3;
 /// Distances below this are the patches' own noise, px.
 const NOISE_PX: f64 = 0.1;
-/// Frames in none of which a plane was seen, after which it is looked for no more: a sky, or noise, where the search for it costs most.
+/// Frames in none of which a plane was seen, after which it is looked for no more: a sky, or noise, where the search for it costs
+/// most. A quarter of the frames that the choice looks at; what comes into view later is followed by the similarity.
 const MOST_WITHOUT: usize = 12;
 /// The median of Rayleigh's distribution in deviations of an axis.
 const MEDIAN_SD: f64 = 1.1774;

@@ -132,19 +132,7 @@ fn probed(ahead: &[Frame]) -> &[Frame] {
 pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Box<dyn Detector>> {
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
-    let mut detector = crate::vision::build(&choice.config.detector, &info)?;
-    crate::pipeline::prime(&mut *detector, frames);
-    let mut pass = FirstPass::new(detector);
-    let mut at_once = pass.at_once(request.n_threads());
-    let mut taken = 0;
-    loop {
-        let frames = frames.read_on(taken + at_once.n_frames()).get(taken..).unwrap_or_default();
-        if frames.is_empty() || !pass.take(frames, &mut at_once) {
-            break;
-        }
-        taken += frames.len();
-    }
-    drop(at_once);
+    let mut pass = first_pass(frames, &choice.config, request)?;
     let area_px2 = (info.width * info.height).max(1) as f64;
     let evidence = Evidence::of_scans(pass.scans(), area_px2);
     speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
@@ -163,7 +151,8 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
                 isolated.min_score = score;
             }
             choice.reasons.push(reason);
-            pass.go_on_with(crate::vision::build(&choice.config.detector, &info)?, score);
+            // Other blobs fall away with those left out, so all is detected anew: what is learnt is learnt of what the run sees.
+            pass = first_pass(frames, &choice.config, request)?;
             statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
         }
         return Ok(Box::new(pass));
@@ -192,6 +181,22 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
         }
     }
     Ok(Box::new(pass))
+}
+
+/// The detector of a configuration with the scans that it makes of the frames read ahead.
+fn first_pass(frames: &mut Replay, config: &Config, request: &Request) -> Result<FirstPass> {
+    let mut detector = crate::vision::build(&config.detector, frames.info())?;
+    crate::pipeline::prime(&mut *detector, frames);
+    let mut pass = FirstPass::new(detector);
+    let mut at_once = pass.at_once(request.n_threads());
+    let mut taken = 0;
+    loop {
+        let frames = frames.read_on(taken + at_once.n_frames()).get(taken..).unwrap_or_default();
+        if frames.is_empty() || !pass.take(frames, &mut at_once) {
+            return Ok(pass);
+        }
+        taken += frames.len();
+    }
 }
 
 /// Learns noise and motion, and of points what the detections are made of; of regions this is not known, and their rule stays.
@@ -289,17 +294,14 @@ mod tests {
         }
     }
 
-    /// What is reported of 100 frames of noise with bright squares of 4 px at these places and speeds, px a frame.
-    fn reported(squares: &[([f64; 2], f64)]) -> (Report, Vec<String>) {
+    /// 100 frames on which `draw` has drawn, and what describes them.
+    fn filmed(draw: impl Fn(u64, &mut Image<u8>)) -> (Vec<Frame>, SourceInfo) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let frames: Vec<Frame> = (0..100u64)
+        let frames = (0..100u64)
             .map(|k| {
                 let noise = (0..SIZE[0] * SIZE[1]).map(|_| 60 + rng.random_range(0..6u8)).collect();
                 let mut image = Image::from_vec(SIZE[0], SIZE[1], noise).unwrap();
-                for ([x, y], speed) in squares {
-                    let x = (x + speed * k as f64) as usize;
-                    (0..4).for_each(|dy| image.row_mut(*y as usize + dy)[x..x + 4].fill(200));
-                }
+                draw(k, &mut image);
                 Frame {
                     index: FrameIndex(k),
                     time: Timestamp::from_secs_f64(0.04 * k as f64),
@@ -317,16 +319,66 @@ mod tests {
             rate_hz: Some(25.0),
             true_times: true,
         };
+        (frames, info)
+    }
+
+    /// Draws a bright square of 4 px.
+    fn square(image: &mut Image<u8>, [x, y]: [f64; 2], value: u8) {
+        (0..4).for_each(|dy| image.row_mut(y as usize + dy)[x as usize..x as usize + 4].fill(value));
+    }
+
+    /// The choice that is learnt from, for isolated blobs of at least this score.
+    fn assumed(min_score: f64, report: Report) -> Choice {
         let mut config = Config::default();
         config.detector = DetectorConfig {
-            threshold: ThresholdConfig::Isolated(IsolatedConfig::default()),
+            threshold: ThresholdConfig::Isolated(IsolatedConfig { min_score, ..IsolatedConfig::default() }),
             ..DetectorConfig::default()
         };
-        config.tracker.report = Report::Moving;
-        let mut choice = Choice { config, reasons: Vec::new() };
+        config.tracker.report = report;
+        Choice { config, reasons: Vec::new() }
+    }
+
+    /// What is reported of noise with bright squares at these places and speeds, px a frame.
+    fn reported(squares: &[([f64; 2], f64)]) -> (Report, Vec<String>) {
+        let (frames, info) = filmed(|k, image| {
+            squares.iter().for_each(|([x, y], speed)| square(image, [x + speed * k as f64, *y], 200));
+        });
+        let mut choice = assumed(IsolatedConfig::default().min_score, Report::Moving);
         let mut frames = Replay::new(Box::new(Memory(frames.into_iter(), info)), 100);
         learn(&mut frames, &mut choice, &Request::default()).unwrap();
         (choice.config.tracker.report, choice.reasons)
+    }
+
+    #[test]
+    fn where_specks_are_left_out_the_scans_made_ahead_are_those_of_the_configuration_that_is_written() {
+        // Twelve bright squares, and forty faint specks that stay for eight frames each.
+        let (frames, info) = filmed(|k, image| {
+            (0..12).for_each(|i| {
+                let (column, row) = (i % 4, i / 4);
+                square(image, [8.0 + 36.0 * f64::from(column) + 0.2 * k as f64, 10.0 + 40.0 * f64::from(row)], 200);
+            });
+            let mut specks = ChaCha8Rng::seed_from_u64(100 + k / 8);
+            for _ in 0..40 {
+                let place = [specks.random_range(4.0..150.0), specks.random_range(4.0..110.0)];
+                if place[1] as usize % 40 > 20 {
+                    square(image, place, 75 + specks.random_range(0..10));
+                }
+            }
+        });
+        let mut choice = assumed(2.5, Report::All);
+        choice.config.detector.camera = crate::camera::CameraConfig::Moving;
+        choice.config.tracker.min_initiation_score = 4.0;
+        let mut replay = Replay::new(Box::new(Memory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
+        let mut learnt = learn(&mut replay, &mut choice, &Request::default()).unwrap();
+        let ThresholdConfig::Isolated(isolated) = &choice.config.detector.threshold else { panic!("another detector") };
+        assert!(isolated.min_score > 2.5, "{:?}", choice.reasons);
+        let mut anew = crate::vision::build(&choice.config.detector, &info).unwrap();
+        for frame in &frames {
+            let [mut a, mut b] = [Scan::default(), Scan::default()];
+            learnt.detect(frame, &mut a).unwrap();
+            anew.detect(frame, &mut b).unwrap();
+            assert_eq!(format!("{a:?}"), format!("{b:?}"));
+        }
     }
 
     #[test]

@@ -178,14 +178,6 @@ impl<const N: usize> Columns<N> {
         self.square[l] += d * d;
     }
 
-    /// Adds a row of pixels.
-    #[inline(always)]
-    fn add_row(&mut self, v: &[f32; N], place: f32) {
-        for l in 0..N {
-            self.add(l, v[l], place);
-        }
-    }
-
     /// The cell of the eight columns from `at` on.
     #[inline(always)]
     fn part(&self, at: usize) -> Part {
@@ -236,11 +228,9 @@ widest! {
             let mut columns = Columns::about(base);
             for (y, row) in rows.iter().enumerate() {
                 let Some(row) = row[x..].first_chunk::<LANES>() else { continue };
-                let mut values = [0.0; LANES];
                 for l in 0..LANES {
-                    values[l] = row[l].value_f32();
+                    columns.add(l, row[l].value_f32(), y as f32 - 3.5);
                 }
-                columns.add_row(&values, y as f32 - 3.5);
             }
             out.extend([columns.part(0), columns.part(CELL)]);
         }

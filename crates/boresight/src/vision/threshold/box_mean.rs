@@ -1,7 +1,7 @@
 //! Mean over a square box of any odd side, at a cost that hardly grows with it.
 //!
-//! Source: textbook sliding sums down the columns; along the rows windows of 1, 2, 4 ... columns, each of two of the one before, are put together to the side (the doubling of
-//! M. van Herk's and others' running filters): no sum waits for the one of the pixel beside it, so rows are summed many pixels at a time. Sums are in f64,
+//! Source: textbook sliding sums down the columns; along the rows windows of 1, 2, 4 ... columns, each of two of the one before, are put together to the side: no sum waits
+//! for the one of the pixel beside it, so rows are summed many pixels at a time. Sums are in f64,
 //! so that f32 pixels of any size leave no trace behind. Pixels outside repeat the edge.
 
 use crate::Image;

@@ -198,13 +198,13 @@ impl SpotDetector {
     fn find_peaks(&mut self) {
         let mut spots = std::mem::take(&mut self.spots);
         spots.clear();
-        let (w, h) = (self.response.width(), self.response.height());
+        let h = self.response.height();
         for y in 0..h {
             self.grid.level_row(y, self.config.k as f32, self.config.min_contrast as f32, 1.0, &mut self.level);
             let row = self.response.row(y);
             let above = if y > 0 { self.response.row(y - 1) } else { &[] };
             let below = if y + 1 < h { self.response.row(y + 1) } else { &[] };
-            for (x, (&v, level)) in row.iter().zip(&self.level).enumerate().take(w) {
+            for (x, (&v, level)) in row.iter().zip(&self.level).enumerate() {
                 if !(v >= *level && v > 0.0) {
                     continue;
                 }
