@@ -24,7 +24,7 @@ pub fn first(scans: &[Scan]) -> &[Scan] {
 }
 
 /// How many tracks hold each detection of one scan; keeps its memory.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Shares(Vec<u8>);
 
 impl Shares {

@@ -4,6 +4,7 @@
 //! the same configuration given back gives the identical result. [`open_and_choose`] is the whole way from an input's name to its frames
 //! and configuration.
 
+mod adaptation;
 mod asked;
 mod cells;
 mod chains;
@@ -41,6 +42,7 @@ mod steadied;
 mod summed;
 
 pub use crate::io::Replay;
+pub use adaptation::Adaptation;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
 pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose, report_whole};

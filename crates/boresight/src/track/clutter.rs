@@ -100,6 +100,11 @@ impl Clutter {
         Self { config: config.clone(), given, one: given, seen, map: BTreeMap::new(), free: Vec::new() }
     }
 
+    /// Takes another given density; what was learnt stays.
+    pub fn set_given(&mut self, given: f64) {
+        self.given = given;
+    }
+
     /// Whether each detection has a density of its own.
     pub fn is_map(&self) -> bool {
         matches!(self.config, ClutterConfig::Map(_))

@@ -6,6 +6,7 @@
 //! Limits: those of [`SteadyGround`]. Scans pass through untouched, bit by bit, until the first one with a motion.
 
 use super::backward::Backward;
+use super::parameters::TrackerParameters;
 use super::tracking::Tracking;
 use crate::camera::SteadyGround;
 use crate::{Result, Scan, TrackId, TrackState};
@@ -47,6 +48,10 @@ impl Tracking for Stabilised {
             });
         }
         Ok(&self.states)
+    }
+
+    fn adapt(&mut self, parameters: &TrackerParameters) -> Result<bool> {
+        self.inner.adapt(parameters)
     }
 
     fn renamed(&self) -> &[(TrackId, TrackId)] {

@@ -18,6 +18,7 @@ use super::config::TrackerConfig;
 use super::confirm::history::{Decision, Evidence};
 use super::confirm::status::status;
 use super::merged_measurements::MergedMeasurements;
+use super::parameters::TrackerParameters;
 use super::reidentify::{Field, Identity, Reidentification, Stay};
 use super::scan_table::{Predicted, ScanTable};
 use super::single_track::{BATCH, Outcome, Track};
@@ -291,6 +292,15 @@ impl Tracking for Tracker {
         initiate(&context, &self.clutter, &mut self.association.used, &mut self.pending, &mut new);
         self.reidentify(scan.time, first_begun);
         Ok(&self.states)
+    }
+
+    fn adapt(&mut self, parameters: &TrackerParameters) -> Result<bool> {
+        let before = self.config.acceleration_density_px2_per_s3;
+        self.config = parameters.in_config(&self.config)?;
+        self.clutter.set_given(self.config.clutter_density_per_px2);
+        let factor = self.config.acceleration_density_px2_per_s3 / before;
+        self.tracks.iter_mut().for_each(|t| t.filter.scale_density(factor));
+        Ok(true)
     }
 
     fn renamed(&self) -> &[(TrackId, TrackId)] {

@@ -1,6 +1,7 @@
 //! The trait of everything that turns scans into tracks.
 
 use super::backward::Backward;
+use super::parameters::TrackerParameters;
 use crate::{Result, Scan, TrackId, TrackState};
 
 /// Turns scans into tracks: the tracker, or the multiple-hypothesis tracker.
@@ -9,6 +10,14 @@ pub trait Tracking: Send {
     /// # Errors
     /// A scan that runs back in time or holds values that are not finite; the tracks are then unchanged.
     fn step(&mut self, scan: &Scan) -> Result<&[TrackState]>;
+
+    /// Takes other parameters from the next scan on, while its tracks go on; `false` if it cannot.
+    /// # Errors
+    /// A value outside its range; all stays as it was.
+    fn adapt(&mut self, parameters: &TrackerParameters) -> Result<bool> {
+        let _ = parameters;
+        Ok(false)
+    }
 
     /// Tracks that got another id in the newest scan, because they continue a lost one: the id they had until then, and the one they have now.
     fn renamed(&self) -> &[(TrackId, TrackId)] {

@@ -4,12 +4,13 @@
 //! series whose innovations are made as probable as possible.
 //! Limits: constant velocity only, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position equal to the one before to the bit; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
-mod fit;
+pub(super) mod fit;
 
 use super::digits::round;
 use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
+use crate::track::TrackerConfig;
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use std::collections::BTreeMap;
@@ -24,6 +25,17 @@ const GATE_PROBABILITY: f64 = 0.9999;
 const MERGED_S: f64 = 1.0;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
+
+/// The noise that a tracker assumes.
+pub(super) fn assumed(t: &TrackerConfig) -> Noise {
+    Noise {
+        scale: t.detection_covariance_scale,
+        extra_px: t.extra_noise_px,
+        extra_per_height: t.extra_noise_per_height,
+        density: t.acceleration_density_px2_per_s3,
+        density_per_height2: t.acceleration_density_per_height2_per_s3,
+    }
+}
 
 /// What is known of one track of the first pass.
 #[derive(Default)]
@@ -79,7 +91,7 @@ pub fn learn(
             of.sizes[0].push(d.extent.width_px);
             of.sizes[1].push(d.extent.height_px);
             let variance = [d.cov[(0, 0)], d.cov[(1, 1)]];
-            of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px });
+            of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px, weight: 1.0 });
         }
     }
     tracks.retain(|_, t| t.confirmed);
@@ -94,13 +106,7 @@ pub fn learn(
     let size_std = deviation(&mut size_wander(&tracks));
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
-    let before = Noise {
-        scale: t.detection_covariance_scale,
-        extra_px: t.extra_noise_px,
-        extra_per_height: t.extra_noise_per_height,
-        density: t.acceleration_density_px2_per_s3,
-        density_per_height2: t.acceleration_density_per_height2_per_s3,
-    };
+    let before = assumed(t);
     let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
     t.merged_measurements.edge_std_px = round(size_std);
     t.gate_probability = GATE_PROBABILITY;

@@ -102,6 +102,14 @@ impl ConstantVelocityKf {
         self.coupled = self.coupling.iter().any(|c| *c != 0.0);
     }
 
+    /// Multiplies the density of the white acceleration.
+    pub(super) fn scale_density(&mut self, factor: f64) {
+        self.noise = match self.noise {
+            AccelerationNoise::Continuous(density) => AccelerationNoise::Continuous(density * factor),
+            AccelerationNoise::Discrete(std) => AccelerationNoise::Discrete(std * factor.sqrt()),
+        };
+    }
+
     /// Position, px.
     #[inline]
     pub fn position(&self) -> [f64; 2] {

@@ -32,6 +32,15 @@ impl Clone for TrackedFilter {
     }
 }
 
+impl TrackedFilter {
+    /// Multiplies the density of the acceleration that drives a filter in place; another keeps its own until its track ends.
+    pub(in crate::track) fn scale_density(&mut self, factor: f64) {
+        if let Self::Cv(f) = self {
+            f.scale_density(factor);
+        }
+    }
+}
+
 impl Filter for TrackedFilter {
     #[inline]
     fn predict(&mut self, dt_s: f64) -> Result<(), FilterError> {
