@@ -2,6 +2,7 @@
 
 use crate::histogram::Histogram;
 use crate::tune::Change;
+use boresight::track::TrackerParameters;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -111,6 +112,8 @@ pub struct ScanNotes {
     pub false_alarms_asked: Option<f64>,
     /// How far the background's middle moved since the scan before, px.
     pub camera_moved_px: Option<f64>,
+    /// Mean normalised squared innovation lately, where the parameters follow the scans.
+    pub nis_lately: Option<f64>,
 }
 
 #[derive(Debug, Default)]
@@ -122,6 +125,7 @@ struct Told {
     rate: Option<(Instant, f64)>,
     changes: VecDeque<Change>,
     only_tracks: bool,
+    parameters: Option<TrackerParameters>,
     notes: ScanNotes,
     /// Mean of the unclaimed detections lately, and the scans so far.
     unclaimed: (f64, u64),
@@ -176,6 +180,16 @@ impl Board {
     pub fn configured(&self, config: String, reasons: Vec<String>) {
         let mut told = self.told();
         (told.config, told.reasons) = (config, reasons);
+    }
+
+    /// Notes what the tracker assumes now.
+    pub fn assumes(&self, parameters: TrackerParameters) {
+        self.told().parameters = Some(parameters);
+    }
+
+    /// What the tracker assumes now.
+    pub fn parameters(&self) -> Option<TrackerParameters> {
+        self.told().parameters
     }
 
     /// The configuration as TOML, empty before it is chosen, and its reasons.

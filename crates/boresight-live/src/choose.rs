@@ -1,7 +1,7 @@
 //! The automatic choice for a stream: its first frames are kept while they are looked at, and tracked afterwards, so that looking costs none.
 
 use crate::source::{Arrived, Content};
-use boresight::auto::{self, DetectorKind, Request};
+use boresight::auto::{self, Adaptation, DetectorKind, Request};
 use boresight::io::LengthUnit;
 use boresight::vision::Detector;
 use boresight::{Config, Error, ErrorKind, Frame, FrameSource, Result, Scan, SourceInfo, vision};
@@ -33,6 +33,8 @@ pub struct Ready {
     pub reasons: Vec<String>,
     /// Frame to detections; `None` for a stream of detections.
     pub detector: Option<Box<dyn Detector>>,
+    /// What follows the scans where the configuration was chosen, but for what was set by hand.
+    pub adaptation: Option<Adaptation>,
     /// What was kept.
     pub kept: Vec<Arrived>,
 }
@@ -55,7 +57,7 @@ impl Kept {
     /// Keeps one more; a frame of another size than those before is dropped, and `false`.
     pub fn keep(&mut self, arrived: Arrived, label: &str) -> bool {
         match arrived.content {
-            Content::Scan(mut scan) => {
+            Content::Scan(mut scan) | Content::Adapted(mut scan, _) => {
                 scan.index.0 = self.scans.len() as u64;
                 self.scans.push(scan);
             }
@@ -101,7 +103,9 @@ impl Kept {
             auto::for_detections(&self.scans, rate_hz, LengthUnit::Pixel, None, &mut config, &mut reasons);
             let contents = self.scans.into_iter().map(Content::Scan);
             let kept = contents.zip(self.clocks).map(|(content, c)| arrived(content, c)).collect();
-            return Ok(Ready { config: set(config)?, reasons, detector: None, kept });
+            let config = set(config)?;
+            let adaptation = adaptation(&config, sets);
+            return Ok(Ready { config, reasons, detector: None, adaptation, kept });
         };
         info.n_frames = Some(self.frames.len() as u64);
         let memory = Box::new(Memory { frames: self.frames.into_iter(), info });
@@ -119,7 +123,8 @@ impl Kept {
                 kept.push(arrived(Content::Frame(frame), clock));
             }
         }
-        Ok(Ready { config, reasons: choice.reasons, detector: Some(detector), kept })
+        let adaptation = adaptation(&config, sets);
+        Ok(Ready { config, reasons: choice.reasons, detector: Some(detector), adaptation, kept })
     }
 
     /// Takes the configuration as it is given.
@@ -129,8 +134,14 @@ impl Kept {
         let detector = self.info.as_ref().map(|info| vision::build(&config.detector, info)).transpose()?;
         let contents = self.frames.into_iter().map(Content::Frame).chain(self.scans.into_iter().map(Content::Scan));
         let kept = contents.zip(self.clocks).map(|(content, c)| arrived(content, c)).collect();
-        Ok(Ready { config, reasons: vec!["Configuration as given.".into()], detector, kept })
+        Ok(Ready { config, reasons: vec!["Configuration as given.".into()], detector, adaptation: None, kept })
     }
+}
+
+fn adaptation(config: &Config, sets: &[String]) -> Option<Adaptation> {
+    let mut adaptation = Adaptation::of(&config.tracker)?;
+    sets.iter().for_each(|set| adaptation.freeze(set.split('=').next().unwrap_or_default()));
+    Some(adaptation)
 }
 
 fn arrived(content: Content, (at, wall): Clock) -> Arrived {

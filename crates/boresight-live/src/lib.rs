@@ -3,6 +3,7 @@
 //! The stages are those of `boresight track` ([`boresight::auto`], [`boresight::vision`], [`boresight::track`]); here stand what differs: a source that
 //! may be lost, a clock, and outputs that must never keep the run waiting.
 
+mod adapted;
 mod board;
 mod cbor;
 mod choose;

@@ -1,6 +1,7 @@
 //! What outputs of a live run see of each frame, and their trait: the page, the wire, the record.
 
 use crate::event::{Event, TrackReport, When};
+use boresight::track::TrackerParameters;
 use boresight::{Config, Result, View};
 
 /// One frame after it was tracked, read only.
@@ -21,6 +22,10 @@ pub trait LiveOutput: Send {
     /// The configuration is settled.
     fn configured(&mut self, config: &Config) {
         let _ = config;
+    }
+    /// The tracker has other parameters from the next frame on; `config` is the configuration with them.
+    fn adapted(&mut self, parameters: &TrackerParameters, config: &Config) {
+        let _ = (parameters, config);
     }
     /// Takes a frame.
     /// # Errors

@@ -4,6 +4,7 @@
 //! dropped and counted; the gap is a gap in time, which the filters know. While the source gives nothing, tracks coast: blind scans carry the
 //! time on, half a second behind the clock, until the budget of the configuration deletes them.
 
+use crate::adapted;
 use crate::board::{Board, ScanNotes, State, add, read as read_count, unix_s};
 use crate::choose::{Kept, Ready};
 use crate::event::{CONFIRMED, Event, TrackReport, When, status_line};
@@ -15,6 +16,7 @@ use crate::stages::Stages;
 use crate::tune::Change;
 use boresight::auto::DetectorKind;
 use boresight::io::StopFlag;
+use boresight::track::TrackerParameters;
 use boresight::world::World;
 use boresight::{CameraMotion, Config, Error, ErrorKind, Frame, FrameIndex, Result, Scan, Timestamp, View};
 use std::sync::Arc;
@@ -108,6 +110,8 @@ struct Live<'o> {
     outputs: &'o mut [Box<dyn LiveOutput>],
     lives: Lives,
     world: Option<World>,
+    /// The parameters that were said last.
+    assumed: Option<TrackerParameters>,
     reports: Vec<TrackReport>,
     events: Vec<Event>,
     said: State,
@@ -119,7 +123,7 @@ impl<'o> Live<'o> {
         let failing = vec![false; outputs.len()];
         let lives = Lives::new(updates_hz);
         let (reports, events) = (Vec::new(), Vec::new());
-        Self { board, outputs, lives, world: None, reports, events, said: State::Ended, failing }
+        Self { board, outputs, lives, world: None, assumed: None, reports, events, said: State::Ended, failing }
     }
 
     fn all(&mut self, slot: &Slot<Arrived>, options: &RunOptions, stop: &dyn Fn() -> bool) -> Result<()> {
@@ -182,6 +186,7 @@ impl<'o> Live<'o> {
         self.board.say(&format!("{}: configuration:{reasons}", self.board.source));
         self.board.configured(toml, ready.reasons.clone());
         self.outputs.iter_mut().for_each(|output| output.configured(&ready.config));
+        self.settled(&ready.config);
         if ready.detector.is_none() {
             self.board.only_tracks();
         }
@@ -197,6 +202,11 @@ impl<'o> Live<'o> {
     /// One arrival through the stages; `is_timed`: its latency counts.
     fn step(&mut self, stages: &mut Stages, mut arrived: Arrived, is_timed: bool) -> Result<()> {
         let index = FrameIndex(stages.n_steps);
+        if let Content::Adapted(_, parameters) = &arrived.content
+            && !stages.is_adapting()
+        {
+            self.adapt(stages, parameters);
+        }
         let frame = match &mut arrived.content {
             Content::Frame(frame) => {
                 // The frames that reach the tracker are numbered, so that the record has no holes that a reader would fill.
@@ -209,7 +219,7 @@ impl<'o> Live<'o> {
                 }
                 Some(&*frame)
             }
-            Content::Scan(scan) => {
+            Content::Scan(scan) | Content::Adapted(scan, _) => {
                 scan.index = index;
                 std::mem::swap(&mut stages.scan, scan);
                 None
@@ -227,10 +237,36 @@ impl<'o> Live<'o> {
         Ok(())
     }
 
+    fn settled(&mut self, config: &Config) {
+        let parameters = TrackerParameters::of(&config.tracker);
+        self.assumed = Some(parameters);
+        self.board.assumes(parameters);
+    }
+
+    /// Other parameters for the scans that come: those that the run learnt, or those of a record that is replayed.
+    fn adapt(&mut self, stages: &mut Stages, parameters: &TrackerParameters) {
+        let name = &self.board.source;
+        match stages.adapt(parameters).and_then(|taken| Ok(taken.then_some(stages.config.to_toml()?))) {
+            Ok(Some(toml)) => {
+                self.board.configured(toml, self.board.configuration().1);
+                self.board.assumes(*parameters);
+                self.outputs.iter_mut().for_each(|output| output.adapted(parameters, &stages.config));
+                let said = self.assumed.get_or_insert(*parameters);
+                if let Some(words) = adapted::words(said, parameters) {
+                    self.board.say(&format!("{name}: adapted: {words}"));
+                    *said = *parameters;
+                }
+            }
+            Ok(None) => {}
+            Err(e) => self.refuse(&e),
+        }
+    }
+
     /// The scan of `stages` through the tracker to the outputs.
     fn track(&mut self, stages: &mut Stages, frame: Option<&Frame>, arrived_unix_s: f64, at: Instant) {
         let pixels = frame.map(|f| f.pixels.width() * f.pixels.height());
         let false_alarms_asked = pixels.and_then(|n| stages.false_alarms_asked(n));
+        let nis_lately = stages.mean_nis();
         let (scan, tracks) = match stages.track() {
             Ok(tracked) => tracked,
             Err(e) => return self.refuse(&e),
@@ -269,11 +305,14 @@ impl<'o> Live<'o> {
             let moved = |m: &CameraMotion| (m.now_from_before.apply(m.centre_px) - m.centre_px).norm();
             let camera_moved_px = scan.camera_motion.as_ref().map(moved).filter(|px| px.is_finite());
             add(&counts.unclaimed, unclaimed as u64);
-            let notes = ScanNotes { unclaimed, false_alarms_asked, camera_moved_px };
+            let notes = ScanNotes { unclaimed, false_alarms_asked, camera_moved_px, nis_lately };
             self.board.scan_done(self.reports.iter().filter_map(|t| t.nis), notes);
         }
         stages.last = Some((stages.scan.time, at));
         stages.n_steps += 1;
+        if let Some(parameters) = stages.take_next() {
+            self.adapt(stages, &parameters);
+        }
     }
 
     /// Carries the time on while nothing comes.
@@ -308,6 +347,7 @@ impl<'o> Live<'o> {
                 reasons.push(format!("Changed on the page: {words}."));
                 self.board.configured(toml, reasons);
                 self.outputs.iter_mut().for_each(|output| output.configured(&stages.config));
+                self.settled(&stages.config);
                 if !change.is_of_detector() {
                     self.end_tracks();
                 }

@@ -3,7 +3,8 @@
 use crate::board::Board;
 use crate::choose::{Ready, info_of};
 use crate::tune::Change;
-use boresight::track::Tracking;
+use boresight::auto::Adaptation;
+use boresight::track::{TrackerParameters, Tracking};
 use boresight::vision::Detector;
 use boresight::vision::threshold::ThresholdConfig;
 use boresight::{
@@ -36,6 +37,10 @@ pub struct Stages {
     first_id: u64,
     last_id: u64,
     renumbered: Vec<TrackState>,
+    /// What follows the scans, where the configuration was chosen.
+    adaptation: Option<Adaptation>,
+    /// What it says for the scans that come.
+    next: Option<TrackerParameters>,
 }
 
 /// The tracks of a step with numbers of the run; `first_id` counts those of earlier trackers.
@@ -62,6 +67,8 @@ impl Stages {
     pub fn of(ready: Ready) -> Result<(Self, Vec<crate::source::Arrived>)> {
         let stages = Self {
             tracking: track::build(&ready.config.tracker)?,
+            adaptation: ready.adaptation,
+            next: None,
             config: ready.config,
             detector: ready.detector,
             size: None,
@@ -84,7 +91,35 @@ impl Stages {
     pub fn track(&mut self) -> Result<(&Scan, &[TrackState])> {
         let tracks = self.tracking.step(&self.scan)?;
         self.n_tracks = tracks.len();
+        self.next = self.adaptation.as_mut().and_then(|a| a.step(&self.scan, tracks));
         Ok((&self.scan, numbered(tracks, self.first_id, &mut self.last_id, &mut self.renumbered)))
+    }
+
+    /// What the scans so far say for those that come, once.
+    pub fn take_next(&mut self) -> Option<TrackerParameters> {
+        self.next.take()
+    }
+
+    /// Whether the parameters follow the scans.
+    pub fn is_adapting(&self) -> bool {
+        self.adaptation.is_some()
+    }
+
+    /// Mean of the normalised squared innovations lately, where they are followed.
+    pub fn mean_nis(&self) -> Option<f64> {
+        self.adaptation.as_ref().and_then(Adaptation::mean_nis)
+    }
+
+    /// Gives the tracker other parameters, while its tracks go on; `false` if it takes none.
+    /// # Errors
+    /// A value outside its range; everything stays as it was.
+    pub fn adapt(&mut self, parameters: &TrackerParameters) -> Result<bool> {
+        let tracker = parameters.in_config(&self.config.tracker)?;
+        let is_taken = self.tracking.adapt(parameters)?;
+        if is_taken {
+            self.config.tracker = tracker;
+        }
+        Ok(is_taken)
     }
 
     /// False detections that the detector is asked for in a frame of so many pixels; only some have such a knob.
@@ -108,6 +143,11 @@ impl Stages {
             self.tracking = track::build(&config.tracker)?;
             self.first_id = self.last_id;
             self.n_tracks = 0;
+            if let Some(adaptation) = &mut self.adaptation {
+                adaptation.freeze(change.key());
+                adaptation.restart(&config.tracker);
+            }
+            self.next = None;
         }
         self.config = config;
         Ok(())

@@ -86,6 +86,11 @@ impl Change {
         Ok(Self { key: dial.key, value, whole: dial.whole })
     }
 
+    /// Its key.
+    pub fn key(&self) -> &'static str {
+        self.key
+    }
+
     /// The value as TOML.
     fn text(&self) -> String {
         if self.whole { format!("{}", self.value) } else { format!("{:?}", self.value) }

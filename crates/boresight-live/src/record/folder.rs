@@ -8,6 +8,7 @@ use super::film::Film;
 use super::segment::Segment;
 use crate::board::Board;
 use crate::output::{LiveOutput, Shown};
+use boresight::track::TrackerParameters;
 use boresight::{Config, Error, ErrorKind, PixelKind, Result, io};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -58,6 +59,8 @@ pub struct Record {
     dir: PathBuf,
     options: RecordOptions,
     config: String,
+    /// What the tracker assumes from the next line on, where it is other than before.
+    parameters: Option<TrackerParameters>,
     _lock: File,
     open: Option<(Segment, Instant)>,
     /// Closed segments by their number.
@@ -90,7 +93,7 @@ impl Record {
             }
         }
         let (config, open, rests_until, film, size) = (String::new(), None, None, None, None);
-        Ok(Self { dir, options, config, _lock: lock, open, closed, rests_until, film, size })
+        Ok(Self { dir, options, config, parameters: None, _lock: lock, open, closed, rests_until, film, size })
     }
 
     /// Records the pictures too, as a video beside the tables; `board` counts and says what is left out of it.
@@ -169,7 +172,7 @@ impl Record {
         }
         self.size = size.or(self.size);
         let Some((segment, _)) = &mut self.open else { return Ok(()) };
-        segment.put(shown)?;
+        segment.put(shown, self.parameters.take().as_ref())?;
         if let (Some(film), Some(pixels)) = (&mut self.film, pixels) {
             film.put(segment.entry.number, pixels, shown.when.time);
         }
@@ -208,6 +211,12 @@ impl LiveOutput for Record {
         self.config = config.to_toml().unwrap_or_default();
         // A segment has one configuration: what follows another goes into the next.
         self.close();
+    }
+
+    fn adapted(&mut self, parameters: &TrackerParameters, config: &Config) {
+        // The segment goes on: its lines say from where on. The next one begins with them.
+        self.config = config.to_toml().unwrap_or_default();
+        self.parameters = Some(*parameters);
     }
 
     fn put(&mut self, shown: &Shown<'_>) -> Result<()> {

@@ -8,6 +8,7 @@ use super::entry::{ENDINGS, Entry, path};
 use crate::motion::MotionLine;
 use crate::output::Shown;
 use boresight::io::{self, DetectionsCsv, JsonLines, Output, TracksCsv};
+use boresight::track::TrackerParameters;
 use boresight::{Error, ErrorKind, Result, Sink};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -79,10 +80,10 @@ impl Segment {
         Ok(segment)
     }
 
-    /// Writes a frame: each file by one write, so that a kill leaves whole lines.
+    /// Writes a frame: each file by one write, so that a kill leaves whole lines; `parameters`: what the tracker assumed from it on.
     /// # Errors
     /// [`ErrorKind::Output`] if it cannot be written.
-    pub fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
+    pub fn put(&mut self, shown: &Shown<'_>, parameters: Option<&TrackerParameters>) -> Result<()> {
         for part in &mut self.parts {
             part.sink.put(&shown.view)?;
         }
@@ -91,7 +92,9 @@ impl Segment {
         let motion = shown.view.scan.camera_motion.as_ref().and_then(MotionLine::of);
         let motion = motion.and_then(|m| serde_json::to_string(&m).ok());
         let motion = motion.map_or(String::new(), |m| format!("\"camera_motion\":{m},"));
-        self.write_out(&format!("{{\"arrived_unix_s\":{at},{blind}{motion}"))?;
+        let parameters = parameters.and_then(|p| serde_json::to_string(p).ok());
+        let parameters = parameters.map_or(String::new(), |p| format!("\"parameters\":{p},"));
+        self.write_out(&format!("{{\"arrived_unix_s\":{at},{blind}{motion}{parameters}"))?;
         let entry = &mut self.entry;
         entry.frames = Some([entry.frames.map_or(frame, |f| f[0]), frame]);
         entry.times_s = Some([entry.times_s.map_or(time_s, |t| t[0]), time_s]);

@@ -12,7 +12,7 @@ const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5
 /// A number of a source: its name, its kind, what it is, and how it is had; `None`: it is not known yet.
 type Number = (&'static str, &'static str, &'static str, fn(&Board) -> Option<f64>);
 
-const NUMBERS: [Number; 24] = [
+const NUMBERS: [Number; 31] = [
     ("frames_total", "counter", "Frames or scans that came from the source.", |b| count(&b.counts.arrived)),
     ("frames_tracked_total", "counter", "Frames that went through detector and tracker.", |b| count(&b.counts.tracked)),
     ("frames_dropped_total", "counter", "Frames that a newer one replaced.", |b| count(&b.counts.dropped)),
@@ -53,6 +53,27 @@ const NUMBERS: [Number; 24] = [
     ("rate_hz", "gauge", "Frames tracked a second.", |b| Some(b.rate_hz())),
     ("running", "gauge", "1 while frames come.", |b| Some(f64::from(u8::from(b.said().state == State::Running)))),
     ("nis_mean", "gauge", "Mean normalised squared innovation; 2 if consistent.", |b| b.mean_nis().map(|n| n.0)),
+    ("nis_lately", "gauge", "The same over the last half minute or so, where the parameters follow the scans.", |b| {
+        b.notes().nis_lately
+    }),
+    ("tracker_detection_covariance_scale", "gauge", "Factor on the covariances that detections state.", |b| {
+        b.parameters().map(|p| p.detection_covariance_scale)
+    }),
+    ("tracker_extra_noise_px", "gauge", "Noise of a position beyond what is stated.", |b| {
+        b.parameters().map(|p| p.extra_noise_px)
+    }),
+    ("tracker_acceleration_density_px2_per_s3", "gauge", "Density of the white acceleration.", |b| {
+        b.parameters().map(|p| p.acceleration_density_px2_per_s3)
+    }),
+    ("tracker_detection_probability", "gauge", "Probability that a target is detected.", |b| {
+        b.parameters().map(|p| p.detection_probability)
+    }),
+    ("tracker_redetection_probability", "gauge", "The same after a miss.", |b| {
+        b.parameters().and_then(|p| p.redetection_probability)
+    }),
+    ("tracker_clutter_density_per_px2", "gauge", "False detections per square pixel and scan.", |b| {
+        b.parameters().map(|p| p.clutter_density_per_px2)
+    }),
     ("nis_count", "gauge", "Innovations behind the mean.", |b| b.mean_nis().map(|n| n.1 as f64)),
 ];
 

@@ -2,12 +2,13 @@
 //!
 //! Of a detection `x_px` and `y_px` must be there; `cov_px2` (`[x,x] [x,y] [y,y]`; 1 px² each if absent), the box (`left_px`, `top_px`,
 //! `width_px`, `height_px`), `area_px`, `peak`, `sum`, `score` and `class` may. `blind` says that nothing could be detected,
-//! `camera_motion` how the background moved. Other fields are passed over, so a record's lines are read as they are. A line that cannot be read is left out and counted.
+//! `camera_motion` how the background moved, `parameters` (of a record) what the tracker assumed from that scan on. Other fields are passed over, so a record's lines are read as they are. A line that cannot be read is left out and counted.
 //! Limits: 4 MB a line, 100,000 detections a scan.
 
 use super::feed::{Content, Feed};
 use crate::motion::MotionLine;
 use boresight::boresight_filters::nalgebra::{Matrix2, Vector2};
+use boresight::track::TrackerParameters;
 use boresight::{ClassId, Detection, Error, ErrorKind, Extent, FrameIndex, Result, Scan, SourceInfo, Timestamp};
 use serde::Deserialize;
 use std::io::{BufRead, Read};
@@ -22,6 +23,7 @@ struct Line {
     #[serde(default)]
     blind: bool,
     camera_motion: Option<MotionLine>,
+    parameters: Option<Box<TrackerParameters>>,
 }
 
 #[derive(Deserialize)]
@@ -72,10 +74,10 @@ impl Row {
     }
 }
 
-/// Reads one line as a scan, and whether it states its time.
+/// Reads one line as a scan with what comes with it, and whether it states its time.
 /// # Errors
 /// What is wrong with it.
-pub fn parse(line: &str, index: u64) -> Result<(Scan, bool)> {
+pub fn parse(line: &str, index: u64) -> Result<(Content, bool)> {
     let line: Line = serde_json::from_str(line)
         .map_err(|e| Error::new(ErrorKind::Damaged, "expected a JSON object with \"detections\"").because(e))?;
     if line.detections.len() > MAX_DETECTIONS {
@@ -87,7 +89,11 @@ pub fn parse(line: &str, index: u64) -> Result<(Scan, bool)> {
     let motion = line.camera_motion.as_ref().and_then(MotionLine::motion);
     let scan =
         Scan::at(FrameIndex(index), time).with_detections(detections).with_blind(line.blind).with_camera_motion(motion);
-    Ok((scan, line.time_s.is_some()))
+    let content = match line.parameters {
+        Some(parameters) => Content::Adapted(scan, parameters),
+        None => Content::Scan(scan),
+    };
+    Ok((content, line.time_s.is_some()))
 }
 
 /// Scans from lines.
@@ -137,11 +143,11 @@ impl<R: BufRead + Send> Feed for DetectionLines<R> {
                 continue;
             }
             match parse(text, self.n_given) {
-                Ok((scan, has_time)) => {
+                Ok((content, has_time)) => {
                     // One line without a time decides for all: half of a clock is none.
                     self.has_stamps &= has_time;
                     self.n_given += 1;
-                    return Ok(Some(Content::Scan(scan)));
+                    return Ok(Some(content));
                 }
                 Err(e) => {
                     self.n_bad += 1;

@@ -1,6 +1,7 @@
 //! What a source gives: frames or scans, one after another; and how it is connected, again if it is lost.
 
 use boresight::io::StopFlag;
+use boresight::track::TrackerParameters;
 use boresight::{Frame, FrameSource, Result, Scan, SourceInfo, Timestamp};
 
 /// One thing that came.
@@ -10,6 +11,8 @@ pub enum Content {
     Frame(Frame),
     /// Detections made elsewhere.
     Scan(Scan),
+    /// The same, of a record: from it on the tracker had these parameters.
+    Adapted(Scan, Box<TrackerParameters>),
 }
 
 impl Content {
@@ -17,7 +20,7 @@ impl Content {
     pub fn stamp(&self) -> Timestamp {
         match self {
             Self::Frame(frame) => frame.time,
-            Self::Scan(scan) => scan.time,
+            Self::Scan(scan) | Self::Adapted(scan, _) => scan.time,
         }
     }
 }

@@ -140,6 +140,6 @@ impl Reader {
 fn restamp(content: &mut Content, index: u64, time: Timestamp) {
     match content {
         Content::Frame(frame) => (frame.index, frame.time) = (FrameIndex(index), time),
-        Content::Scan(scan) => (scan.index, scan.time) = (FrameIndex(index), time),
+        Content::Scan(scan) | Content::Adapted(scan, _) => (scan.index, scan.time) = (FrameIndex(index), time),
     }
 }
