@@ -24,6 +24,11 @@ const MEMORY_S: f64 = 30.0;
 const LONGEST_S: f64 = 3.0 * MEMORY_S;
 /// Time between two updates, s.
 const EVERY_S: f64 = 5.0;
+/// What is new at an update, as a share of what is remembered: an innovation is told to several updates, and counts once in all of them.
+const NEW_SHARE: f64 = EVERY_S / MEMORY_S;
+/// Deviation of the logarithm of a variance that drifts between two updates: ln 2 · √([`EVERY_S`] / [`MEMORY_S`]), a factor of two in [`MEMORY_S`]. What the
+/// innovations hardly tell stays what it was: without it q went up and down by a factor of ten from update to update, for 64 targets whose last second is remembered.
+const DRIFT_STD: f64 = 0.283;
 /// Weight of innovations, or of scans, from which on they count: 10 % of a variance.
 const LEAST_WEIGHT: f64 = 100.0;
 /// R and q stay within this factor of the first choice's, to either side: a deviation within a factor of 4.
@@ -255,14 +260,17 @@ impl Adaptation {
     fn learn(&mut self, now: Timestamp) -> TrackerParameters {
         self.forget(now);
         let mut next = self.now;
-        let weigh =
-            |(at, step): &(Timestamp, Step)| Step { weight: (-now.seconds_since(*at) / MEMORY_S).exp(), ..*step };
+        let weigh = |(at, step): &(Timestamp, Step)| Step {
+            weight: NEW_SHARE * (-now.seconds_since(*at) / MEMORY_S).exp(),
+            ..*step
+        };
         let series: Vec<Vec<Step>> = self.tracks.values().map(|t| t.steps.iter().map(weigh).collect()).collect();
         let weight: f64 = series.iter().flatten().map(|s| s.weight).sum();
-        if weight >= LEAST_WEIGHT && !(self.frozen.measurement && self.frozen.motion) {
+        if weight >= NEW_SHARE * LEAST_WEIGHT && !(self.frozen.measurement && self.frozen.motion) {
             // The field only says how rare a stranger is; an unknown one is as large as a small picture.
             let area_px2 = self.field_px2.unwrap_or(1e5);
-            let found = fit_factors(&series, &self.noise, self.factors, MOST_NOISE_FACTOR, self.speed_std, area_px2);
+            let found =
+                fit_factors(&series, &self.noise, self.factors, MOST_NOISE_FACTOR, DRIFT_STD, self.speed_std, area_px2);
             self.put_noise(found, &mut next);
         }
         let c = &self.faded;

@@ -148,3 +148,29 @@ fn nothing_changes_before_there_is_enough() {
     });
     assert_eq!(changes.count(), 0, "blind scans say nothing");
 }
+
+#[test]
+fn what_the_innovations_hardly_tell_does_not_wander() {
+    // 64 targets at 30 scans a second: the detections that are held are those of the last second, which hardly tell q.
+    let config = TrackerConfig { acceleration_density_px2_per_s3: 0.3, ..config() };
+    let (mut tracker, mut a) = (build(&config).unwrap(), Adaptation::of(&config).unwrap());
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut densities = vec![config.acceleration_density_px2_per_s3];
+    for k in 0..2400u64 {
+        let time_s = k as f64 / 30.0;
+        let place = |i: u32| {
+            let turn = 0.1 * time_s + f64::from(i);
+            let home = Vector2::new(60.0 + 120.0 * f64::from(i % 8), 50.0 + 95.0 * f64::from(i / 8));
+            let mut error = || 0.5 * rng.sample::<f64, _>(StandardNormal);
+            home + Vector2::new(30.0 * turn.cos() + error(), 30.0 * turn.sin() + error())
+        };
+        let places: Vec<_> = (0..64).map(place).collect();
+        let detections = places.iter().map(|p| Detection::at(*p, 0.25 * Matrix2::identity())).collect();
+        let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(time_s)).with_detections(detections);
+        let next = go(&mut *tracker, &mut a, &scan);
+        densities.extend(next.map(|p| p.acceleration_density_px2_per_s3));
+    }
+    assert!(densities.len() > 3, "{densities:?}");
+    let most = densities.windows(2).map(|w| (w[1] / w[0]).ln().abs()).fold(0.0, f64::max);
+    assert!(most < 2f64.ln(), "a factor of two from one update to the next: {densities:?}");
+}

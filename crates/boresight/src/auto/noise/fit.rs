@@ -74,15 +74,18 @@ pub fn fit_factors(
     noise: &Noise,
     from: [f64; 2],
     most: f64,
+    drift_std: f64,
     speed_std: f64,
     area_px2: f64,
 ) -> [f64; 2] {
     let edge = most.ln();
+    let start = from.map(|f| f.ln().clamp(-edge, edge));
     let cost = |x: &[f64; 2]| {
-        let prior: f64 = x.iter().map(|v| (v / edge).powi(2)).sum();
+        let far = |(v, start): (&f64, &f64)| (v / edge).powi(2) + ((v - start) / drift_std).powi(2);
+        let prior: f64 = x.iter().zip(&start).map(far).sum();
         0.5 * prior - log_likelihood(series, &noise.times(x.map(f64::exp)), speed_std, area_px2)
     };
-    search(from.map(|f| f.ln().clamp(-edge, edge)), FACTOR_STEPS, [-edge, edge], cost).map(f64::exp)
+    search(start, FACTOR_STEPS, [-edge, edge], cost).map(f64::exp)
 }
 
 impl Noise {
@@ -271,7 +274,7 @@ mod tests {
                         Step { dt_s: 0.1, position, variance: [1.0; 2], height_px: 5.0, weight: 1.0 }
                     })
                     .collect();
-                fit_factors(&[steps], &noise, [1.0; 2], 16.0, 50.0, 1e5)[0]
+                fit_factors(&[steps], &noise, [1.0; 2], 16.0, f64::INFINITY, 50.0, 1e5)[0]
             })
             .collect();
         let mean = found.iter().sum::<f64>() / 60.0;
