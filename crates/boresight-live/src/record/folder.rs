@@ -209,7 +209,8 @@ fn read_manifest(path: &Path) -> Vec<Entry> {
 impl LiveOutput for Record {
     fn configured(&mut self, config: &Config) {
         self.config = config.to_toml().unwrap_or_default();
-        // A segment has one configuration: what follows another goes into the next.
+        // A segment has one configuration: what follows another goes into the next, and what was learnt before it is in it or overruled by it.
+        self.parameters = None;
         self.close();
     }
 
@@ -252,6 +253,27 @@ mod tests {
         let scan = Scan::at(FrameIndex(k), time).with_detections(vec![Detection::point(1.5, 2.0, 0.5)]);
         let when = When { frame: k, time, arrived_unix_s: 1e9 + k as f64 };
         record.put(&Shown { view: View { frame: None, scan: &scan, tracks: &[] }, when, tracks: &[], events: &[] })
+    }
+
+    #[test]
+    fn what_is_set_overrules_what_was_learnt_before_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut record = Record::create(dir.path(), RecordOptions::default()).unwrap();
+        let mut config = Config::default();
+        record.configured(&config);
+        put(&mut record, 0).unwrap();
+        record.adapted(&TrackerParameters::of(&config.tracker), &config);
+        put(&mut record, 1).unwrap();
+        record.adapted(&TrackerParameters::of(&config.tracker), &config);
+        config.tracker.extra_noise_px = 3.0;
+        record.configured(&config);
+        put(&mut record, 2).unwrap();
+        record.finish();
+        let said =
+            |n: u64| std::fs::read_to_string(path(dir.path(), n, "jsonl")).unwrap().matches("\"parameters\":").count();
+        assert_eq!([said(1), said(2)], [1, 0]);
+        let second = Config::from_file(&path(dir.path(), 2, "config.toml")).unwrap();
+        assert_eq!(second.tracker.extra_noise_px, 3.0);
     }
 
     #[test]

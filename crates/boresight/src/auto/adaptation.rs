@@ -1,13 +1,13 @@
 //! The slow adaptation of a run that goes on: noise, motion, clutter and detection probability follow what the confirmed tracks show, within bounds.
 //!
 //! Source: our own. R and q: two factors on what the first choice learnt, by the likelihood of the innovations of `noise/fit.rs`, with each innovation weighted
-//! by e^(−age / τ). P_D, P_D after a miss and the clutter: the counts of `detection_statistics.rs`, forgotten with the same τ.
+//! by e^(−age / τ), and a prior that they drift slowly ([`DRIFT_STD`]). P_D, P_D after a miss and the clutter: the counts of `detection_statistics.rs`, forgotten with the same τ.
 //! The series are filtered here, from the detections of confirmed tracks, so that what was adapted does not feed on itself except by the gate.
 //! Derivation of τ: n weighted innovations in two axes tell a variance to √(2 / 2n) of itself, and n = 2 r τ for r innovations a second. For 10 % with one target at
 //! 2 scans a second n = 100, τ = 25 s; [`MEMORY_S`] is the next round number. With less than [`LEAST_WEIGHT`] nothing is changed.
 //! All times are those of the scans. Nothing changes before τ has passed: until then the first choice knows more.
 //! Limits: constant velocity, without several hypotheses and without the discrete noise; clutter only where the field is known; at most [`MOST_TRACKS`] tracks
-//! and [`MOST_STEPS`] detections are looked at.
+//! and [`MOST_STEPS`] detections are looked at, so many targets at a high rate are remembered for less than τ.
 
 use super::digits::round;
 use super::first_scans::Shares;
@@ -29,6 +29,8 @@ const NEW_SHARE: f64 = EVERY_S / MEMORY_S;
 /// Deviation of the logarithm of a variance that drifts between two updates: ln 2 · √([`EVERY_S`] / [`MEMORY_S`]), a factor of two in [`MEMORY_S`]. What the
 /// innovations hardly tell stays what it was: without it q went up and down by a factor of ten from update to update, for 64 targets whose last second is remembered.
 const DRIFT_STD: f64 = 0.283;
+/// The same where nothing drifts, since a value was set by hand: any other factor costs more than all innovations give.
+const HELD: f64 = f64::MIN_POSITIVE;
 /// Weight of innovations, or of scans, from which on they count: 10 % of a variance.
 const LEAST_WEIGHT: f64 = 100.0;
 /// R and q stay within this factor of the first choice's, to either side: a deviation within a factor of 4.
@@ -84,7 +86,6 @@ impl Faded {
 #[derive(Debug)]
 pub struct Adaptation {
     first: TrackerParameters,
-    noise: Noise,
     now: TrackerParameters,
     frozen: Frozen,
     /// Factors on R and q now.
@@ -95,7 +96,6 @@ pub struct Adaptation {
     faded: Faded,
     shares: Shares,
     ground: SteadyGround,
-    on_ground: Scan,
     began: Option<Timestamp>,
     last: Option<Timestamp>,
     due: Option<Timestamp>,
@@ -108,7 +108,6 @@ impl Adaptation {
             chosen.filter.is_constant_velocity() && chosen.mht.is_none() && chosen.acceleration_std_px_per_s2.is_none();
         suits.then(|| Self {
             first: TrackerParameters::of(chosen),
-            noise: assumed(chosen),
             now: TrackerParameters::of(chosen),
             frozen: Frozen::default(),
             factors: [1.0; 2],
@@ -118,7 +117,6 @@ impl Adaptation {
             faded: Faded::default(),
             shares: Shares::default(),
             ground: SteadyGround::default(),
-            on_ground: Scan::default(),
             began: None,
             last: None,
             due: None,
@@ -130,7 +128,7 @@ impl Adaptation {
         let is = |part: &str| key.contains(part);
         self.frozen.measurement |= is("extra-noise") || is("detection-covariance-scale");
         self.frozen.motion |= is("acceleration-");
-        self.frozen.detection |= is("detection-probability") || is("redetection-probability");
+        self.frozen.detection |= is("detection-probability");
         self.frozen.clutter |= is("clutter-density");
     }
 
@@ -149,13 +147,6 @@ impl Adaptation {
             self.factors[1] = 1.0;
         }
         self.now = given;
-        self.noise = Noise {
-            scale: self.first.detection_covariance_scale,
-            extra_px: self.first.extra_noise_px,
-            extra_per_height: self.first.extra_noise_per_height,
-            density: self.first.acceleration_density_px2_per_s3,
-            density_per_height2: self.first.acceleration_density_per_height2_per_s3,
-        };
         self.tracks.clear();
     }
 
@@ -188,7 +179,6 @@ impl Adaptation {
     }
 
     fn look(&mut self, scan: &Scan, states: &[TrackState]) {
-        self.ground.scan_on_ground(scan, &mut self.on_ground);
         self.shares.count(scan.detections.len(), states);
         self.tracks.values_mut().for_each(|t| t.is_there = false);
         let (mut own, mut n_followed) = (0, 0);
@@ -219,7 +209,7 @@ impl Adaptation {
             if alone.is_none() {
                 continue;
             }
-            let d = &self.on_ground.detections[j as usize];
+            let d = self.ground.detection_on_ground(&scan.detections[j as usize]);
             let position = [d.position.x, d.position.y];
             let before = of.steps.back();
             // A picture that is shown again measures nothing anew.
@@ -269,9 +259,12 @@ impl Adaptation {
         if weight >= NEW_SHARE * LEAST_WEIGHT && !(self.frozen.measurement && self.frozen.motion) {
             // The field only says how rare a stranger is; an unknown one is as large as a small picture.
             let area_px2 = self.field_px2.unwrap_or(1e5);
-            let found =
-                fit_factors(&series, &self.noise, self.factors, MOST_NOISE_FACTOR, DRIFT_STD, self.speed_std, area_px2);
-            self.put_noise(found, &mut next);
+            // What is held is the truth for the other: a position's error beyond a given R is motion.
+            let drift = [self.frozen.measurement, self.frozen.motion].map(|held| if held { HELD } else { DRIFT_STD });
+            let noise = assumed(&self.first);
+            self.factors =
+                fit_factors(&series, &noise, self.factors, MOST_NOISE_FACTOR, drift, self.speed_std, area_px2);
+            self.put(&noise.times(self.factors), &mut next);
         }
         let c = &self.faded;
         if c.hit[0] + c.hit[1] >= LEAST_WEIGHT && !self.frozen.detection {
@@ -286,9 +279,7 @@ impl Adaptation {
         next
     }
 
-    fn put_noise(&mut self, found: [f64; 2], next: &mut TrackerParameters) {
-        self.factors = found;
-        let noise = self.noise.times(found);
+    fn put(&self, noise: &Noise, next: &mut TrackerParameters) {
         if !self.frozen.measurement {
             next.detection_covariance_scale = round(noise.scale);
             next.extra_noise_px = round(noise.extra_px);

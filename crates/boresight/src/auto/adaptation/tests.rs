@@ -130,6 +130,10 @@ fn what_was_set_by_hand_stays() {
     }
     assert_eq!(a.now.detection_covariance_scale, config.detection_covariance_scale);
     assert_eq!(a.now.detection_probability, config.detection_probability);
+    // The errors are of twice the deviation that is held: what it does not hold of them is taken for motion.
+    assert_eq!(a.factors[0], 1.0);
+    let q = a.now.acceleration_density_px2_per_s3 / config.acceleration_density_px2_per_s3;
+    assert!(q > 4.0, "{q}");
     assert!(a.now.clutter_density_per_px2 > 2.0 * config.clutter_density_per_px2, "the rest goes on");
 }
 

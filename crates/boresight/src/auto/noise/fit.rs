@@ -68,21 +68,20 @@ pub fn fit(series: &[Vec<Step>], before: Noise, speed_std: f64, area_px2: f64) -
 }
 
 /// The factors on R and on q, both within `1 / most ..= most`, that make the innovations most probable; begun at `from`. One deviation of the prior, around
-/// a factor of 1, is `most`.
+/// a factor of 1, is `most`; one around where it begins is `drift_std`, of the logarithms.
 pub fn fit_factors(
     series: &[Vec<Step>],
     noise: &Noise,
     from: [f64; 2],
     most: f64,
-    drift_std: f64,
+    drift_std: [f64; 2],
     speed_std: f64,
     area_px2: f64,
 ) -> [f64; 2] {
     let edge = most.ln();
     let start = from.map(|f| f.ln().clamp(-edge, edge));
     let cost = |x: &[f64; 2]| {
-        let far = |(v, start): (&f64, &f64)| (v / edge).powi(2) + ((v - start) / drift_std).powi(2);
-        let prior: f64 = x.iter().zip(&start).map(far).sum();
+        let prior: f64 = (0..2).map(|i| (x[i] / edge).powi(2) + ((x[i] - start[i]) / drift_std[i]).powi(2)).sum();
         0.5 * prior - log_likelihood(series, &noise.times(x.map(f64::exp)), speed_std, area_px2)
     };
     search(start, FACTOR_STEPS, [-edge, edge], cost).map(f64::exp)
@@ -274,7 +273,7 @@ mod tests {
                         Step { dt_s: 0.1, position, variance: [1.0; 2], height_px: 5.0, weight: 1.0 }
                     })
                     .collect();
-                fit_factors(&[steps], &noise, [1.0; 2], 16.0, f64::INFINITY, 50.0, 1e5)[0]
+                fit_factors(&[steps], &noise, [1.0; 2], 16.0, [f64::INFINITY; 2], 50.0, 1e5)[0]
             })
             .collect();
         let mean = found.iter().sum::<f64>() / 60.0;

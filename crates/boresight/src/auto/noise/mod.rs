@@ -10,7 +10,7 @@ use super::digits::round;
 use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
-use crate::track::TrackerConfig;
+use crate::track::TrackerParameters;
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use std::collections::BTreeMap;
@@ -27,13 +27,13 @@ const MERGED_S: f64 = 1.0;
 const MOST_STEPS: usize = 20_000;
 
 /// The noise that a tracker assumes.
-pub(super) fn assumed(t: &TrackerConfig) -> Noise {
+pub(super) fn assumed(p: &TrackerParameters) -> Noise {
     Noise {
-        scale: t.detection_covariance_scale,
-        extra_px: t.extra_noise_px,
-        extra_per_height: t.extra_noise_per_height,
-        density: t.acceleration_density_px2_per_s3,
-        density_per_height2: t.acceleration_density_per_height2_per_s3,
+        scale: p.detection_covariance_scale,
+        extra_px: p.extra_noise_px,
+        extra_per_height: p.extra_noise_per_height,
+        density: p.acceleration_density_px2_per_s3,
+        density_per_height2: p.acceleration_density_per_height2_per_s3,
     }
 }
 
@@ -106,7 +106,7 @@ pub fn learn(
     let size_std = deviation(&mut size_wander(&tracks));
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
-    let before = assumed(t);
+    let before = assumed(&TrackerParameters::of(t));
     let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
     t.merged_measurements.edge_std_px = round(size_std);
     t.gate_probability = GATE_PROBABILITY;
