@@ -1,4 +1,4 @@
-//! Frames and tables in and out: images, video, CSV, MOTChallenge.
+//! Frames and tables in and out: images, video, streams; CSV, MOTChallenge, KITTI, COCO and others' tables.
 
 mod atomic;
 mod atomic_folder;

@@ -1,4 +1,4 @@
-//! Tables in and out: tracks, detections, MOTChallenge, JSON lines.
+//! Tables in and out: tracks and detections by column names, MOTChallenge, KITTI, AB3DMOT; JSON lines and COCO.
 //!
 //! One way in: [`lexer`] parts lines and fields, [`table`] tells the kind by the first line, [`columns`] names the columns,
 //! [`dialect`] knows what is special of each, [`row`] gives cells as numbers. What is made of the rows: detections

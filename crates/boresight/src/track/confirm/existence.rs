@@ -51,7 +51,7 @@ impl ExistenceConfig {
         let mend = "1e-6 is one new target in three scans of 640 x 512 px";
         positive(at, "new-target-density-per-px2", self.new_target_density_per_px2, mend)?;
         probability(at, "confirm-probability", self.confirm_probability, "0.95 is usual")?;
-        probability(at, "delete-probability", self.delete_probability, "0.01 is usual")?;
+        probability(at, "delete-probability", self.delete_probability, "0.001 is usual")?;
         probability(at, "demotion-probability", self.demotion_probability, "0.5 is usual")?;
         check(
             self.demotion_probability <= self.confirm_probability,

@@ -1,4 +1,4 @@
-//! What is said of a track to the outside: tentative, confirmed or coasting. The one place that says so.
+//! What is said of a track to the outside: tentative, confirmed or coasting, as it runs.
 //!
 //! A track is reported as confirmed when its rule holds it for confirmed and it has moved by itself where only that is reported; without a
 //! detection in the scan it is coasting. A track that the rule has confirmed and that has not moved yet is tentative for everyone outside,
