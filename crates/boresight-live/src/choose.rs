@@ -114,9 +114,8 @@ impl Kept {
             return Err(Error::new(ErrorKind::Unsupported, "a colour cannot be learnt from frames that were read without")
                 .hint("write a configuration with `boresight track --detector colour` on a recording, and give it by --config"));
         }
-        choice.config = set(choice.config)?;
-        let detector = auto::learn(&mut frames, &mut choice, &request)?;
-        let config = set(choice.config)?;
+        let detector = auto::learn(&mut frames, &mut choice, &request, set)?;
+        let config = choice.config;
         let mut kept = Vec::with_capacity(self.clocks.len());
         for clock in self.clocks {
             if let Some(frame) = frames.next_frame()? {

@@ -79,8 +79,7 @@ impl Wishes {
         }
         let request = self.request()?;
         let (mut frames, mut choice) = auto::open_and_choose(input, &base, &request)?;
-        choice.config = changed(choice.config, &self.sets)?;
-        let detector = auto::learn(&mut frames, &mut choice, &request)?;
+        let detector = auto::learn(&mut frames, &mut choice, &request, |config| changed(config, &self.sets))?;
         self.chosen(frames, choice, detector)
     }
 
@@ -97,18 +96,13 @@ impl Wishes {
         let again = again.as_mut().map(|a| a as &mut dyn FrameSource);
         let (mut frames, mut choice) =
             auto::read_and_choose(base.input.mend(Box::new(frames))?, again, &base, &request)?;
-        auto::report_whole(
-            frames.info().rate_hz.unwrap_or(base.input.rate_hz),
-            &mut choice.config,
-            &mut choice.reasons,
-        );
-        choice.config = changed(choice.config, &self.sets)?;
-        let detector = auto::learn(&mut frames, &mut choice, &request)?;
+        choice.report_whole(frames.info().rate_hz.unwrap_or(base.input.rate_hz));
+        let detector = auto::learn(&mut frames, &mut choice, &request, |config| changed(config, &self.sets))?;
         self.chosen(frames, choice, detector)
     }
 
     fn chosen(self, frames: auto::Replay, choice: auto::Choice, detector: Box<dyn vision::Detector>) -> Result<Plan> {
-        let config = changed(choice.config, &self.sets)?;
+        let config = choice.config;
         let (total, reader) = (frames.info().n_frames, frames.info().reader.clone());
         let mut reasons = choice.reasons;
         reasons.extend(unused(&config));

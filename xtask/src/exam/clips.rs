@@ -26,6 +26,8 @@ const CAR: Columns = Columns { first_pixel: 0.0, ..BOXES };
 impl Columns {
     /// Points: frame, id, x, y, from 0, below a header.
     pub const POINTS: Self = POINTS;
+    /// Frame, id, left, top, width, height, from 0, below a header.
+    pub const CORNERS: Self = Self { first_frame: 0, ..CAR };
 }
 
 /// How near a result must be to a target.

@@ -9,6 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// A truth made by a tracker, as that of the particles, holds many pieces of a few frames: they say more of it than of a target.
+pub const LONG_FRAMES: usize = 20;
+
 /// What the tracks of a run say.
 #[derive(Default)]
 struct Reported {
@@ -43,12 +46,14 @@ impl Sink for Collect {
 pub struct Score {
     /// Share of the truth's rows with a reported track near.
     pub held: f64,
+    /// The same of targets that are in the truth in more than [`LONG_FRAMES`] frames.
+    pub held_long: Option<f64>,
     /// Share of the reported rows that are near a target.
     pub precision: Option<f64>,
     pub idf1: Option<f64>,
-    /// Reported tracks that are a target's in half of their rows or more, per target.
     /// Targets held in at least half of their rows, and all.
     pub found: [usize; 2],
+    /// Reported tracks that are a target's in half of their rows or more, per target.
     pub ids_a_target: f64,
     /// The other reported tracks, in words.
     pub false_tracks: Option<Vec<String>>,
@@ -73,11 +78,9 @@ pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until:
     truth.retain(|r| until.is_none_or(|u| r.frame < u));
     let started = std::time::Instant::now();
     let (mut source, mut choice) = auto::open_and_choose(&clip.input, &Config::default(), request)?;
-    let changed = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
-    // As the command does: what is set holds for the first pass as well, and is not overruled by it.
-    choice.config = changed(choice.config)?;
-    let detector = auto::learn(&mut source, &mut choice, request)?;
-    let config = changed(choice.config)?;
+    let set = |config: Config| sets.iter().try_fold(config, |config, set| config.with(set));
+    let detector = auto::learn(&mut source, &mut choice, request, set)?;
+    let config = choice.config;
     let tracker = track::build(&config.tracker)?;
     let seen = Arc::new(Mutex::new(Reported::default()));
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Collect(Arc::clone(&seen)))];
@@ -96,6 +99,7 @@ pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until:
     let n_targets = truth.iter().map(|r| r.id).collect::<BTreeSet<_>>().len().max(1);
     Ok(Score {
         held: near.errors.len() as f64 / truth.len().max(1) as f64,
+        held_long: near.held_long,
         precision: clip.whole.then(|| near.n_near as f64 / seen.rows.len().max(1) as f64),
         idf1: if clip.whole { Some(idf1(&truth, seen.rows, clip.near)?) } else { None },
         found: [near.n_found, n_targets],
@@ -117,6 +121,7 @@ fn median(mut v: Vec<f64>) -> f64 {
 struct Nearness {
     /// Of each held target in each frame, px.
     errors: Vec<f64>,
+    held_long: Option<f64>,
     n_found: usize,
     n_near: usize,
     n_true_tracks: usize,
@@ -158,6 +163,9 @@ fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
         *of = [of[0] + 1, of[1] + usize::from(found.is_some())];
         errors.extend(found);
     }
+    let long = of_target.values().filter(|[rows, _]| *rows > LONG_FRAMES);
+    let [rows, held] = long.fold([0, 0], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    let held_long = (rows > 0).then(|| held as f64 / rows as f64);
     let n_found = of_target.values().filter(|[rows, held]| 2 * held >= *rows).count();
     let mut tracks: BTreeMap<i64, (usize, Vec<&TrackRow>)> = BTreeMap::new();
     for r in result {
@@ -176,6 +184,7 @@ fn nearness(truth: &[TrackRow], result: &[TrackRow], near: Near) -> Nearness {
     };
     Nearness {
         errors,
+        held_long,
         n_found,
         n_near,
         n_true_tracks: true_tracks.len(),

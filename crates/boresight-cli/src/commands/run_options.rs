@@ -194,10 +194,8 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     };
     let (mut source, mut choice) = auto::open_and_choose(&args.input, &base, &request)?;
     let info = source.info().clone();
-    // What the user sets holds for the first pass as well, and is not overruled by what it learns.
-    choice.config = changed(choice.config, args, tracker)?;
-    let detector = auto::learn(&mut source, &mut choice, &request)?;
-    let config = changed(choice.config, args, tracker)?;
+    let detector = auto::learn(&mut source, &mut choice, &request, |config| changed(config, args, tracker))?;
+    let config = choice.config;
     let input = Input::Frames(Box::new(source), detector);
     let reasons = choice.reasons.into_iter().chain(unused(&config)).collect();
     Ok(Plan::of_frames(input, config, reasons, info))

@@ -8,6 +8,7 @@ use super::interval::interval_s;
 use super::request::Request;
 use super::scene::{self, Scene};
 use super::spread::growing;
+use super::whole_tracks::report_whole;
 use super::{cells, colour, faint, moving, particles, spots, steadied};
 use crate::io::Colour;
 use crate::vision::threshold::Polarity;
@@ -23,6 +24,29 @@ pub struct Choice {
     pub config: Config,
     /// What was seen and chosen, a sentence each.
     pub reasons: Vec<String>,
+    /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
+    pub(super) runner_up: Option<Box<Choice>>,
+}
+
+impl Choice {
+    /// A choice that nothing stands against.
+    pub(super) fn alone(config: Config, reasons: Vec<String>) -> Self {
+        Self { config, reasons, runner_up: None }
+    }
+
+    /// As [`super::report_whole`], whichever detector the first pass bears out.
+    pub fn report_whole(&mut self, rate_hz: f64) {
+        report_whole(rate_hz, &mut self.config, &mut self.reasons);
+        if let Some(other) = self.runner_up.as_deref_mut() {
+            other.report_whole(rate_hz);
+        }
+    }
+
+    /// Changes this choice and the one that may be taken in its place in the same way.
+    pub(super) fn change<E>(&mut self, mut change: impl FnMut(&mut Self) -> Result<(), E>) -> Result<(), E> {
+        change(self)?;
+        self.runner_up.as_deref_mut().map_or(Ok(()), change)
+    }
 }
 
 /// Proposes a configuration from the first frames of a sequence; [`super::open_and_choose`] also takes a second look at files.
@@ -65,6 +89,7 @@ pub(super) fn choose_looked(
     let n_threads = request.n_threads();
     let mut reasons = Vec::new();
     let mut config = base.clone();
+    let mut runner_up = None;
     let interval_s = interval_s(frames, info);
     let n_looked = frames.len().max(second.len());
     let looked = if second.is_empty() { frames } else { second };
@@ -109,21 +134,30 @@ pub(super) fn choose_looked(
         };
         if let Some(seen) = cells {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
-        } else if let Some(seen) = steadied::look_beside(&evidence, frames, scene, info, n_threads)? {
-            steadied::configure(&seen, info, &mut config, &mut reasons);
         } else {
+            let steadied = steadied::look_beside(&evidence, frames, scene, info, n_threads)?;
+            let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);
             }
+            if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
+                steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
+                runner_up = Some(Box::new(Choice::alone(config, reasons)));
+                Choice { config, reasons, .. } = first;
+            }
         }
     }
-    config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
-    reasons.push(format!(
-        "A target that is lost and found again keeps its id, within {REIDENTIFY_S} s where it is not known how long targets stay (--no-stitch gives every track its \
-         own)."
-    ));
-    Ok(Choice { config, reasons })
+    let mut choice = Choice { config, reasons, runner_up };
+    choice.change(|c| {
+        c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
+        c.reasons.push(format!(
+            "A target that is lost and found again keeps its id, within {REIDENTIFY_S} s where it is not known how long targets stay (--no-stitch gives every track its \
+             own)."
+        ));
+        Ok::<(), crate::Error>(())
+    })?;
+    Ok(choice)
 }

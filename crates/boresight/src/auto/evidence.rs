@@ -97,6 +97,11 @@ impl Evidence {
         self.moving.iter().filter(move |c| c.gain > self.most_by_chance + scale * SURE_GAIN)
     }
 
+    /// Detections in chains that move.
+    pub fn n_hits(&self) -> usize {
+        self.moving.iter().map(|c| c.hits.len()).sum()
+    }
+
     /// Gain of what moves beyond that of the surrogates, nats.
     pub fn gain(&self) -> f64 {
         self.moving.iter().map(|c| c.gain).sum::<f64>() - self.by_chance[1]
@@ -104,7 +109,10 @@ impl Evidence {
 
     /// Gain of those chains that go with none of `other`, nats, beyond that of the surrogates.
     pub fn gain_beside(&self, other: &Self) -> f64 {
-        let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o)));
+        // A detector may have been blind in scans in which the other one saw.
+        let at = |t: &f64| other.times_s.binary_search_by(|o| o.total_cmp(t)).ok();
+        let same: Vec<Option<usize>> = self.times_s.iter().map(at).collect();
+        let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o, &same)));
         own.map(|c| c.gain).sum::<f64>() - self.by_chance[1]
     }
 
@@ -117,7 +125,7 @@ impl Evidence {
     ///
     /// The gain of a detection has the variance of χ²/2, 1: that of n of them deviates by √n.
     pub fn is_surely_more_than(&self, other: &Self) -> bool {
-        let hits = |e: &Self| e.moving.iter().map(|c| c.hits.len()).sum::<usize>() as f64;
+        let hits = |e: &Self| e.n_hits() as f64;
         let luck = if other.is_sure() { STDS * (hits(self) + hits(other)).sqrt() } else { 0.0 };
         self.gain() > other.gain().max(0.0) + SURE_GAIN + luck
     }

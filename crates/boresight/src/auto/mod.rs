@@ -10,6 +10,7 @@ mod cells;
 mod chains;
 mod choose;
 mod colour;
+mod contest;
 mod detection_statistics;
 mod detections;
 mod digits;
@@ -40,14 +41,16 @@ mod spots;
 mod spread;
 mod steadied;
 mod summed;
+mod whole_tracks;
 
 pub use crate::io::Replay;
 pub use adaptation::Adaptation;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
-pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose, report_whole};
+pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose};
 #[cfg(feature = "report")]
 pub use preview::preview;
 pub use radar::for_radar;
 pub use request::{DetectorKind, Request};
 pub use second_look::SECOND_LOOK_FRAMES;
+pub use whole_tracks::report_whole;

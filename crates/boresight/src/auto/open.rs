@@ -13,12 +13,12 @@ use super::first_pass::FirstPass;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
-use super::{first_scans, initiation_score, noise, speed};
+use super::{contest, first_scans, initiation_score, noise, speed};
 use crate::io::{LengthUnit, MOST_BYTES, Replay, frames_ahead};
 use crate::track::{Report, Tracking};
 use crate::vision::Detector;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, Frame, FrameSource, Result, Scan};
+use crate::{Config, Error, Frame, FrameSource, Result, Scan};
 use std::ffi::OsStr;
 
 /// Frames looked at by the automatic choice.
@@ -26,12 +26,6 @@ pub const PROBE_FRAMES: usize = 48;
 
 /// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
 const FEW_STILL: f64 = 3.0;
-
-/// How long results of a recording are held back, s: longer than a target takes that is seen faintly or stands at first, and short enough that its frames fit into
-/// memory where they are small.
-const RETROSPECTIVE_S: f64 = 10.0;
-/// And for how many scans at least: as many as a radar's target of P_D 0.5 needs to be confirmed in clutter.
-const RETROSPECTIVE_SCANS: f64 = 30.0;
 
 /// An input ready to be run: its frames, and what turns them into tracks.
 pub struct Opened {
@@ -70,7 +64,7 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
     let mut choice = choose_from(&mut frames, again, base, request)?;
     if second_look::can_be_opened_twice(input) {
         let rate_hz = frames.info().rate_hz.unwrap_or(base.input.rate_hz);
-        report_whole(rate_hz, &mut choice.config, &mut choice.reasons);
+        choice.report_whole(rate_hz);
     }
     if choice.config.input.colour != base.input.colour {
         frames = read(&choice.config)?;
@@ -96,16 +90,6 @@ pub fn read_and_choose(
     Ok((frames, choice))
 }
 
-/// Has the tracks of a recording of so many scans a second reported from their first detection on, since nobody waits for them, and says so; [`open_and_choose`]
-/// does it for files.
-pub fn report_whole(rate_hz: f64, config: &mut Config, reasons: &mut Vec<String>) {
-    let hold_s = RETROSPECTIVE_S.max((RETROSPECTIVE_SCANS / rate_hz.max(1e-9)).ceil());
-    config.tracker.retrospective_s = hold_s;
-    reasons.push(format!(
-        "A confirmed track is reported from its first detection on, for {hold_s} s at most (from its confirmation on: --set tracker.retrospective-s=0)."
-    ));
-}
-
 /// The choice from frames read ahead; `again` gives those of the second look, which only a fixed camera or a colour asks for.
 fn choose_from(
     frames: &mut Replay,
@@ -126,16 +110,43 @@ fn probed(ahead: &[Frame]) -> &[Frame] {
 }
 
 /// Runs the detector chosen over the frames read ahead, learns noise and motion of the targets from its detections, and returns it: it goes on
-/// where they end, so no frame is detected twice.
+/// where they end, so no frame is detected twice. What `set` changes in a configuration holds for this first pass as well, and is not overruled by what it learns.
 /// # Errors
-/// A parameter out of its range.
-pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Box<dyn Detector>> {
-    let false_tracks_per_hour = request.false_tracks_per_hour;
-    let info = frames.info().clone();
+/// A parameter out of its range; what `set` refuses.
+pub fn learn<E: From<Error>>(
+    frames: &mut Replay,
+    choice: &mut Choice,
+    request: &Request,
+    set: impl Fn(Config) -> Result<Config, E>,
+) -> Result<Box<dyn Detector>, E> {
+    choice.change(|c| set(std::mem::take(&mut c.config)).map(|config| c.config = config))?;
+    let area_px2 = (frames.info().width * frames.info().height).max(1) as f64;
     let mut pass = first_pass(frames, &choice.config, request)?;
-    let area_px2 = (info.width * info.height).max(1) as f64;
-    let evidence = Evidence::of_scans(pass.scans(), area_px2);
-    speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
+    let mut evidence = Evidence::of_scans(pass.scans(), area_px2);
+    if let Some(other) = choice.runner_up.take()
+        && let Some(reason) = contest::lost(&evidence, pass.scans(), choice, &other)
+    {
+        *choice = *other;
+        choice.reasons.push(reason);
+        pass = first_pass(frames, &choice.config, request)?;
+        evidence = Evidence::of_scans(pass.scans(), area_px2);
+    }
+    learn_from(&mut pass, &evidence, frames, choice, request)?;
+    choice.change(|c| set(std::mem::take(&mut c.config)).map(|config| c.config = config))?;
+    Ok(Box::new(pass))
+}
+
+/// Learns from the scans of a first pass; where the detector is changed by it, the pass is made anew.
+fn learn_from(
+    pass: &mut FirstPass,
+    evidence: &Evidence,
+    frames: &mut Replay,
+    choice: &mut Choice,
+    request: &Request,
+) -> Result<()> {
+    let false_tracks_per_hour = request.false_tracks_per_hour;
+    let area_px2 = (frames.info().width * frames.info().height).max(1) as f64;
+    speed::learn(evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
     let assumed = choice.clone();
     let found = statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
     let raised = found.as_ref().and_then(|f| initiation_score::raised(f.per_scan, area_px2, &choice.config));
@@ -152,18 +163,18 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
             }
             choice.reasons.push(reason);
             // Other blobs fall away with those left out, so all is detected anew: what is learnt is learnt of what the run sees.
-            pass = first_pass(frames, &choice.config, request)?;
+            *pass = first_pass(frames, &choice.config, request)?;
             statistics(pass.scans(), area_px2, false_tracks_per_hour, choice)?;
         }
-        return Ok(Box::new(pass));
+        return Ok(());
     }
     let mut fainter = assumed.clone();
     let clear_s = found.as_ref().map_or(&[][..], |f| &f.spans_s);
-    if initiation_score::learn(&evidence, clear_s, &mut fainter.config, &mut fainter.reasons) {
+    if initiation_score::learn(evidence, clear_s, &mut fainter.config, &mut fainter.reasons) {
         let more = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut fainter)?;
         if more.is_some_and(|f| f.n_targets > 0) {
             *choice = fainter;
-            return Ok(Box::new(pass));
+            return Ok(());
         }
     }
     if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
@@ -177,10 +188,9 @@ pub fn learn(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
                 things.per_scan
             ));
             *choice = still;
-            return Ok(Box::new(pass));
         }
     }
-    Ok(Box::new(pass))
+    Ok(())
 }
 
 /// The detector of a configuration with the scans that it makes of the frames read ahead.
@@ -213,7 +223,7 @@ fn statistics(
         }
         return Ok(None);
     }
-    let Choice { config, reasons } = choice;
+    let Choice { config, reasons, .. } = choice;
     // Scans in which nothing could be detected are no misses.
     let seeing: Vec<Scan>;
     let scans = if scans.iter().any(|s| s.blind) {
@@ -261,7 +271,7 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
 /// An input that cannot be read; a parameter out of its range.
 pub fn open(input: impl AsRef<OsStr>, base: &Config) -> Result<Opened> {
     let (mut frames, mut choice) = open_and_choose(input, base, &Request::default())?;
-    let detector = learn(&mut frames, &mut choice, &Request::default())?;
+    let detector = learn(&mut frames, &mut choice, &Request::default(), Ok::<_, Error>)?;
     Ok(Opened {
         frames: Box::new(frames),
         detector,
@@ -335,7 +345,7 @@ mod tests {
             ..DetectorConfig::default()
         };
         config.tracker.report = report;
-        Choice { config, reasons: Vec::new() }
+        Choice::alone(config, Vec::new())
     }
 
     /// What is reported of noise with bright squares at these places and speeds, px a frame.
@@ -345,7 +355,7 @@ mod tests {
         });
         let mut choice = assumed(IsolatedConfig::default().min_score, Report::Moving);
         let mut frames = Replay::new(Box::new(Memory(frames.into_iter(), info)), 100);
-        learn(&mut frames, &mut choice, &Request::default()).unwrap();
+        learn(&mut frames, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
         (choice.config.tracker.report, choice.reasons)
     }
 
@@ -369,7 +379,7 @@ mod tests {
         choice.config.detector.camera = crate::camera::CameraConfig::Moving;
         choice.config.tracker.min_initiation_score = 4.0;
         let mut replay = Replay::new(Box::new(Memory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
-        let mut learnt = learn(&mut replay, &mut choice, &Request::default()).unwrap();
+        let mut learnt = learn(&mut replay, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
         let ThresholdConfig::Isolated(isolated) = &choice.config.detector.threshold else { panic!("another detector") };
         assert!(isolated.min_score > 2.5, "{:?}", choice.reasons);
         let mut anew = crate::vision::build(&choice.config.detector, &info).unwrap();

@@ -29,7 +29,7 @@ const LEAST_PX: f64 = 4.0;
 /// Rims of one target lie as far apart as this share of the frame's longer side: 7 px of 512. A car of 10 px keeps its id with 7 and is two with 3.
 const RIMS: f64 = 0.0137;
 /// Share of the regions that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
-const LEAST_EXPLAINED: f64 = 0.2;
+pub(super) const LEAST_EXPLAINED: f64 = 0.2;
 /// Share of the sure isolated blobs that chains explain, from which on isolated targets tell what the frames show.
 const TOLD: f64 = 0.5;
 
@@ -65,15 +65,11 @@ fn detector(lag_s: f64, info: &SourceInfo) -> DetectorConfig {
     config
 }
 
-fn hits(chains: &Evidence) -> usize {
-    chains.moving.iter().map(|c| c.hits.len()).sum()
-}
-
 /// Whether the chains of isolated targets hold most of the blobs that stand clear in so many looks.
 fn tells(isolated: &spots::Seen, n_looks: usize) -> bool {
     let (polarity, chains) = isolated.most();
     let clear = if polarity == Polarity::Dark { &isolated.dark } else { &isolated.bright };
-    chains.is_sure() && hits(chains) as f64 >= TOLD * clear.per_frame * n_looks as f64
+    chains.is_sure() && chains.n_hits() as f64 >= TOLD * clear.per_frame * n_looks as f64
 }
 
 /// What moves by itself where the camera moves and the chains of isolated targets tell little, or where it stands and nothing stands clear, if its own surely
@@ -161,7 +157,7 @@ fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Seen> {
         per_frame: n as f64 / looked.len().max(1) as f64,
         side_px: sides.get(sides.len() / 2).copied().unwrap_or(0.0),
         step,
-        explained: hits(&chains) as f64 / n.max(1) as f64,
+        explained: chains.n_hits() as f64 / n.max(1) as f64,
         chains,
     })
 }

@@ -7,13 +7,16 @@
 //! ratio of "the target was there" against "nobody was" is added up: ln(P_D l / λ) of a detection, ln(1 − P_D P_G) of a miss, with the probabilities that the tracker has, and
 //! a clutter density that is no lower than what is seen around the place.
 //! The track begins where that sum is largest, if it is as sure there as what confirms a track; a walk ends when it has become as unlikely as what deletes one.
+//! Where tracks are confirmed by counting hits no such probability is known; but one that was initiated from two detections has had the first of them in the scan before, and is
+//! continued by that one.
 //! Symbols: l likelihood of a detection (1/px²); λ false detections per px² and scan; times run backward, so velocities have the other sign inside.
-//! Limits: one hypothesis; constant velocity whatever the track's own model; needs the probabilities of [`ExistenceConfig`]; where more than [`MOST_AROUND`] detections lie around
+//! Limits: one hypothesis; constant velocity whatever the track's own model; more than one scan only with the probabilities of [`ExistenceConfig`]; where more than [`MOST_AROUND`] detections lie around
 //! a place nothing is taken there.
 
 use super::config::TrackerConfig;
 use super::confirm::existence::ExistenceConfig;
 use super::confirm::rule::ConfirmationConfig;
+use super::initiation::InitiationConfig;
 use super::score_likelihood::{LogScore, ScoreLikelihoodConfig};
 use crate::associate::UniformGrid;
 use crate::camera::SteadyGround;
@@ -60,7 +63,8 @@ pub(crate) struct Own<'a> {
 #[derive(Clone, Debug)]
 pub struct Backward {
     config: TrackerConfig,
-    existence: ExistenceConfig,
+    /// Without it only the first of two detections is added.
+    existence: Option<ExistenceConfig>,
 }
 
 /// A target on its way back.
@@ -79,14 +83,19 @@ struct Walk<'c> {
 }
 
 impl Backward {
-    /// What continues the tracks of such a tracker; `None` if it holds nothing back or knows no probability that a target is there.
+    /// What continues the tracks of such a tracker; `None` if it holds nothing back, or knows no probability that a target is there and initiates from one detection.
     pub(crate) fn of(config: &TrackerConfig) -> Option<Self> {
-        match &config.confirmation {
-            ConfirmationConfig::Existence(existence) if config.retrospective_s > 0.0 => {
-                Some(Self { config: config.clone(), existence: existence.clone() })
-            }
+        let existence = match &config.confirmation {
+            ConfirmationConfig::Existence(existence) => Some(existence.clone()),
             _ => None,
-        }
+        };
+        let knows = existence.is_some() || matches!(config.initiation, InitiationConfig::TwoPoint(_));
+        (config.retrospective_s > 0.0 && knows).then(|| Self { config: config.clone(), existence })
+    }
+
+    /// Whether it may go back by more than one scan.
+    pub(crate) fn goes_far(&self) -> bool {
+        self.existence.is_some()
     }
 
     /// The states of a track before its first one, the newest first, in image coordinates; `own` are the scans in which it took a detection, from the oldest on, and
@@ -95,13 +104,17 @@ impl Backward {
         &self,
         id: TrackId,
         own: impl Iterator<Item = Own<'a>>,
-        before: impl Iterator<Item = Past<'a>>,
+        mut before: impl Iterator<Item = Past<'a>>,
     ) -> Vec<TrackState> {
         let mut states = Vec::new();
         let Some(mut walk) = self.begin(own) else { return states };
-        let (confirm, delete) = [self.existence.confirm_probability, self.existence.delete_probability]
-            .map(|p| (p / (1.0 - p)).ln())
-            .into();
+        let Some(existence) = &self.existence else {
+            let first = before.next().and_then(|past| walk.step(id, &past));
+            states.extend(first.map(|(_, state)| state).filter(|s| s.detection.is_some()));
+            return states;
+        };
+        let (confirm, delete) =
+            [existence.confirm_probability, existence.delete_probability].map(|p| (p / (1.0 - p)).ln()).into();
         let (mut sum, mut best, mut n_best) = (0.0, 0.0f64, 0);
         for past in before {
             let Some((evidence, state)) = walk.step(id, &past) else { break };
@@ -341,7 +354,8 @@ impl Walk<'_> {
             height_px,
         };
         let status = if detection.is_some() { TrackStatus::Confirmed } else { TrackStatus::Coasting };
-        let score = self.back.existence.confirm_probability as f32;
+        // One that is confirmed by its hits is a target: nothing less is known of it.
+        let score = self.back.existence.as_ref().map_or(1.0, |e| e.confirm_probability) as f32;
         let mut state = [TrackState { id, status, kinematics, extent, detection, innovation, score }];
         past.ground.tracks_in_image(&mut state);
         let [state] = state;

@@ -118,7 +118,7 @@ fn run(frames: Vec<Frame>, spots: &[[Vector2<f64>; 2]]) -> Found {
     };
     let (request, source) = (auto::Request::default(), Box::new(Memory(frames.into_iter(), info)));
     let (mut frames, mut choice) = auto::read_and_choose(source, None, &Config::default(), &request).unwrap();
-    let mut detector = auto::learn(&mut frames, &mut choice, &request).unwrap();
+    let mut detector = auto::learn(&mut frames, &mut choice, &request, Ok::<_, boresight::Error>).unwrap();
     let mut tracker = boresight::track::build(&choice.config.tracker).unwrap();
     let (mut scan, mut held, mut n_false, mut k) = (Scan::default(), 0, 0, 0);
     while let Some(frame) = frames.next_frame().unwrap() {

@@ -210,3 +210,24 @@ fn a_gate_larger_than_the_square_of_false_detections_is_searched_whole() {
     };
     assert_eq!(scene.back(&config, 40).len(), 40);
 }
+
+#[test]
+fn what_is_confirmed_by_its_hits_has_the_first_of_two_detections_and_no_more() {
+    let counted = TrackerConfig { confirmation: ConfirmationConfig::default(), ..config() };
+    let (mut sum, mut n) = (0.0, 0);
+    for seed in 0..100 {
+        let scene = scene(seed, 0, 1.0, 3, 2.0);
+        let states = scene.back(&counted, 12);
+        assert_eq!(states.len(), 1, "{seed}");
+        let (ground, truth) = (scene.grounds[11], scene.truth[11]);
+        assert_eq!(states[0].detection, Some(0), "{seed}");
+        let error = states[0].position() - ground.in_image(Vector2::new(truth[0], truth[2]));
+        sum += error.norm_squared() / (2.0 * 0.3f64.powi(2));
+        n += 1;
+    }
+    // A smoothed place is better than the detection's 0.3 px an axis, and not by more than a filter can be.
+    assert!((0.1..1.0).contains(&(sum / f64::from(n))), "{sum}");
+    let one_point = InitiationConfig::OnePoint(crate::track::OnePointConfig { velocity_std_px_per_s: 20.0 });
+    let none = Backward::of(&TrackerConfig { initiation: one_point, ..counted });
+    assert!(none.is_none(), "its first state is its first detection's");
+}
