@@ -40,7 +40,7 @@ const MOST_FALSE_MOTION: f64 = 0.01;
 /// A target may be hidden for so long and keep its id, s: now that it is known how long targets stay, likelihoods decide, and this bounds memory alone.
 const LONGEST_HIDDEN_S: f64 = 3600.0;
 /// Share of the targets' detections that may be given up with what scores less.
-const FAINT_SHARE: f64 = 0.01;
+pub(super) const FAINT_SHARE: f64 = 0.01;
 /// Fewer scans than this tell nothing.
 const LEAST_SCANS: usize = 8;
 

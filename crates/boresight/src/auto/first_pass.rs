@@ -2,6 +2,7 @@
 //!
 //! The detector that made them goes on where they end, so a frame is detected once however often it is looked at.
 
+use crate::io::Replay;
 use crate::vision::{AtOnce, Detector};
 use crate::{Frame, Result, Scan};
 use std::collections::VecDeque;
@@ -30,6 +31,17 @@ impl FirstPass {
         let taken = at_once.detect(&mut *self.detector, &frames, &mut scans).is_ok();
         self.scans.extend(scans);
         taken
+    }
+
+    /// Takes frames that are read ahead, or read now as long as they may be held, until `most` or more are taken in all or the detector refuses one.
+    pub fn take_on(&mut self, frames: &mut Replay, at_once: &mut AtOnce, most: usize) {
+        while self.scans.len() < most {
+            let taken = self.scans.len();
+            let frames = frames.read_on(taken + at_once.n_frames()).get(taken..).unwrap_or_default();
+            if frames.is_empty() || !self.take(frames, at_once) {
+                return;
+            }
+        }
     }
 
     /// The scans made ahead.

@@ -5,6 +5,9 @@
 
 use crate::{Scan, TrackState};
 
+/// Frames looked at by the automatic choice.
+pub const PROBE_FRAMES: usize = 48;
+
 /// Most scans and detections of the first pass: half a minute of most videos, or of a table; a guard of time and memory.
 pub const MOST_SCANS: usize = crate::io::MOST_FRAMES;
 const MOST_DETECTIONS: usize = 2_000_000;

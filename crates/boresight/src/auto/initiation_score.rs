@@ -22,6 +22,9 @@ const GAIN_SHARE: f64 = 0.1;
 /// Share of false ones among the detections that may start a track, where targets are many and all that stands is reported.
 const FALSE_STARTS: f64 = 0.01;
 
+/// Detections of targets after which it is known what hardly one of them falls short of: of so many some ten do, give or take three.
+pub const ENOUGH_HELD: f64 = 10.0 / super::detection_statistics::FAINT_SHARE;
+
 /// Lowers the least score that starts a track to what the chains show, and says whether it did; `clear_s` lists from when to when clear targets are followed, s.
 pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, reasons: &mut Vec<String>) -> bool {
     let assumed = config.tracker.min_initiation_score;

@@ -22,6 +22,7 @@ mod fixed_blocks;
 mod ground;
 mod initiation_score;
 mod interval;
+mod learn;
 mod looks;
 mod moving;
 mod noise;
@@ -47,7 +48,9 @@ pub use crate::io::Replay;
 pub use adaptation::Adaptation;
 pub use choose::{Choice, choose};
 pub use detections::for_detections;
-pub use open::{Opened, PROBE_FRAMES, learn, open, open_and_choose, read_and_choose};
+pub use first_scans::PROBE_FRAMES;
+pub use learn::learn;
+pub use open::{Opened, open, open_and_choose, read_and_choose};
 #[cfg(feature = "report")]
 pub use preview::preview;
 pub use radar::for_radar;

@@ -31,6 +31,7 @@ mod strongest;
 mod target_finder;
 pub(crate) mod tbd;
 pub mod threshold;
+mod whole;
 pub(crate) mod window;
 pub use centroid::{Centroid, Surroundings, centroid};
 pub use cluster::{Clusterer, segment};

@@ -66,6 +66,8 @@ pub struct Bars {
     /// For small clusters.
     least: Vec<f32>,
     ground: Vec<f32>,
+    /// No peak needs less.
+    floor: f64,
     /// The largest ring, counted from 1, within whose inside the cell is the highest.
     leads: Vec<u8>,
     scratch: [Vec<f32>; 2],
@@ -123,14 +125,22 @@ impl Bars {
         (need.mean < f64::INFINITY).then_some(need)
     }
 
+    /// No peak needs less, whatever its rings: their ground is a mean of cells.
+    pub fn floor(&self) -> f64 {
+        self.floor
+    }
+
     /// From the third lowest ground and the third lowest spread of the cells next to each.
     fn near(&mut self, cells: &Cells, bar: &Bar) {
         let columns = cells.size().0;
         let (means, spreads) = cells.each();
         let sign = bar.sign as f32;
         let [grounds, quiet] = &mut self.lowest;
-        grounds.read(means.iter().map(|v| sign * v), columns);
-        quiet.read(spreads.iter().copied(), columns);
+        grounds.read(means, sign, columns);
+        quiet.read(spreads, 1.0, columns);
+        let lowest = grounds.least.iter().copied().fold(f32::INFINITY, f32::min);
+        // f32 holds means to less than a millionth of themselves.
+        self.floor = f64::from(lowest) - 1e-6 * f64::from(lowest.abs()) + bar.min_score * bar.unit;
         self.ground.clear();
         self.ground.extend_from_slice(&grounds.least);
         self.least.clear();
@@ -172,19 +182,17 @@ struct Lowest {
 }
 
 impl Lowest {
-    /// Reads the cells of one frame; what is not a number counts for none.
-    fn read(&mut self, of: impl Iterator<Item = f32>, columns: usize) {
+    /// Reads the cells of one frame times a sign; what is not a number counts for none.
+    fn read(&mut self, of: &[f32], sign: f32, columns: usize) {
         let columns = columns.max(1);
         let Self { least, second, third, padded } = self;
         padded.clear();
         padded.resize(columns + 3, f32::INFINITY);
-        for (i, v) in of.enumerate() {
-            if i > 0 && i % columns == 0 {
-                padded.extend([f32::INFINITY; 2]);
-            }
-            padded.push(if v.is_nan() { f32::INFINITY } else { v });
+        for row in of.chunks(columns) {
+            padded.extend(row.iter().map(|v| if v.is_nan() { f32::INFINITY } else { sign * v }));
+            padded.extend([f32::INFINITY; 2]);
         }
-        padded.resize(padded.len() + columns + 3, f32::INFINITY);
+        padded.resize(padded.len() + columns + 1, f32::INFINITY);
         let wide = columns + 2;
         let rows = padded.len() / wide - 2;
         for v in [&mut *least, &mut *second, &mut *third] {
@@ -269,7 +277,7 @@ mod tests {
                 .map(|_| if rng.random_range(0..20) == 0 { f32::NAN } else { rng.random_range(0..30) as f32 })
                 .collect();
             let mut lowest = Lowest::default();
-            lowest.read(values.iter().copied(), columns);
+            lowest.read(&values, 1.0, columns);
             for (i, third) in lowest.third.iter().enumerate() {
                 let (c, r) = (i % columns, i / columns);
                 let near = |a: usize, b: usize| a.abs_diff(b) <= 1;

@@ -39,6 +39,15 @@ struct Cell {
     squares: f64,
 }
 
+impl Cell {
+    /// Mean of the values and of the squares. A product where it is the quotient to the bit: a division takes as long as the rest of the cell.
+    fn means(&self) -> [f64; 2] {
+        const WHOLE: f64 = (CELL * CELL) as f64;
+        let each = [self.values, self.squares];
+        if self.pixels == WHOLE { each.map(|v| v * (1.0 / WHOLE)) } else { each.map(|v| v / self.pixels) }
+    }
+}
+
 impl Cells {
     /// Reads a frame.
     pub fn read<T: Pixel>(&mut self, image: &Image<T>) {
@@ -57,7 +66,9 @@ impl Cells {
             let mut rows = [image.row(r * CELL); CELL];
             rows.iter_mut().enumerate().take(tall).for_each(|(y, row)| *row = image.row(r * CELL + y));
             parts.clear();
-            row_of_cells(&rows[..tall], &mut parts);
+            let of_bytes = T::STEP > 0.0 && size_of::<T>() == 1 && tall == CELL;
+            let from = if of_bytes { row_of_byte_cells(&rows, &mut parts) } else { 0 };
+            row_of_cells(&rows[..tall], from, &mut parts);
             let mut before = [0.0; 3];
             for (c, part) in parts.iter().enumerate() {
                 let wide = CELL.min(image.width() - c * CELL);
@@ -65,8 +76,9 @@ impl Cells {
                 self.lowest[r * self.columns + c] = cell.low;
                 self.highest[r * self.columns + c] = cell.high;
                 // NaN where no pixel is finite.
-                self.means[r * self.columns + c] = (cell.values / cell.pixels) as f32;
-                self.spreads[r * self.columns + c] = (cell.squares / cell.pixels).sqrt() as f32;
+                let [mean, square] = cell.means();
+                self.means[r * self.columns + c] = mean as f32;
+                self.spreads[r * self.columns + c] = square.sqrt() as f32;
                 before[0] += cell.pixels;
                 before[1] += cell.values;
                 before[2] += cell.squares;
@@ -217,12 +229,63 @@ fn sum_of(v: [f32; CELL]) -> f32 {
     ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
 }
 
+/// Columns of bytes that are summed side by side.
+const BYTE_LANES: usize = 4 * CELL;
+
 widest! {
-    /// Appends the cells of up to eight rows of pixels.
-    fn row_of_cells<T: Pixel>(rows: &[&[T]], out: &mut Vec<Part>) {
+    /// Appends the cells of eight rows of bytes in whole numbers, which are those of [`row_of_cells`] to the bit, since f32 holds all its sums of bytes exactly; returns the column from
+    /// which on pixels are left.
+    fn row_of_byte_cells<T: Pixel>(rows: &[&[T]; CELL], out: &mut Vec<Part>) -> usize {
+        let whole = rows[0].len() / BYTE_LANES * BYTE_LANES;
+        for x in (0..whole).step_by(BYTE_LANES) {
+            let (mut low, mut high) = ([u16::MAX; BYTE_LANES], [0u16; BYTE_LANES]);
+            // Twice the place below the middle is a whole number.
+            let (mut sum, mut down, mut square) = ([0u16; BYTE_LANES], [0i16; BYTE_LANES], [0u32; BYTE_LANES]);
+            for (y, row) in rows.iter().enumerate() {
+                let Some(row) = row[x..].first_chunk::<BYTE_LANES>() else { continue };
+                for l in 0..BYTE_LANES {
+                    let v = row[l].index() as u16;
+                    low[l] = low[l].min(v);
+                    high[l] = high[l].max(v);
+                    sum[l] += v;
+                    down[l] += (2 * y as i16 - 7) * v as i16;
+                    square[l] += u32::from(v * v);
+                }
+            }
+            for at in (0..BYTE_LANES).step_by(CELL) {
+                let (mut s, mut q, mut along, mut below) = (0i32, 0i32, 0i32, 0i32);
+                let (mut least, mut most) = (u16::MAX, 0);
+                for i in 0..CELL {
+                    s += i32::from(sum[at + i]);
+                    q += square[at + i] as i32;
+                    along += (2 * i as i32 - 7) * i32::from(sum[at + i]);
+                    below += i32::from(down[at + i]);
+                    least = least.min(low[at + i]);
+                    most = most.max(high[at + i]);
+                }
+                let base = rows[0][x + at].index() as i32;
+                let n = (CELL * CELL) as i32;
+                out.push(Part {
+                    base: base as f32,
+                    low: f32::from(least),
+                    high: f32::from(most),
+                    sum: (s - n * base) as f32,
+                    along: 0.5 * along as f32,
+                    down: 0.5 * below as f32,
+                    square: (q - 2 * base * s + n * base * base) as f32,
+                });
+            }
+        }
+        whole
+    }
+}
+
+widest! {
+    /// Appends the cells of up to eight rows of pixels from a column on.
+    fn row_of_cells<T: Pixel>(rows: &[&[T]], from: usize, out: &mut Vec<Part>) {
         let width = rows[0].len();
-        let whole = width / LANES * LANES;
-        for x in (0..whole).step_by(LANES) {
+        let whole = from + (width - from) / LANES * LANES;
+        for x in (from..whole).step_by(LANES) {
             let mut base = [rows[0][x].value_f32(); LANES];
             base[CELL..].fill(rows[0][x + CELL].value_f32());
             let mut columns = Columns::about(base);
@@ -288,6 +351,21 @@ mod tests {
             assert!((mean - plane).abs() < 0.1 * gain + 1e-7 * offset, "{mean} {plane}");
             // 61 of 64 degrees of freedom of a cell are left.
             assert!((spread / gain / (61f64 / 64.0).sqrt() - 1.0).abs() < 0.04, "{spread}");
+        }
+    }
+
+    #[test]
+    fn bytes_give_what_floats_give() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for (w, h) in [(32, 8), (101, 27), (320, 16)] {
+            for range in [0..=255u8, 250..=255, 7..=7, 0..=1] {
+                let bytes: Vec<u8> = (0..w * h).map(|_| rng.random_range(range.clone())).collect();
+                let floats = bytes.iter().map(|v| f32::from(*v)).collect();
+                let [mut a, mut b] = [Cells::default(), Cells::default()];
+                a.read(&Image::from_vec(w, h, bytes).unwrap());
+                b.read(&Image::<f32>::from_vec(w, h, floats).unwrap());
+                assert_eq!(format!("{a:?}").split("row:").next(), format!("{b:?}").split("row:").next());
+            }
         }
     }
 

@@ -51,6 +51,7 @@ pub struct IsolatedDetector {
     ring: Ring,
     levels: Vec<f64>,
     samples: Vec<f32>,
+    maxima: Vec<u8>,
     peaks: Vec<Peak>,
     candidates: Vec<Candidate>,
     nested: Nested,
@@ -69,6 +70,7 @@ impl IsolatedDetector {
             ring: Ring::default(),
             levels: Vec::new(),
             samples: Vec::new(),
+            maxima: Vec::new(),
             peaks: Vec::new(),
             candidates: Vec::new(),
             nested: Nested::default(),
@@ -117,7 +119,7 @@ impl IsolatedDetector {
             max_side: self.isolated.max_side_px,
         };
         self.bars.take(&self.cells, &bar);
-        peaks::find(image, &self.cells, &self.bars, &bar, sign * lowest, &mut self.peaks);
+        peaks::find(image, &self.cells, &self.bars, &bar, sign * lowest, &mut self.maxima, &mut self.peaks);
         self.growth.frame(image.width(), image.height(), self.levels.len(), bar.max_side);
         self.ring.forget();
         let peaks = std::mem::take(&mut self.peaks);
@@ -140,7 +142,7 @@ impl IsolatedDetector {
         self.growth.start(peak.x, peak.y, self.steps.of(*pixel), self.steps.above(need.ground));
         let mut noted = false;
         loop {
-            let step = self.growth.step(image, &self.steps);
+            let step = self.growth.step(image, &self.steps, need.mean);
             if step == Step::End {
                 return;
             }

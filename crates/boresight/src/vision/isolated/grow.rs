@@ -4,6 +4,7 @@
 //! to the few peaks that can matter: pixels next to the cluster wait in a bucket of their level, so that each is visited once whatever the number of levels.
 //! A pixel that another peak's cluster held at this level or a higher one ends the growth: the two are one cluster from there on, and the first peak, which is at least as
 //! high, has seen it. One that the other took in lower down, past the saddle between the two, is free.
+//! Of the pixels that a level adds most are those of the last one, which floods the ground: there a cluster ends as soon as its mean says that it can be no target (`bars`).
 //! Symbols: `reached` number of levels that a pixel reaches.
 //! Limits: 511 levels; the border itself belongs to no cluster.
 
@@ -18,6 +19,9 @@ const LEVEL: u32 = (1 << LEVEL_BITS) - 1;
 
 /// Marks of a cache line.
 const LINE: usize = 16;
+
+/// Pixels up to which a cluster is grown to the end of its level: a cell's, whose bar is an estimate that the ring of a small cluster may prove too high.
+const SMALL: u32 = 64;
 
 /// No pixel.
 const NONE: u32 = u32::MAX;
@@ -130,8 +134,8 @@ impl Growth {
         Step::End
     }
 
-    /// Takes in the pixels of the next level, the highest first.
-    pub fn step<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps) -> Step {
+    /// Takes in the pixels of the next level, the highest first, as long as the cluster is small or its mean not below `least_mean`.
+    pub fn step<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, least_mean: f64) -> Step {
         let level = usize::from(self.reached);
         if level < self.floor || level <= self.met {
             return self.end();
@@ -146,11 +150,11 @@ impl Growth {
             self.stack.push(at);
             head = before;
         }
-        if self.take_in(image, steps, level) { Step::Grown } else { self.end() }
+        if self.take_in(image, steps, level, least_mean) { Step::Grown } else { self.end() }
     }
 
     /// Takes in the pixels on the stack and those that they lead to at this level; false if the cluster cannot be a target from there on.
-    fn take_in<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, level: usize) -> bool {
+    fn take_in<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, level: usize, least_mean: f64) -> bool {
         let (stack, waiting, heads, marks) =
             (&mut self.stack, &mut self.waiting, self.heads.as_mut_slice(), self.marks.as_mut_slice());
         let (pixels, width, stride, beside) = (image.as_slice(), self.width, self.stride.max(1), self.beside);
@@ -170,6 +174,11 @@ impl Growth {
             let pixel = y as usize * width + x as usize;
             let value = steps.signed(pixels[pixel]);
             sum += value;
+            // What is still to come of this level is lower than all that was there before it, so the mean only falls.
+            if blob.area > SMALL && sum < least_mean * f64::from(blob.area) {
+                whole = false;
+                break;
+            }
             peak = if value > peak { value } else { peak };
             marks[at as usize] = own | level as u32;
             for &(of_mark, of_pixel) in &beside {
@@ -244,7 +253,7 @@ mod tests {
                 growth.frame(40, 30, 1, 20);
             }
             growth.start(20, 12, 1, 1);
-            let step = growth.step(&image, &steps);
+            let step = growth.step(&image, &steps, f64::NEG_INFINITY);
             if step == Step::Grown {
                 let (blob, mean, peak) = growth.cluster().unwrap();
                 assert_eq!((blob.bounds(), blob.area, mean, peak), ([20, 12, 23, 14], 12, 90.0, 90.0));

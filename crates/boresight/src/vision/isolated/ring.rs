@@ -113,28 +113,14 @@ impl Ring {
         let middle = [blob.left + blob.right, blob.top + blob.bottom].map(|twice| 0.5 * twice as f32);
         let (base, sign) = (image.row(y0)[x0].value_f32(), sign as f32);
         let base = if base.is_finite() { base } else { 0.0 };
-        let columns = x1 - x0 + 1;
+        let shape = Shape { inner, outer: [x0, y0, x1, y1], stride, middle, base, sign };
+        let most = ((x1 - x0) / stride + 1) * ((y1 - y0) / stride + 1);
         for v in [&mut self.x, &mut self.y, &mut self.values] {
-            v.clear();
+            v.resize(most, 0.0);
         }
-        for y in (y0..=y1).step_by(stride) {
-            let row = &image.row(y)[x0..=x1];
-            let beside = y >= inner[1] && y <= inner[3];
-            // The first column of the grid past the box.
-            let past = (inner[2] + 1 - x0).next_multiple_of(stride);
-            let spans = if beside { [0..inner[0] - x0, past.min(columns)..columns] } else { [0..columns, 0..0] };
-            for span in spans {
-                let value = |p: &T| sign * (p.value_f32() - base);
-                let place = |i: usize| (x0 + i) as f32 - middle[0];
-                if stride == 1 {
-                    self.x.extend(span.clone().map(place));
-                    self.values.extend(row[span].iter().map(value));
-                } else {
-                    self.x.extend(span.clone().step_by(stride).map(place));
-                    self.values.extend(row[span].iter().step_by(stride).map(value));
-                }
-                self.y.resize(self.x.len(), y as f32 - middle[1]);
-            }
+        let n = gather(image, &shape, &mut self.x, &mut self.y, &mut self.values);
+        for v in [&mut self.x, &mut self.y, &mut self.values] {
+            v.truncate(n);
         }
         if T::STEP == 0.0 {
             self.drop_unknown();
@@ -166,6 +152,60 @@ impl Ring {
         for v in [&mut self.x, &mut self.y, &mut self.values] {
             v.truncate(kept);
         }
+    }
+}
+
+/// The samples of a ring.
+struct Shape {
+    /// `[left, top, right, bottom]` of what it surrounds, and its own.
+    inner: [usize; 4],
+    outer: [usize; 4],
+    /// Columns and rows from one sample to the next.
+    stride: usize,
+    /// From where places are counted, px, and values, counts.
+    middle: [f32; 2],
+    base: f32,
+    sign: f32,
+}
+
+widest! {
+    /// Writes place and value of each sample and returns their number.
+    fn gather<T: Pixel>(image: &Image<T>, shape: &Shape, x: &mut [f32], y: &mut [f32], values: &mut [f32]) -> usize {
+        let &Shape { inner, outer: [x0, y0, x1, y1], stride, middle, base, sign } = shape;
+        let columns = x1 - x0 + 1;
+        // The first column of the grid past the box.
+        let past = (inner[2] + 1 - x0).next_multiple_of(stride);
+        let mut n = 0;
+        let mut at = y0;
+        while at <= y1 {
+            let row = &image.row(at)[x0..=x1];
+            let beside = at >= inner[1] && at <= inner[3];
+            let spans = if beside { [(0, inner[0] - x0), (past.min(columns), columns)] } else { [(0, columns), (0, 0)] };
+            let below = at as f32 - middle[1];
+            for (from, to) in spans {
+                let m = (to - from).div_ceil(stride);
+                let (x, y, values) = (&mut x[n..][..m], &mut y[n..][..m], &mut values[n..][..m]);
+                // Columns of an image are far fewer than i32 holds, and vectors turn i32 into f32.
+                let first = (x0 + from) as i32;
+                if stride == 1 {
+                    let row = &row[from..][..m];
+                    for i in 0..m {
+                        x[i] = (first + i as i32) as f32 - middle[0];
+                        y[i] = below;
+                        values[i] = sign * (row[i].value_f32() - base);
+                    }
+                } else {
+                    for i in 0..m {
+                        x[i] = (first + (i * stride) as i32) as f32 - middle[0];
+                        y[i] = below;
+                        values[i] = sign * (row[from + i * stride].value_f32() - base);
+                    }
+                }
+                n += m;
+            }
+            at += stride;
+        }
+        n
     }
 }
 

@@ -7,6 +7,7 @@
 
 use crate::Image;
 use crate::vision::pixel::Pixel;
+use crate::vision::whole;
 
 /// 1 / Φ⁻¹(3/4): the standard deviation of normal noise in units of its median absolute deviation.
 pub const SD_PER_MAD: f64 = 1.482_602_218_505_602;
@@ -136,23 +137,29 @@ fn between(x: f64, cell: usize, n: usize) -> (usize, usize, f64) {
     (i, (i + 1).min(n - 1), u - i as f64)
 }
 
-/// Median and 1.4826 x MAD of values; whole-number values (`step` 1) are taken as spread evenly over +- 1/2. Sorts them.
+/// The mean of the two middle values, or the middle one of an odd number; changes their order.
+fn middle(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f32::total_cmp);
+    let lower = if n % 2 == 1 { upper } else { below.iter().copied().max_by(f32::total_cmp).unwrap_or(upper) };
+    0.5 * (lower + upper)
+}
+
+/// Median and 1.4826 x MAD of values; whole-number values (`step` 1) are taken as spread evenly over +- 1/2. Changes their order.
 /// No values: zeros.
 pub fn median_and_deviation(values: &mut [f32], step: f32) -> (f32, f32) {
     let n = values.len();
     if n == 0 {
         return (0.0, 0.0);
     }
-    values.sort_unstable_by(f32::total_cmp);
     if step == 0.0 {
-        let middle = |v: &[f32]| 0.5 * (v[(n - 1) / 2] + v[n / 2]);
         let median = middle(values);
         for v in values.iter_mut() {
             *v = (*v - median).abs();
         }
-        values.sort_unstable_by(f32::total_cmp);
         return (median, middle(values) * SD_PER_MAD as f32);
     }
+    whole::sort(values);
     let half = n as f32 / 2.0;
     let v = values[n / 2];
     let below = values.partition_point(|&s| s < v) as f32;

@@ -7,6 +7,7 @@ pub(crate) mod grid;
 pub(crate) mod level;
 pub(crate) mod local;
 pub(crate) mod otsu;
+mod reaching;
 pub(crate) mod spot;
 pub use band::words;
 pub use bits::band_bits;

@@ -13,6 +13,7 @@
 
 use super::box_mean::BoxMean;
 use super::grid::BackgroundGrid;
+use super::reaching::{BLOCK, find_reaching};
 use super::{Side, SpotConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::pixel::Pixel;
@@ -70,6 +71,8 @@ pub struct SpotDetector {
     grid: BackgroundGrid,
     noise: PixelNoise,
     level: Vec<f32>,
+    /// Blocks of the row in which a pixel reaches the level.
+    reaching: Vec<usize>,
     spots: Vec<Spot>,
     keep: Vec<bool>,
     found: Vec<Found>,
@@ -122,6 +125,7 @@ impl SpotDetector {
             grid: BackgroundGrid::new(cell),
             noise: PixelNoise::default(),
             level: Vec::new(),
+            reaching: Vec::new(),
             spots: Vec::new(),
             keep: Vec::new(),
             found: Vec::new(),
@@ -179,17 +183,24 @@ impl SpotDetector {
                 work.reset(w, h, 0.0);
             }
         }
-        let mut last = 0.0;
-        for (f, p) in self.frame.as_mut_slice().iter_mut().zip(image.as_slice()) {
-            let v = p.value_f32();
-            if v.is_finite() {
-                last = v;
+        let pixels = self.frame.as_mut_slice().iter_mut().zip(image.as_slice());
+        let run = if T::STEP > 0.0 {
+            pixels.for_each(|(f, p)| *f = p.value_f32());
+            BoxMean::run_whole
+        } else {
+            let mut last = 0.0;
+            for (f, p) in pixels {
+                let v = p.value_f32();
+                if v.is_finite() {
+                    last = v;
+                }
+                *f = last;
             }
-            *f = last;
-        }
-        self.boxes.run(&self.frame, self.smooth, &mut self.response);
+            BoxMean::run
+        };
+        run(&mut self.boxes, &self.frame, self.smooth, &mut self.response);
         self.boxes.run(&self.response, self.smooth, &mut self.smoothed);
-        self.boxes.run(&self.frame, self.surround, &mut self.response);
+        run(&mut self.boxes, &self.frame, self.surround, &mut self.response);
         for (r, s) in self.response.as_mut_slice().iter_mut().zip(self.smoothed.as_slice()) {
             *r = s - *r;
         }
@@ -204,17 +215,22 @@ impl SpotDetector {
             let row = self.response.row(y);
             let above = if y > 0 { self.response.row(y - 1) } else { &[] };
             let below = if y + 1 < h { self.response.row(y + 1) } else { &[] };
-            for (x, (&v, level)) in row.iter().zip(&self.level).enumerate() {
-                if !(v >= *level && v > 0.0) {
-                    continue;
-                }
-                // Most pixels have a larger one beside them.
-                let is_beside = (x > 0 && row[x - 1] >= v)
-                    || row.get(x + 1).is_some_and(|o| *o > v)
-                    || above.get(x).is_some_and(|o| *o >= v)
-                    || below.get(x).is_some_and(|o| *o > v);
-                if !is_beside && self.is_peak(x, y, v) {
-                    spots.push(self.centre(x, y, v));
+            self.reaching.clear();
+            find_reaching(row, &self.level, &mut self.reaching);
+            for block in &self.reaching {
+                for x in (block * BLOCK..(block + 1) * BLOCK).take_while(|x| *x < row.len()) {
+                    let (v, level) = (row[x], self.level[x]);
+                    if !(v >= level && v > 0.0) {
+                        continue;
+                    }
+                    // Most pixels have a larger one beside them.
+                    let is_beside = (x > 0 && row[x - 1] >= v)
+                        || row.get(x + 1).is_some_and(|o| *o > v)
+                        || above.get(x).is_some_and(|o| *o >= v)
+                        || below.get(x).is_some_and(|o| *o > v);
+                    if !is_beside && self.is_peak(x, y, v) {
+                        spots.push(self.centre(x, y, v));
+                    }
                 }
             }
         }
@@ -277,8 +293,11 @@ impl SpotDetector {
             let Some(row) = self.response.row(y as usize).get(from as usize..to.max(from) as usize) else { continue };
             let py = cy + f64::from(dy) - c.y;
             for (i, d) in row.iter().enumerate() {
+                if !(*d > 0.0) {
+                    continue;
+                }
                 let px = (from + i as i64) as f64 - c.x;
-                let d = f64::from(d.max(0.0));
+                let d = f64::from(*d);
                 let r2 = px * px + py * py;
                 if r2 >= outer2 {
                     continue;
