@@ -1,12 +1,21 @@
-//! The camera's motion between two scans as a scan carries it: a similarity with its covariance, measured or held.
+//! The camera's motion between two scans as a scan carries it: a plane's, with its covariance, measured or held.
 //!
-//! Symbols: q = `[dx, dy, angle, ln zoom]` (px, px, rad, 1): shift of the background at `centre_px`, its turn and its growth about that
-//! point; C = Cov(q). A point at d = p - centre has the Jacobian J = `[1 0 -dy dx; 0 1 dx dy]`, and J C Jᵀ is the covariance of where
-//! the background lies there.
-//! Limits: first order in angle and ln zoom; the errors of scans are taken as independent.
+//! Symbols: q = `[dx, dy, angle, ln zoom, stretch, shear, g, h]` (px, px, rad, 1, 1, 1, 1/px, 1/px): shift of the background at `centre_px`, its turn and its growth about that
+//! point, what else is affine, and the perspective; C = Cov(q). A point at d = p - centre has the Jacobian
+//! J = `[1 0 -dy dx dx dy dx² dx dy; 0 1 dx dy -dy dx dx dy dy²]`, and J C Jᵀ is the covariance of where the background lies there.
+//! Limits: first order in all of them; the errors of scans are taken as independent.
 
-use crate::Similarity;
-use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2};
+use crate::Homography;
+use nalgebra::{Matrix2, SMatrix, Vector2};
+
+/// Covariance of the eight numbers of a plane's motion.
+pub type MotionCov = SMatrix<f64, 8, 8>;
+
+/// What each of the eight numbers moves at a point `d` from the middle, px.
+pub(crate) fn motion_jacobian(d: Vector2<f64>) -> SMatrix<f64, 2, 8> {
+    let (x, y) = (d.x, d.y);
+    SMatrix::from_row_slice(&[1.0, 0.0, -y, x, x, y, x * x, x * y, 0.0, 1.0, x, y, -y, x, x * y, y * y])
+}
 
 /// Where a motion is known from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -40,11 +49,12 @@ impl MotionBasis {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraMotion {
     /// Where the background that lay at a point in the scan before lies now.
-    pub now_from_before: Similarity,
+    pub now_from_before: Homography,
     /// The point that `cov` speaks of, px: the image's middle.
     pub centre_px: Vector2<f64>,
-    /// Covariance of the background's shift at `centre_px` (px, px), of its turn (rad) and of the logarithm of its growth.
-    pub cov: Matrix4<f64>,
+    /// Covariance of the background's shift at `centre_px` (px, px), of its turn (rad), of the logarithm of its growth, of stretch and shear, and of the
+    /// perspective (1/px); zero where the motion has no such number.
+    pub cov: MotionCov,
     /// Measured or held.
     pub basis: MotionBasis,
 }
@@ -53,9 +63,9 @@ impl CameraMotion {
     /// A shift (px) that is known exactly, as of a gimbal's encoder.
     pub fn exact_shift(shift_px: Vector2<f64>) -> Self {
         Self {
-            now_from_before: Similarity::shift(shift_px),
+            now_from_before: Homography::shift(shift_px),
             centre_px: Vector2::zeros(),
-            cov: Matrix4::zeros(),
+            cov: MotionCov::zeros(),
             basis: MotionBasis::Measured,
         }
     }
@@ -72,9 +82,9 @@ impl CameraMotion {
 
     /// Covariance of where the background lies at a point of the image, px².
     pub fn cov_at(&self, p: Vector2<f64>) -> Matrix2<f64> {
-        let d = p - self.centre_px;
-        let j = Matrix2x4::new(1.0, 0.0, -d.y, d.x, 0.0, 1.0, d.x, d.y);
-        j * self.cov * j.transpose()
+        let j = motion_jacobian(p - self.centre_px);
+        let c = j * self.cov * j.transpose();
+        0.5 * (c + c.transpose())
     }
 
     /// Whether all of it is finite and the motion has a way back.
@@ -91,7 +101,7 @@ mod tests {
     fn far_from_the_middle_an_uncertain_turn_counts_across_and_an_uncertain_zoom_along() {
         let motion = CameraMotion {
             centre_px: Vector2::new(100.0, 50.0),
-            cov: Matrix4::from_diagonal(&nalgebra::Vector4::new(0.01, 0.04, 1e-6, 4e-6)),
+            cov: MotionCov::from_diagonal(&[0.01, 0.04, 1e-6, 4e-6, 0.0, 0.0, 0.0, 0.0].into()),
             ..CameraMotion::exact_shift(Vector2::zeros())
         };
         assert_eq!(motion.cov_at(motion.centre_px), Matrix2::new(0.01, 0.0, 0.0, 0.04));

@@ -104,13 +104,14 @@ mod view;
 pub mod vision;
 pub mod world;
 
-pub use camera_motion::{CameraMotion, MotionBasis};
+pub(crate) use camera_motion::motion_jacobian;
+pub use camera_motion::{CameraMotion, MotionBasis, MotionCov};
 pub use config::Config;
 pub use cpu::cpu_features;
 pub use detection::{ClassId, DetectedVelocity, Detection, Extent, PositionFit, RadarPlot, Scan};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{Frame, FrameSource, PixelKind, Pixels, SourceInfo, Wanted};
-pub(crate) use homography::Homography;
+pub use homography::Homography;
 pub use image::Image;
 pub use record::{TrackFrame, TrackId, TrackInnovation, TrackState, TrackStatus};
 pub use similarity::Similarity;

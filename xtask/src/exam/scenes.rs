@@ -27,13 +27,18 @@ const COMPRESSED: &str = "simulated: 50 spots, 720p, H.264";
 const QUANTISER: u8 = 32;
 
 /// Kind, pan (px a frame), shake (px), turn (degrees a frame), growth (share a frame).
-const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 6] = [
+const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 11] = [
     ("simulated: still", [0.0, 0.0], 0.0, 0.0, 0.0),
+    ("simulated: pan 1", [1.0, 0.2], 0.0, 0.0, 0.0),
     ("simulated: pan 2", [2.0, 0.5], 0.0, 0.0, 0.0),
     ("simulated: pan 5", [5.0, -1.0], 0.0, 0.0, 0.0),
+    ("simulated: pan 10", [10.0, -2.0], 0.0, 0.0, 0.0),
+    ("simulated: pan 20", [20.0, 4.0], 0.0, 0.0, 0.0),
     ("simulated: shake 2.5", [0.0, 0.0], 2.5, 0.0, 0.0),
     ("simulated: turn 1 deg", [0.0, 0.0], 0.0, 1.0, 0.0),
+    ("simulated: turn 2 deg", [0.0, 0.0], 0.0, 2.0, 0.0),
     ("simulated: zoom 1 %", [0.0, 0.0], 0.0, 0.0, 0.01),
+    ("simulated: zoom 2 %", [0.0, 0.0], 0.0, 0.0, 0.02),
 ];
 
 /// Writes the scenes to a folder and returns them as clips.
@@ -80,7 +85,9 @@ fn over_ground(pan: [f64; 2], shake_px: f64, turn_deg: f64, growth: f64) -> Scen
         let shape =
             Shape::Spot(Spot { sigma_px: 0.0, psf_sigma_px: 1.5, total: 100.0 * std::f64::consts::TAU * 1.5 * 1.5 });
         // A panning camera goes with the targets: they move against the ground all the same.
-        let own = [speed[0] - 0.8 * pan[0], speed[1] - 0.8 * pan[1]];
+        // What is left of the pan in the image is a fifth of it, and at most 2 px a frame: faster, they would be out of it within half the sequence.
+        let goes_with = f64::max(0.8, 1.0 - 2.0 / pan[0].hypot(pan[1]).max(1.0));
+        let own = [0, 1].map(|i| speed[i] - goes_with * pan[i]);
         let at = |i: usize| middle[i] + from_middle[i] - half * (own[i] + pan[i]);
         Target { start_px: [at(0), at(1)], velocity_px_per_s: own.map(|v| RATE_HZ * v), shape, ..Target::default() }
     };

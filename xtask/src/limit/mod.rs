@@ -1,5 +1,6 @@
 //! `cargo xtask limit`: what is reached below the noise of a frame beside what was aimed at, as Markdown, written to docs/limit.md.
 
+mod camera;
 mod cost;
 mod crossing;
 mod curve;
@@ -17,7 +18,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost, positions. The page is then printed, not written.
+    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost, positions, camera. The page is then printed, not written.
     #[arg(default_value = "")]
     only: String,
     /// Windows of eight spots for each point of the curves.
@@ -32,13 +33,16 @@ pub struct Args {
     /// Fits for each row of positions.
     #[arg(long, default_value_t = 32_000)]
     fits: usize,
+    /// Pairs of views for the camera's motion.
+    #[arg(long, default_value_t = 2_000)]
+    pairs: usize,
     /// Keys set for the real clips.
     #[arg(long = "set")]
     sets: Vec<String>,
     /// Test data (default: `BORESIGHT_TEST_DATA`).
     #[arg(long)]
     data: Option<PathBuf>,
-    /// Python with NumPy, for the comparison of cost; with SciPy, trackpy and picassosr, for that of positions.
+    /// Python with NumPy, for the comparison of cost; with SciPy, trackpy and picassosr, for that of positions; with OpenCV, for that of the camera's motion.
     #[arg(long)]
     python: Option<PathBuf>,
 }
@@ -75,6 +79,9 @@ pub fn run(args: &Args) -> Result<()> {
     part("cost", include_str!("cost.txt").trim(), &mut |p| cost::table(args.python.as_deref(), p))?;
     part("positions", include_str!("positions.txt").trim(), &mut |p| {
         positions::table(args.fits, &data, args.python.as_deref(), p)
+    })?;
+    part("camera", include_str!("camera.txt").trim(), &mut |p| {
+        camera::table(args.pairs, &data, args.python.as_deref(), p)
     })?;
     if args.only.is_empty() {
         let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");

@@ -9,7 +9,7 @@ use super::run_summary::RunSummary;
 use super::stop::Stop;
 use crate::console::say;
 use crate::progress;
-use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, Thumbnail};
+use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, SteadyView, Thumbnail};
 use boresight::io::LengthUnit;
 use boresight::io::video::Mp4Options;
 use boresight::pipeline::{self, Input, Outcome, Summary};
@@ -65,6 +65,9 @@ pub struct Args {
     /// Also write the annotated frames as PNG files to DIR/frames.
     #[arg(long)]
     png: bool,
+    /// Write the annotated video, and the frames of --png, as a camera at rest would see them: the ground of the first frame stands still.
+    #[arg(long)]
+    steady: bool,
     /// Also write every frame's tracks as JSON lines to DIR/tracks.jsonl.
     #[arg(long)]
     json: bool,
@@ -260,11 +263,17 @@ fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> bore
     if folder.makes("annotated.mp4") {
         let path = folder.path("annotated.mp4");
         let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?;
-        sinks.push(Box::new(video.with_colours(colours(plan, input))));
+        sinks.push(match args.steady {
+            true => Box::new(SteadyView::new(Box::new(video)).with_colours(colours(plan, input))),
+            false => Box::new(video.with_colours(colours(plan, input))),
+        });
     }
     if folder.makes("frames/") {
         let pictures = PngFolder::create(folder.path("frames/"), DrawOptions::default())?;
-        sinks.push(Box::new(pictures.with_colours(colours(plan, input))));
+        sinks.push(match args.steady {
+            true => Box::new(SteadyView::new(Box::new(pictures)).with_colours(colours(plan, input))),
+            false => Box::new(pictures.with_colours(colours(plan, input))),
+        });
     }
     if folder.makes("thumbnail.png") {
         sinks.push(Box::new(Thumbnail::create(folder.path("thumbnail.png"), DrawOptions::default())?));

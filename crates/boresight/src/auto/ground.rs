@@ -1,7 +1,7 @@
 //! Where the first frame's ground lies in each of the frames that the choice looks at, and how far from it what stands may seem to lie.
 //!
 //! Source: our own. Frames with texture all over follow their plane ([`PlaneFollower`]), and each is registered with the first one once more, directly, as long as they
-//! share enough; the others follow the similarity of [`crate::camera::CameraMotionEstimator`]. A view from the air is a plane at best: what sticks out of it moves against it, as
+//! share enough; the others follow the motion of [`crate::camera::CameraMotionEstimator`]. A view from the air is a plane at best: what sticks out of it moves against it, as
 //! does all that stands around it. So of each cell of a grid the median distance of the patches around from the plane, since the first frame, is the ground's own deviation there; where
 //! half of them are not found near it, nothing is known of it ([`UNKNOWN_PX`]). Patches of mere noise have no say ([`SOLID_PX`]).
 //! Symbols: image_from_first (px of the frame); cells of the first frame.
@@ -9,7 +9,7 @@
 
 use crate::camera::{PlaneFollower, PlanePatches};
 use crate::vision::steadied::plane_image;
-use crate::{Frame, Homography, Image, Similarity};
+use crate::{Frame, Homography, Image};
 use nalgebra::Vector2;
 
 /// Where the first frame's ground lies.
@@ -34,18 +34,14 @@ const SOLID_FRAMES: usize = 3;
 /// Distances below this are the patches' own noise, px.
 const NOISE_PX: f64 = 0.1;
 /// Frames in none of which a plane was seen, after which it is looked for no more: a sky, or noise, where the search for it costs
-/// most. A quarter of the frames that the choice looks at; what comes into view later is followed by the similarity.
+/// most. A quarter of the frames that the choice looks at; what comes into view later is followed by the estimator's motion.
 const MOST_WITHOUT: usize = 12;
 /// The median of Rayleigh's distribution in deviations of an axis.
 const MEDIAN_SD: f64 = 1.1774;
 
-impl From<&Similarity> for Ground {
-    fn from(image_from_first: &Similarity) -> Self {
-        Self {
-            first_from_image: Homography::of_similarity(&image_from_first.inverse()),
-            spread_px: Vec::new(),
-            cell_px: Vector2::zeros(),
-        }
+impl From<&Homography> for Ground {
+    fn from(image_from_first: &Homography) -> Self {
+        Self { first_from_image: image_from_first.inverse(), spread_px: Vec::new(), cell_px: Vector2::zeros() }
     }
 }
 
@@ -84,8 +80,8 @@ fn spreads(residuals: &[(Vector2<f64>, Option<f64>)], (w, h): (usize, usize), ou
     }
 }
 
-/// The ground in each frame; `similar` are the motions from frame to frame by the similarity.
-pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
+/// The ground in each frame; `steps` are the estimator's motions from frame to frame.
+pub fn follow(frames: &[Frame], steps: &[Homography]) -> Vec<Ground> {
     let (mut plane, mut first_patches, mut first) =
         (PlaneFollower::default(), PlanePatches::default(), Image::default());
     let (mut line, mut now) = (Vec::new(), Image::default());
@@ -94,7 +90,7 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
     let (mut image_from_first, mut spread) = (Homography::identity(), Vec::new());
     let (mut residuals, mut solid) = (Vec::new(), Vec::new());
     let (mut factor, mut ever_seen) = (1, false);
-    for (k, (frame, similar)) in frames.iter().zip(similar).enumerate() {
+    for (k, (frame, step)) in frames.iter().zip(steps).enumerate() {
         let looks = ever_seen || k < MOST_WITHOUT;
         if looks {
             factor = plane_image(&frame.pixels, &mut line, &mut now);
@@ -123,9 +119,7 @@ pub fn follow(frames: &[Frame], similar: &[Similarity]) -> Vec<Ground> {
                 first_patches.choose(&now);
                 first.clone_from(&now);
             }
-            None => {
-                image_from_first = image_from_first.then(&grow.then(&Homography::of_similarity(similar)).then(&shrink))
-            }
+            None => image_from_first = image_from_first.then(&grow.then(step).then(&shrink)),
         }
         if looks {
             plane.keep(&mut now);
@@ -173,20 +167,20 @@ mod tests {
     }
 
     /// How far the ground's origin has gone, px.
-    fn gone(n: u64, from: u64, similar: Similarity) -> f64 {
+    fn gone(n: u64, from: u64, step: Homography) -> f64 {
         let frames = frames(n, from);
-        let ground = follow(&frames, &vec![similar; frames.len()]);
+        let ground = follow(&frames, &vec![step; frames.len()]);
         -ground[frames.len() - 1].of(Vector2::zeros()).x
     }
 
     #[test]
     fn a_plane_that_is_seen_within_the_first_frames_is_followed_and_later_ones_are_not_looked_for() {
-        let nothing = Similarity::identity();
+        let nothing = Homography::identity();
         let late = MOST_WITHOUT as u64;
         assert!((gone(late + 8, late - 4, nothing) - 2.0 * 11.0).abs() < 0.5);
         assert!(gone(late + 8, late + 2, nothing).abs() < 1e-9);
-        // The similarity of the frames says it then, each on the one before.
-        let shift = Similarity::shift(Vector2::new(2.0, 0.0));
+        // The motions of the frames say it then, each on the one before.
+        let shift = Homography::shift(Vector2::new(2.0, 0.0));
         let n = late + 8;
         assert!((gone(n, late + 2, shift) - 2.0 * (n - 1) as f64).abs() < 1e-9);
     }

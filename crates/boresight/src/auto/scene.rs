@@ -21,7 +21,7 @@ use crate::vision::config::{ClusterConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Frame, Image, MotionBasis, PixelKind, Pixels, Result, Similarity, SourceInfo};
+use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Pixels, Result, SourceInfo};
 use nalgebra::Vector2;
 
 /// Width of the grid, px.
@@ -174,11 +174,11 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
 fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Ground>) {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
-    let (mut moved, mut steps) = (Similarity::identity(), Vec::with_capacity(frames.len()));
+    let (mut moved, mut steps) = (Homography::identity(), Vec::with_capacity(frames.len()));
     let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     for frame in frames {
         let step = motion.step(&frame.pixels);
-        steps.push(step.map_or(Similarity::identity(), |s| s.now_from_before));
+        steps.push(step.map_or(Homography::identity(), |s| s.now_from_before));
         if let Some(step) = step {
             moved = moved.then(&step.now_from_before);
             if step.basis != MotionBasis::Held {

@@ -67,7 +67,7 @@ mod tests {
         let detection = |k: usize| Detection::point(k as f64, 0.0, 0.1).with_score(k as f32);
         let scan = Scan::at(FrameIndex(0), Timestamp::from_ns(0)).with_detections((0..400).map(detection).collect());
         // The image lies 3 px to the right of the ground.
-        let ground = Ground::from(&crate::Similarity::shift(Vector2::new(3.0, 0.0)));
+        let ground = Ground::from(&crate::Homography::shift(Vector2::new(3.0, 0.0)));
         let seen = Sightings::of(&scan, Some(&ground));
         assert_eq!(seen.all.len(), MOST_A_SCAN);
         assert_eq!(seen.all[0].at, Vector2::new(396.0, 0.0));

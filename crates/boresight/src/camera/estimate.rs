@@ -2,21 +2,26 @@
 //!
 //! Source: our own; block matching against a key frame with a consensus, as every video stabiliser does it in some form.
 //! How: the frame is made small ([`super::reduce`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
-//! ([`super::course`]) leads them ([`super::find_patch`]); a shift, or a shift with turn and zoom, is fitted to where they are ([`super::fit`]).
+//! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
+//! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
+//! is chosen by what they say ([`super::plane`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest until its corners have moved by [`STILL`]; it comes to rest
 //! again after [`REST_FRAMES`] within that.
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
-//! again or, where the last frame is found, replaced by that one. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
+//! again or, where the last frame is found, replaced. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
-//! Limits: one plane; [`SEARCH`] reduced px a frame beyond what the course expects. At a new key frame its error stays in the ground for good.
+//! Limits: one plane. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
-use super::find_patch::{SEARCH, find};
-use super::fit::{AGREE, AGREE_EVEN, Expected, Fit, Match, fit};
-use super::key_frame::{KeyFrame, MIN_PATCHES};
+use super::find_patch::{SEARCH, Vote, find, vote};
+use super::fine::{FinePatches, fine_factor};
+use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match, fit};
+use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
+use super::plane::{self, Limits, corners_apart};
 use super::reduce::{factor, reduce};
-use crate::{CameraMotion, Image, MotionBasis, Pixels, Similarity};
-use nalgebra::{Matrix4, Vector2, Vector4};
+use super::wide::Wide;
+use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity};
+use nalgebra::{Matrix3, Matrix4, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +47,16 @@ const KEY_SHARE: f64 = 0.25;
 const KEY_TURN: f64 = 0.25;
 /// Frames that are bridged at most: half a second at 25 frames/s.
 const MOST_HELD: u32 = 12;
+/// Share of the image's cells that the background shows in, at least: a target that covers a third of the image shows in more than half of them, for it touches cells that it does not
+/// fill. Where it shows in fewer, as below a sky, a first motion is believed once it was found in so many frames one after the other.
+const LEAST_COVER: f64 = 0.6;
+/// Where this share agrees the others are not asked.
+const CLEAR_COVER: f64 = 0.75;
+const UNSURE_FRAMES: u32 = 3;
+/// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
+const FINE_FOUND: f64 = 0.5;
+/// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
+const FINE_LOST_PX: f64 = 0.5;
 
 /// Follows the background from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -49,19 +64,23 @@ pub struct CameraMotionEstimator {
     now: Image<f32>,
     sums: Vec<f32>,
     key: KeyFrame,
+    fine: FinePatches,
+    wide: Wide,
     /// The last frame: where the key frame is not found it takes its place.
     last: KeyFrame,
     key_is_last: bool,
-    from_key: Similarity,
+    from_key: Homography,
     course: Course,
     /// Whether a motion was measured that the course goes on from.
     known: bool,
+    /// Frames, one after the other, in which a first motion was found that shows in too few places.
+    n_unsure: u32,
     /// Whether turn or zoom changed in the last frame.
     turning: bool,
     rest: Rest,
     n_held: u32,
     /// What is left of the uncertainty of frames that were bridged.
-    carried: Matrix4<f64>,
+    carried: MotionCov,
     matches: Vec<Match>,
     weights: Vec<f64>,
 }
@@ -71,138 +90,248 @@ pub struct CameraMotionEstimator {
 struct Rest {
     moving: bool,
     /// Where it was when the last quiet time began, and how many frames that is ago.
-    began_at: Similarity,
+    began_at: Homography,
     n_quiet: u32,
+}
+
+/// Where the key frame's background lies now, reduced px.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    now_from_key: Homography,
+    cov: MotionCov,
+    turned: bool,
+    /// Whether it shows in enough of the image to be the background's beyond doubt.
+    covers: bool,
+}
+
+/// The frame's sizes.
+#[derive(Clone, Copy, Debug)]
+struct Scales {
+    /// The reduced frame's middle, reduced px.
+    middle: Vector2<f64>,
+    /// Side of a block of the frame that becomes a reduced pixel, and a fine one.
+    factor: usize,
+    fine: usize,
 }
 
 impl CameraMotionEstimator {
     /// Takes the next frame and returns the background's motion since the last one; `None` where nothing can be said.
     pub fn step(&mut self, pixels: &Pixels) -> Option<CameraMotion> {
         reduce(pixels, &mut self.now, &mut self.sums);
-        let factor = factor(pixels.width());
+        let middle = 0.5 * Vector2::new(self.now.width() as f64 - 1.0, self.now.height() as f64 - 1.0);
+        let scales = Scales { middle, factor: factor(pixels.width()), fine: fine_factor(pixels.width()) };
         if (self.key.image.width(), self.key.image.height()) != (self.now.width(), self.now.height()) {
-            self.start_anew();
+            self.start_anew(pixels, &scales);
             return None;
         }
-        let middle = self.middle();
-        let mut found = self.look(false, middle);
-        let at_last = found.is_none();
-        if found.is_none() {
-            self.last.choose();
-            found = self.look(true, middle);
+        let mut found = self.find(pixels, &scales);
+        let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
+        self.n_unsure = if is_unsure { self.n_unsure + 1 } else { 0 };
+        if is_unsure && self.n_unsure < UNSURE_FRAMES {
+            found = None;
         }
-        if found.is_none() && self.rest.moving && !self.last.even {
-            // The few patches that stand out do not agree: the many weak ones may.
-            self.last.choose_even();
-            found = self.look(true, middle);
-        }
+        let at_last = found.is_some_and(|f| f.1);
         self.last.forget();
         self.key_is_last = false;
         let (step, cov, basis) = match found {
-            Some(found) => self.measured(found, at_last, middle),
-            None => self.held(middle)?,
+            Some((found, _)) => self.measured(found, at_last, pixels, &scales),
+            None => self.held(pixels, &scales)?,
         };
         if !self.key_is_last {
             self.last.keep(&mut self.now);
         }
-        Some(full_size(&step, &cov, basis, middle, factor))
-    }
-
-    fn middle(&self) -> Vector2<f64> {
-        0.5 * Vector2::new(self.now.width() as f64 - 1.0, self.now.height() as f64 - 1.0)
+        Some(full_size(&step, &cov, basis, &scales))
     }
 
     /// Forgets all that was; the frame is the key frame.
-    fn start_anew(&mut self) {
+    fn start_anew(&mut self, pixels: &Pixels, scales: &Scales) {
         self.key.take(&mut self.now);
+        self.fine.choose(pixels, scales.factor, &self.key.places);
         self.last.forget();
-        self.from_key = Similarity::identity();
+        self.from_key = Homography::identity();
         self.course = Course::default();
         (self.known, self.turning, self.n_held) = (false, false, 0);
         self.rest = Rest::default();
-        self.carried = Matrix4::zeros();
+        self.carried = MotionCov::zeros();
     }
 
-    /// Looks for the patches of the key frame, or of the last frame.
-    fn look(&mut self, at_last: bool, middle: Vector2<f64>) -> Option<Fit> {
-        let (key, last) = match at_last {
-            true => (&self.last, Similarity::identity()),
-            false => (&self.key, self.from_key),
-        };
-        let predicted = last.then(&self.course.next(middle));
+    /// Looks for the key frame, then for the last one, then for both all over; whether it was the last one that was found, which is the key frame then.
+    fn find(&mut self, pixels: &Pixels, scales: &Scales) -> Option<(Found, bool)> {
+        let along = self.course.next(scales.middle);
+        let next = Homography::of_similarity(&along);
+        let key_next = self.from_key.then(&next);
+        if let Some(found) = self.look(false, &key_next, pixels, scales) {
+            return Some((found, false));
+        }
+        self.last.choose();
+        if let Some(found) = self.look(true, &next, pixels, scales) {
+            return Some((found, true));
+        }
+        for at_last in [false, true] {
+            let (key, start) = if at_last { (&self.last, &next) } else { (&self.key, &key_next) };
+            if !key.patches.is_empty()
+                && let Some(predicted) = self.wide.look(&key.image, &self.now, &start.similarity_at(scales.middle))
+                && let Some(found) = self.look(at_last, &predicted, pixels, scales)
+            {
+                return Some((found, at_last));
+            }
+        }
+        if self.rest.moving && !self.last.even {
+            // The few patches that stand out do not agree: the many weak ones may.
+            self.last.choose_even();
+            return self.look(true, &next, pixels, scales).map(|f| (f, true));
+        }
+        None
+    }
+
+    /// Looks for the patches of the key frame, or of the last frame, where that motion leads them.
+    fn look(&mut self, at_last: bool, predicted: &Homography, pixels: &Pixels, scales: &Scales) -> Option<Found> {
+        let middle = scales.middle;
+        let last = if at_last { Homography::identity() } else { self.from_key };
+        let key = if at_last { &self.last } else { &self.key };
         self.matches.clear();
         for p in &key.patches {
-            let to = find(&key.image, &self.now, *p, &predicted);
+            let to = find(&key.image, &self.now, *p, &predicted.similarity_at(p.middle()));
             self.matches.extend(to.map(|to| Match { from: p.middle(), to, weight: p.weight }));
         }
-        let least_turn_px = if self.turning { 0.0 } else { STILL };
         let agree_px = if key.even { AGREE_EVEN } else { AGREE };
-        let expected = Expected { predicted, last, middle, least_turn_px, agree_px };
-        let found = fit(&self.matches, &expected, &mut self.weights)?;
-        let moved = corners_apart(&found.now_from_key, &Similarity::identity(), middle) > BELIEVED;
+        let coarse = coarse(&mut self.matches, predicted, &last, &mut self.weights, &|predicted, last| Expected {
+            predicted,
+            last,
+            middle,
+            least_turn_px: if self.turning { 0.0 } else { STILL },
+            agree_px,
+        })?;
+        // What is no similarity bends the coarse matches already.
+        let limits = Limits { least_px: STILL, most_px: BEND * agree_px };
+        let start =
+            plane::fit(&self.matches, &coarse.now_from_key, middle, limits).map_or(coarse.now_from_key, |p| p.to_from);
+        // Where the patches that agree are not most of the image's, a thing of much texture may have outvoted the rest.
+        let agrees = |m: &&Match| (start.apply(m.from) - m.to).norm() <= agree_px;
+        let n_agree = self.matches.iter().filter(agrees).count();
+        let n_cells = CELLS.0 * CELLS.1;
+        let mut covers = true;
+        if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
+            let (mut n_for, mut n_against) = (0, 0);
+            for p in key.patches.iter().chain(&key.weak) {
+                let from = p.middle();
+                let places = [start.apply(from), last.apply(from)];
+                match vote((&key.image, &self.now), *p, &predicted.similarity_at(from), places, agree_px) {
+                    Vote::For => n_for += 1,
+                    Vote::Against => n_against += 1,
+                    Vote::Neither => {}
+                }
+            }
+            if n_against >= MIN_PATCHES && n_against > n_for {
+                return None;
+            }
+            covers = n_for.max(n_agree) as f64 >= LEAST_COVER * n_cells as f64;
+        }
+        let found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
+            Some(fine) => Found { covers, ..fine },
+            // Nothing else speaks for it.
+            None => Found { covers: false, ..coarse },
+        };
+        let moved = corners_apart(&found.now_from_key, &Homography::identity(), middle) > BELIEVED;
+        let key = if at_last { &self.last } else { &self.key };
         if key.even && !key.proven && !moved {
             return None;
         }
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
             std::mem::swap(&mut self.key, &mut self.last);
-            self.from_key = Similarity::identity();
-            self.rest.began_at = Similarity::identity();
+            self.fine.clear();
+            self.from_key = Homography::identity();
+            self.rest.began_at = Homography::identity();
         }
         self.key.proven |= moved;
         Some(found)
     }
 
+    /// The motion from the key frame by patches of the frame itself, near a coarse one.
+    fn sharpen(&mut self, coarse: &Homography, pixels: &Pixels, scales: &Scales) -> Option<Found> {
+        let middle = scales.middle;
+        let predicted = scaled(coarse, scales.factor, scales.fine);
+        let n = self.fine.find(pixels, &predicted, &mut self.matches);
+        if (self.matches.len() as f64) < FINE_FOUND * n as f64 {
+            return None;
+        }
+        let scale = scales.factor as f64 / scales.fine as f64;
+        let fine_middle = scale * middle + Vector2::repeat(0.5 * (scale - 1.0));
+        let limits = Limits { least_px: if self.turning { 0.0 } else { STILL }, ..Limits::NONE };
+        let plane = plane::fit(&self.matches, &predicted, fine_middle, limits)?;
+        if plane.spread_px > FINE_LOST_PX || plane.share < FINE_FOUND {
+            return None;
+        }
+        Some(Found {
+            now_from_key: scaled(&plane.to_from, scales.fine, scales.factor),
+            cov: scaled_cov(&plane.cov, 1.0 / scale),
+            turned: plane.n_numbers > 2,
+            covers: true,
+        })
+    }
+
     /// The motion by a fit, to the key frame or, `at_last`, to the frame before.
-    fn measured(&mut self, found: Fit, at_last: bool, middle: Vector2<f64>) -> (Similarity, Matrix4<f64>, MotionBasis) {
+    fn measured(
+        &mut self,
+        found: Found,
+        at_last: bool,
+        pixels: &Pixels,
+        scales: &Scales,
+    ) -> (Homography, MotionCov, MotionBasis) {
+        let middle = scales.middle;
         let before = self.from_key;
         self.from_key = self.rest.settle(&before, &found.now_from_key, middle);
-        let step = if self.from_key == before { Similarity::identity() } else { before.inverse().then(&self.from_key) };
+        let step = if self.from_key == before { Homography::identity() } else { before.inverse().then(&self.from_key) };
         self.turning = found.turned && self.rest.moving;
         // A step over bridged frames is none of one frame.
         match self.n_held {
-            0 => self.course.learn(&step, middle),
+            0 => self.course.learn(&step.similarity_at(middle), middle),
             _ => self.course.found(),
         }
         let basis = if self.n_held > 0 && at_last { MotionBasis::Resumed } else { MotionBasis::Measured };
         (self.known, self.n_held) = (true, 0);
-        let own = if self.rest.moving { found.cov } else { Matrix4::zeros() };
+        let own = if self.rest.moving { found.cov } else { MotionCov::zeros() };
         let cov = own + self.carried;
         // Tracks take the ground's new place up with their updates; what is below a thousandth of a pixel is none.
-        self.carried = if self.carried.max() > 1e-6 { 0.5 * self.carried } else { Matrix4::zeros() };
+        self.carried = if self.carried.max() > 1e-6 { 0.5 * self.carried } else { MotionCov::zeros() };
         let shift = self.from_key.shift_at(middle).abs();
         let far = shift.x > 2.0 * KEY_SHARE * middle.x || shift.y > 2.0 * KEY_SHARE * middle.y;
-        let turned = self.from_key.angle_rad().abs() > KEY_TURN || self.from_key.zoom().ln().abs() > KEY_TURN;
+        let linear = self.from_key.similarity_at(middle);
+        let turned = linear.angle_rad().abs() > KEY_TURN || linear.zoom().ln().abs() > KEY_TURN;
         // Soon too few patches would be left to agree; a camera at rest keeps its key frame, and with it its place.
         let few = self.rest.moving && self.matches.len() < MIN_PATCHES + 2;
-        if far || turned || few {
-            self.new_key();
+        // The last frame's own pixels are gone: this one is as good a key, unless its even texture must first be seen to move.
+        let blunt = at_last && !self.key.even;
+        if far || turned || few || blunt {
+            self.new_key(pixels, scales);
         }
         (step, cov, basis)
     }
 
-    fn new_key(&mut self) {
+    fn new_key(&mut self, pixels: &Pixels, scales: &Scales) {
         self.key.take(&mut self.now);
+        self.fine.choose(pixels, scales.factor, &self.key.places);
         self.key_is_last = true;
         self.rest.began_at = self.from_key.inverse().then(&self.rest.began_at);
-        self.from_key = Similarity::identity();
+        self.from_key = Homography::identity();
     }
 
     /// The motion where nothing was found; `None` where it is unknown.
-    fn held(&mut self, middle: Vector2<f64>) -> Option<(Similarity, Matrix4<f64>, MotionBasis)> {
+    fn held(&mut self, pixels: &Pixels, scales: &Scales) -> Option<(Homography, MotionCov, MotionBasis)> {
         if !self.known {
             // An even texture may yet be seen to move; anything else is no key frame.
             let may_move = self.key.even && !self.matches.is_empty();
             if !may_move {
-                self.start_anew();
+                self.start_anew(pixels, scales);
             }
             return None;
         }
-        let step = self.course.next(middle);
-        let grown = self.course.hold();
+        let step = Homography::of_similarity(&self.course.next(scales.middle));
+        let grown = of_similarity(&self.course.hold());
         self.n_held += 1;
         if self.n_held > MOST_HELD || 2.0 * grown[(0, 0)].sqrt() > SEARCH as f64 {
-            self.start_anew();
+            self.start_anew(pixels, scales);
             return None;
         }
         self.from_key = self.from_key.then(&step);
@@ -213,7 +342,7 @@ impl CameraMotionEstimator {
 
 impl Rest {
     /// Where the background is, by a fit: where it was, as long as the camera is at rest.
-    fn settle(&mut self, before: &Similarity, fitted: &Similarity, middle: Vector2<f64>) -> Similarity {
+    fn settle(&mut self, before: &Homography, fitted: &Homography, middle: Vector2<f64>) -> Homography {
         if !self.moving {
             if corners_apart(fitted, before, middle) <= STILL {
                 return *before;
@@ -229,34 +358,61 @@ impl Rest {
     }
 }
 
-/// The farthest distance between what two motions make of the image's corners.
-fn corners_apart(a: &Similarity, b: &Similarity, middle: Vector2<f64>) -> f64 {
-    let corners =
-        [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)].map(|(x, y)| Vector2::new(x * middle.x, y * middle.y));
-    if a.is_shift() && b.is_shift() {
-        return (a.shift_at(middle) - b.shift_at(middle)).norm();
+/// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
+fn coarse(
+    matches: &mut [Match],
+    predicted: &Homography,
+    last: &Homography,
+    weights: &mut Vec<f64>,
+    expected: &dyn Fn(Similarity, Similarity) -> Expected,
+) -> Option<Found> {
+    let m = predicted.matrix();
+    let is_similar = m[(0, 0)] == m[(1, 1)] && m[(0, 1)] == -m[(1, 0)] && m[(2, 0)] == 0.0 && m[(2, 1)] == 0.0;
+    let similarity = |h: &Homography| h.similarity_at(Vector2::zeros());
+    if is_similar {
+        let fit = fit(matches, &expected(similarity(predicted), similarity(last)), weights)?;
+        let now_from_key = Homography::of_similarity(&fit.now_from_key);
+        return Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: fit.turned, covers: true });
     }
-    corners.into_iter().map(|c| (a.apply(c) - b.apply(c)).norm()).fold(0.0, f64::max)
+    let none = Similarity::identity();
+    matches.iter_mut().for_each(|m| m.from = predicted.apply(m.from));
+    let fit = fit(matches, &expected(none, none), weights);
+    let back = predicted.inverse();
+    matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
+    let fit = fit?;
+    let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
+    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true })
 }
 
-/// A motion of the reduced frame as that of the frame: a reduced pixel's middle is that of its block.
-fn full_size(
-    step: &Similarity,
-    cov: &Matrix4<f64>,
-    basis: MotionBasis,
-    middle: Vector2<f64>,
-    factor: usize,
-) -> CameraMotion {
-    let f = factor as f64;
-    let first = Vector2::repeat(0.5 * (f - 1.0));
-    let centre_px = f * middle + first;
-    let now_from_before = if step.is_shift() {
-        Similarity::shift(f * step.shift_at(middle))
-    } else {
-        Similarity::about(centre_px, f * step.shift_at(middle), step.angle_rad(), step.zoom())
-    };
-    let scale = Matrix4::from_diagonal(&Vector4::new(f, f, 1.0, 1.0));
-    CameraMotion { now_from_before, centre_px, cov: scale * cov * scale, basis }
+/// A similarity's covariance among the eight numbers.
+fn of_similarity(cov: &Matrix4<f64>) -> MotionCov {
+    let mut out = MotionCov::zeros();
+    out.fixed_view_mut::<4, 4>(0, 0).copy_from(cov);
+    out
+}
+
+/// A motion of an image in means of blocks of `from` px as that of one in blocks of `to` px: a mean's middle is that of its block.
+fn scaled(motion: &Homography, from: usize, to: usize) -> Homography {
+    let scale = from as f64 / to as f64;
+    if motion.is_shift() {
+        return Homography::shift(scale * motion.shift_at(Vector2::zeros()));
+    }
+    let first = 0.5 * (scale - 1.0);
+    let grow = Homography::of_matrix(Matrix3::new(scale, 0.0, first, 0.0, scale, first, 0.0, 0.0, 1.0));
+    grow.map_or(*motion, |grow| grow.inverse().then(motion).then(&grow))
+}
+
+/// The covariance of the eight numbers where lengths are `scale` times as many pixels.
+fn scaled_cov(cov: &MotionCov, scale: f64) -> MotionCov {
+    let unit = |i: usize| [scale, 1.0, 1.0, 1.0 / scale][i / 2];
+    MotionCov::from_fn(|i, j| cov[(i, j)] * unit(i) * unit(j))
+}
+
+/// A motion of the reduced frame as that of the frame.
+fn full_size(step: &Homography, cov: &MotionCov, basis: MotionBasis, scales: &Scales) -> CameraMotion {
+    let f = scales.factor as f64;
+    let centre_px = f * scales.middle + Vector2::repeat(0.5 * (f - 1.0));
+    CameraMotion { now_from_before: scaled(step, scales.factor, 1), centre_px, cov: scaled_cov(cov, f), basis }
 }
 
 #[cfg(test)]

@@ -16,14 +16,16 @@ use nalgebra::{Matrix4, Vector2, Vector4};
 /// little above the noise: its patches are found to about half a pixel, and all cells of the image vote.
 pub(super) const AGREE: f64 = 0.7;
 pub(super) const AGREE_EVEN: f64 = 1.5;
+/// So many times as far from a similarity that agrees with its middle a bent image is looked for.
+pub(super) const BEND: f64 = 4.0;
 /// Share of all weight that the winner needs.
 const MAJORITY: f64 = 0.4;
 /// A shift with this share of the weight needs no hypotheses of turn and zoom beside it: the fit finds them.
 const CLEAR: f64 = 0.9;
 /// Matches that a similarity needs: its four numbers and as many again.
 const MIN_TURNED: usize = 8;
-/// Turn (rad) and growth of one frame beyond the predicted ones: 3 degrees, 5 %.
-const MOST_TURN: f64 = 0.05;
+/// Turn (rad) and growth of one frame beyond the predicted ones: 4 degrees, 7 %.
+const MOST_TURN: f64 = 0.07;
 /// Distance between the two matches of a hypothesis, share of the image's width: nearer ones tell no turn.
 const LEAST_BASE: f64 = 0.25;
 /// F with 2 and about 20 degrees of freedom at 0.1 per thousand.

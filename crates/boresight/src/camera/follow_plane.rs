@@ -9,7 +9,7 @@ use crate::{Homography, Image};
 
 /// Follows the plane of a sequence of images of one size.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct PlaneFollower {
+pub struct PlaneFollower {
     last: Image<f32>,
     last_patches: PlanePatches,
     patches: PlanePatches,
@@ -48,7 +48,7 @@ impl PlaneFollower {
     }
 
     /// The patches of the image of the last step.
-    pub fn patches(&self) -> &PlanePatches {
+    pub(crate) fn patches(&self) -> &PlanePatches {
         &self.patches
     }
 

@@ -5,6 +5,7 @@
 //! quarter: before a sky the quiet quarter is noise, whose fixed pattern stands still whatever the camera does.
 //! Where fewer than [`MIN_PATCHES`] stand out so, the texture is even (fields, a forest from the air) or there is none: then every cell's
 //! best has the same vote, and the key frame is marked `even`: its word is to be believed only once it has seen the image move.
+//! Besides, the best of each half of a cell is a place where the frame itself is looked at ([`super::fine`]): two for each patch, by the same rules.
 //! Units: reduced px. Limits: frames below 48 reduced px a side have no patches.
 
 use crate::Image;
@@ -15,7 +16,7 @@ pub(super) const PATCH: usize = 12;
 /// Patches that must agree.
 pub(super) const MIN_PATCHES: usize = 6;
 /// Cells of the key frame in x and y, each with one patch.
-const CELLS: (usize, usize) = (8, 6);
+pub(super) const CELLS: (usize, usize) = (8, 6);
 /// From one place that a patch is looked for at to the next, reduced px.
 const STEP: usize = 4;
 /// Texture below this many times that of the image's quiet quarter does not stand out.
@@ -54,6 +55,10 @@ struct Textured {
 pub(super) struct KeyFrame {
     pub image: Image<f32>,
     pub patches: Vec<Patch>,
+    /// The best of the other cells, which have no vote but may object.
+    pub weak: Vec<Patch>,
+    /// Where the frame itself is worth a look.
+    pub places: Vec<Patch>,
     /// No patch stands out from the others.
     pub even: bool,
     /// It has seen the image move.
@@ -63,6 +68,7 @@ pub(super) struct KeyFrame {
     /// By column, the sums of the absolute gradients along x and y over the rows of a patch.
     gradients: Vec<[f32; 2]>,
     best: Vec<Textured>,
+    best_of_halves: Vec<Textured>,
 }
 
 impl KeyFrame {
@@ -77,12 +83,17 @@ impl KeyFrame {
         std::mem::swap(&mut self.image, frame);
         self.chosen = false;
         self.patches.clear();
+        self.weak.clear();
+        self.places.clear();
     }
 
     /// Is to be looked for no more.
     pub fn forget(&mut self) {
         self.patches.clear();
+        self.weak.clear();
+        self.places.clear();
         self.best.clear();
+        self.best_of_halves.clear();
         self.chosen = true;
     }
 
@@ -90,8 +101,12 @@ impl KeyFrame {
     pub fn choose_even(&mut self) {
         (self.chosen, self.even, self.proven) = (true, true, false);
         self.patches.clear();
+        self.weak.clear();
         let textured = self.best.iter().filter(|b| b.texture > 0.0);
         self.patches.extend(textured.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
+        self.places.clear();
+        let textured = self.best_of_halves.iter().filter(|b| b.texture > 0.0);
+        self.places.extend(textured.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
     }
 
     /// Chooses the patches, if that was not done.
@@ -115,11 +130,12 @@ impl KeyFrame {
         // A few outstanding things may be targets: they count no more than the next. The square holds down the many weak ones, which
         // in a compressed video are often mere copies of the frame before.
         let cap = self.best[MIN_PATCHES - 1].texture - quiet;
-        self.patches.extend(self.best[..n_clear].iter().map(|b| Patch {
-            x: b.x,
-            y: b.y,
-            weight: f64::from((b.texture - quiet).min(cap) / cap).powi(2),
-        }));
+        let patch =
+            |b: &Textured| Patch { x: b.x, y: b.y, weight: f64::from((b.texture - quiet).min(cap) / cap).powi(2) };
+        self.patches.extend(self.best[..n_clear].iter().map(patch));
+        let weak = self.best[n_clear..].iter().filter(|b| b.texture > 0.0);
+        self.weak.extend(weak.map(|b| Patch { x: b.x, y: b.y, weight: 1.0 }));
+        self.places.extend(self.best_of_halves.iter().filter(|b| b.texture > quiet).map(patch));
     }
 
     fn find_best(&mut self) {
@@ -127,23 +143,26 @@ impl KeyFrame {
         let (w, h) = (image.width(), image.height());
         self.textures.clear();
         self.best.clear();
+        self.best_of_halves.clear();
         if w < 4 * PATCH || h < 4 * PATCH {
             return;
         }
         for cy in 0..CELLS.1 {
-            let mut tops: [Option<Textured>; CELLS.0] = [None; CELLS.0];
+            let mut tops: [[Option<Textured>; 2]; CELLS.0] = [[None; 2]; CELLS.0];
             for y in (h * cy / CELLS.1..h * (cy + 1) / CELLS.1).step_by(STEP).take_while(|y| y + PATCH + 1 < h) {
                 self.gradients.clear();
                 self.gradients.resize(w - 1, [0.0; 2]);
                 for r in y..y + PATCH {
                     add_gradients(image.row(r), image.row(r + 1), &mut self.gradients);
                 }
-                for (cx, top) in tops.iter_mut().enumerate() {
-                    let columns = (w * cx / CELLS.0..w * (cx + 1) / CELLS.0).step_by(STEP);
+                for (cx, halves) in tops.iter_mut().enumerate() {
+                    let (first, end) = (w * cx / CELLS.0, w * (cx + 1) / CELLS.0);
+                    let columns = (first..end).step_by(STEP);
                     for x in columns.take_while(|x| x + PATCH + 1 < w) {
                         let texture = texture(&self.gradients[x..x + PATCH]);
                         if texture.is_finite() {
                             self.textures.push(texture);
+                            let top = &mut halves[usize::from(2 * x >= first + end)];
                             if top.as_ref().is_none_or(|t| texture > t.texture) {
                                 *top = Some(Textured { texture, cell: cy * CELLS.0 + cx, x, y });
                             }
@@ -151,7 +170,13 @@ impl KeyFrame {
                     }
                 }
             }
-            self.best.extend(tops.into_iter().flatten());
+            // Of two alike the left one, as in the order that they were looked at.
+            let best = |h: [Option<Textured>; 2]| match h {
+                [Some(a), Some(b)] if b.texture > a.texture => Some(b),
+                [a, b] => a.or(b),
+            };
+            self.best.extend(tops.into_iter().filter_map(best));
+            self.best_of_halves.extend(tops.into_iter().flatten().flatten());
         }
     }
 }

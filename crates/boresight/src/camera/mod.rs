@@ -7,6 +7,7 @@
 mod course;
 mod estimate;
 mod find_patch;
+mod fine;
 mod fit;
 mod follow_plane;
 mod key_frame;
@@ -15,10 +16,12 @@ mod plane;
 mod reduce;
 mod register;
 mod steady;
+mod wide;
 mod wide_search;
 
 pub use estimate::{CameraConfig, CameraMotionEstimator};
-pub(crate) use follow_plane::PlaneFollower;
+pub use follow_plane::PlaneFollower;
 pub use motion::CameraPath;
 pub(crate) use register::PlanePatches;
+pub use register::Registration;
 pub use steady::SteadyGround;

@@ -1,17 +1,18 @@
-//! The motion of a plane from matches of its points: a translation, similarity, affine or projective correction of a prediction, chosen by evidence.
+//! The motion of a plane from matches of its points: a translation, similarity, affine or projective one, chosen by evidence, with its covariance.
 //!
-//! Source: Gauss-Newton on the first-order basis of each group about the prediction, with Tukey's biweight; the choice by the Bayesian information
-//! criterion (G. Schwarz, *Annals of Statistics* 6, 1978) with a robust loss at one scale for all groups, as P. Torr has it for image motions (*IJCV* 50, 2002).
-//! How: residuals are small beforehand (a patch is looked for within a pixel), so that no sampling is needed: the weights' reach falls from three times
-//! the median residual's deviation on. The larger groups contain the smaller ones; each is fitted from the same prediction.
-//! Symbols: u = (p - middle) / half width, in (-1, 1); d displacement (px) = Σ θ_i b_i(u), b = (1, 0), (0, 1) | u, (-v, u) | (u, -v), (v, u) | u u, v u;
-//! k parameters; criterion = Σ ρ(r / s) + k ln(2 m), s the least of the groups' robust deviations of an axis, ρ Tukey's loss (r²/s² for small r), m the
+//! Source: Gauss-Newton on the first-order basis of each group, with Tukey's biweight; the choice by the Bayesian information
+//! criterion (G. Schwarz, *Annals of Statistics* 6, 1978) with a robust loss at one scale for all groups, as P. Torr has it for image motions (*IJCV* 50, 2002);
+//! the covariance that of an M-estimator whose matches are not alike (P. Huber, *Robust Statistics*, 1981, section 7.6), with the factor n / (n - k) for the numbers fitted.
+//! How: each group is fitted from what it can take over of the start, so that no sampling is needed: the weights' reach falls from three times
+//! the median residual's deviation on. The larger groups contain the smaller ones.
+//! Symbols: u = (q - middle) / half width, in (-1, 1), q the place now; d displacement (px) = Σ θ_i b_i(u), b = (1, 0), (0, 1) | (-v, u), u | (u, -v), (v, u) | u u, v u;
+//! k parameters; criterion = Σ w ρ(r / s) + k ln(2 Σ w), s the least of the groups' robust deviations of an axis, ρ Tukey's loss (r²/s² for small r), the second sum over the
 //! matches within its reach. A median's deviation of each group in the place of ρ would scatter more than the few numbers that it is to decide about.
-//! Limits: one plane; what lies off it is a residual (parallax), of which [`Plane::spread_px`] knows.
+//! Limits: one plane; what lies off it is a residual (parallax), of which [`Plane::spread_px`] and the covariance know as far as it is not common to all.
 
 use super::fit::Match;
-use crate::Homography;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
+use crate::{Homography, MotionCov, motion_jacobian};
+use nalgebra::{Const, DimMin, Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 /// Numbers of the groups: translation, similarity, affine, projective.
 const GROUPS: [usize; 4] = [2, 4, 6, 8];
@@ -30,35 +31,70 @@ pub(super) const MOST_MATCHES: usize = 128;
 /// Matches that must agree.
 const LEAST_MATCHES: usize = 8;
 
+/// Deviation of an axis that is common to all matches, px: what straight lines between pixels leave where all patches lie at the same fraction of one.
+const COMMON_PX: f64 = 0.01;
+/// Probability of a group, of the likeliest one's, below which it is left out.
+const LEAST_PROBABILITY: f64 = 1e-6;
+
 /// A plane's motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     pub to_from: Homography,
     /// Robust deviation of the matches from it, px an axis.
     pub spread_px: f64,
+    /// Share of the weight of all matches that lies within reach of it.
+    pub share: f64,
     /// Numbers of the group that was chosen.
-    #[cfg_attr(not(test), expect(dead_code, reason = "what the tests look at"))]
     pub n_numbers: usize,
+    /// Covariance of where it takes the points around the middle ([`motion_jacobian`]), px.
+    pub cov: MotionCov,
 }
 
-type Basis = SMatrix<f64, 8, 2>;
+/// What counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Turn, zoom and what is beyond them count only where they move a corner by more than this from where a shift has it, px.
+    pub least_px: f64,
+    /// Matches farther than this from the fit so far do not count, px.
+    pub most_px: f64,
+}
 
-/// What each number of a correction moves at a point, px; `k` of them.
-fn basis(u: Vector2<f64>, k: usize) -> Basis {
-    let (x, y) = (u.x, u.y);
-    let mut b = Basis::from_row_slice(&[1.0, 0.0, 0.0, 1.0, x, y, -y, x, x, -y, y, x, x * x, x * y, x * y, y * y]);
-    b.rows_mut(k, 8 - k).fill(0.0);
-    b
+impl Limits {
+    pub const NONE: Self = Self { least_px: 0.0, most_px: f64::INFINITY };
+}
+
+/// What each of the first `K` numbers moves at a point, px; transposed.
+fn basis<const K: usize>(u: Vector2<f64>) -> SMatrix<f64, K, 2> {
+    let j = motion_jacobian(u);
+    SMatrix::from_fn(|i, axis| j[(axis, i)])
 }
 
 /// The correction as a homography of px about `middle`.
 fn correction(theta: &SVector<f64, 8>, middle: Vector2<f64>, half: f64) -> Option<Homography> {
+    if theta.rows(2, 6).iter().all(|t| *t == 0.0) {
+        return Some(Homography::shift(Vector2::new(theta[0], theta[1])));
+    }
     let t = theta / half;
     let unit =
-        Matrix3::new(1.0 + t[2] + t[4], -t[3] + t[5], t[0], t[3] + t[5], 1.0 + t[2] - t[4], t[1], -t[6], -t[7], 1.0);
+        Matrix3::new(1.0 + t[3] + t[4], -t[2] + t[5], t[0], t[2] + t[5], 1.0 + t[3] - t[4], t[1], -t[6], -t[7], 1.0);
     let to_unit = Matrix3::new(1.0 / half, 0.0, -middle.x / half, 0.0, 1.0 / half, -middle.y / half, 0.0, 0.0, 1.0);
     let to_px = Matrix3::new(half, 0.0, middle.x, 0.0, half, middle.y, 0.0, 0.0, 1.0);
     Homography::of_matrix(to_px * unit * to_unit)
+}
+
+/// What a group can take over of a motion: all that matters is that it lies in the group.
+fn in_group(start: &Homography, middle: Vector2<f64>, k: usize) -> Homography {
+    match k {
+        2 => Homography::shift(start.shift_at(middle)),
+        4 => Homography::of_similarity(&start.similarity_at(middle)),
+        6 => {
+            let (a, to) = (start.linear_at(middle), start.apply(middle));
+            let t = to - a * middle;
+            let m = Matrix3::new(a[(0, 0)], a[(0, 1)], t.x, a[(1, 0)], a[(1, 1)], t.y, 0.0, 0.0, 1.0);
+            Homography::of_matrix(m).unwrap_or(*start)
+        }
+        _ => *start,
+    }
 }
 
 /// Robust deviation of the residuals, px an axis: the median of Rayleigh's distribution is 1.1774 of it.
@@ -70,76 +106,201 @@ fn spread(matches: &[Match], at: &Homography) -> f64 {
     (*residuals.select_nth_unstable_by(middle, f64::total_cmp).1 / 1.1774).max(SHARP)
 }
 
+/// A group's fit.
+#[derive(Clone, Copy, Debug)]
+struct Settled {
+    at: Homography,
+    cov: MotionCov,
+}
+
 /// The fit of one group.
-fn settle(matches: &[Match], predicted: &Homography, middle: Vector2<f64>, k: usize) -> Option<Homography> {
+fn settle<const K: usize>(matches: &[Match], start: &Homography, middle: Vector2<f64>, most_px: f64) -> Option<Settled>
+where
+    Const<K>: DimMin<Const<K>, Output = Const<K>>,
+{
     let half = middle.x.max(middle.y).max(1.0);
-    let mut at = *predicted;
+    let mut at = in_group(start, middle, K);
     for round in 0..ROUNDS {
         let spread = spread(matches, &at);
-        let reach = if round == 0 { 2.0 * REACH } else { REACH } * spread;
-        let (mut square, mut pull) = (SMatrix::<f64, 8, 8>::identity() * 1e-9, SVector::<f64, 8>::zeros());
+        let reach = (spread * if round == 0 { 2.0 * REACH } else { REACH }).min(most_px);
+        let (mut square, mut pull) = (SMatrix::<f64, K, K>::identity() * 1e-9, SVector::<f64, K>::zeros());
         let (mut sum, mut n, mut all) = (0.0, 0usize, 0.0);
         for m in matches {
             all += m.weight;
-            let r = (m.to - at.apply(m.from)).norm();
-            let q = (r / reach).powi(2);
-            if q >= 1.0 {
+            let to = at.apply(m.from);
+            let r = m.to - to;
+            let q = r.norm_squared() / (reach * reach);
+            // A distance that is no number lies beyond the reach.
+            let inside = q < 1.0;
+            if !inside {
                 continue;
             }
             let w = m.weight * (1.0 - q).powi(2);
-            let to = at.apply(m.from);
-            let b = basis((to - middle) / half, k);
+            let b = basis::<K>((to - middle) / half);
             square += w * b * b.transpose();
-            pull += w * b * (m.to - to);
+            pull += w * b * r;
             (sum, n) = (sum + w, n + 1);
         }
-        if n < LEAST_MATCHES.max(MATCHES_A_NUMBER * k / 2) || sum < 0.5 * MAJORITY * all {
+        if n < LEAST_MATCHES.max(MATCHES_A_NUMBER * K / 2) || sum < 0.5 * MAJORITY * all {
             return None;
         }
         let theta = square.cholesky()?.solve(&pull);
-        at = at.then(&correction(&theta, middle, half)?);
+        let mut full = SVector::<f64, 8>::zeros();
+        full.rows_mut(0, K).copy_from(&theta);
+        at = at.then(&correction(&full, middle, half)?);
+        if theta.norm() < 1e-4 * spread {
+            break;
+        }
     }
-    Some(at)
+    let cov = covariance::<K>(matches, &at, middle, half)?;
+    Some(Settled { at, cov })
 }
 
-/// Tukey's loss of all matches from a fit, at that deviation, and how many lie within its reach.
-fn loss(matches: &[Match], at: &Homography, spread_px: f64) -> (f64, usize) {
-    let (mut sum, mut n) = (0.0, 0);
+/// Covariance of the numbers of a fit: A⁻¹ B A⁻¹, A the mean slope of the weighted residuals, B their sum of squares.
+fn covariance<const K: usize>(matches: &[Match], at: &Homography, middle: Vector2<f64>, half: f64) -> Option<MotionCov>
+where
+    Const<K>: DimMin<Const<K>, Output = Const<K>>,
+{
+    let reach = REACH * spread(matches, at);
+    let (mut slope, mut plain, mut meat) =
+        (SMatrix::<f64, K, K>::zeros(), SMatrix::<f64, K, K>::zeros(), SMatrix::<f64, K, K>::zeros());
+    let mut n = 0.0;
+    for m in matches {
+        let to = at.apply(m.from);
+        let r = m.to - to;
+        let q = r.norm_squared() / (reach * reach);
+        let inside = q < 1.0;
+        if !inside {
+            continue;
+        }
+        let b = basis::<K>((to - middle) / half);
+        let square = b * b.transpose();
+        // The mean over the directions of the derivative of r (1 - q)².
+        slope += m.weight * (1.0 - q) * (1.0 - 3.0 * q) * square;
+        plain += m.weight * (1.0 - q).powi(2) * square;
+        let of_one = r * r.transpose() + Matrix2::identity() * (0.25 * SHARP * SHARP);
+        meat += (m.weight * (1.0 - q).powi(2)).powi(2) * b * of_one * b.transpose();
+        n += 2.0;
+    }
+    let back = slope.cholesky().or_else(|| plain.cholesky())?.inverse();
+    let cov = back * meat * back * (n / (n - K as f64).max(1.0));
+    let mut out = MotionCov::zeros();
+    // Numbers for u in (-1, 1) become those for px.
+    let unit = |i: usize| [1.0, 1.0 / half, 1.0 / half, 1.0 / (half * half)][i / 2];
+    for i in 0..K {
+        for j in 0..K {
+            out[(i, j)] = 0.5 * (cov[(i, j)] + cov[(j, i)]) * unit(i) * unit(j);
+        }
+    }
+    Some(out)
+}
+
+/// Tukey's loss of all matches from a fit, at that deviation, and the weight of those that lie within its reach.
+fn loss(matches: &[Match], at: &Homography, spread_px: f64) -> (f64, f64) {
+    let (mut sum, mut inside) = (0.0, 0.0);
     for m in matches {
         let q = ((m.to - at.apply(m.from)).norm() / (REACH * spread_px)).powi(2);
         // A distance that is no number lies beyond the reach.
-        let inside = q < 1.0;
-        let left = if inside { (1.0 - q).powi(3) } else { 0.0 };
-        sum += REACH * REACH / 3.0 * (1.0 - left);
-        n += usize::from(inside);
+        let is_inside = q < 1.0;
+        let left = if is_inside { (1.0 - q).powi(3) } else { 0.0 };
+        sum += m.weight * REACH * REACH / 3.0 * (1.0 - left);
+        inside += if is_inside { m.weight } else { 0.0 };
     }
-    (sum, n)
+    (sum, inside)
 }
 
-/// The motion that most matches agree with, close to the predicted one; `middle` is the image's, px.
-pub(super) fn fit(matches: &[Match], predicted: &Homography, middle: Vector2<f64>) -> Option<Plane> {
+/// The motion that most matches agree with, from one close to it; `middle` is the image's, px. Turn, zoom and what is beyond them count only where they move
+/// a corner by more than `least_px` from where a shift has it.
+pub(super) fn fit(matches: &[Match], start: &Homography, middle: Vector2<f64>, limits: Limits) -> Option<Plane> {
+    let Limits { least_px, most_px } = limits;
     let matches = &matches[..matches.len().min(MOST_MATCHES)];
     if matches.len() < LEAST_MATCHES {
         return None;
     }
+    let settle = |k: usize| match k {
+        2 => settle::<2>(matches, start, middle, most_px),
+        4 => settle::<4>(matches, start, middle, most_px),
+        6 => settle::<6>(matches, start, middle, most_px),
+        _ => settle::<8>(matches, start, middle, most_px),
+    };
     let mut fits = [None; GROUPS.len()];
     for (fit, k) in fits.iter_mut().zip(GROUPS) {
         if matches.len() < MATCHES_A_NUMBER * k {
             break;
         }
-        *fit = settle(matches, predicted, middle, k).map(|at| (at, spread(matches, &at)));
+        *fit = settle(k).map(|s| (s, spread(matches, &s.at)));
     }
     let least = fits.iter().flatten().map(|f| f.1).fold(f64::INFINITY, f64::min);
+    let all: f64 = matches.iter().map(|m| m.weight).sum();
     let mut best: Option<(f64, Plane)> = None;
-    for (fit, k) in fits.into_iter().zip(GROUPS) {
-        let Some((to_from, spread_px)) = fit else { continue };
-        let (loss, n) = loss(matches, &to_from, least);
-        let criterion = loss + k as f64 * (2.0 * n.max(1) as f64).ln();
-        if best.as_ref().is_none_or(|(b, _)| criterion < *b) {
-            best = Some((criterion, Plane { to_from, spread_px, n_numbers: k }));
+    let mut criteria = [f64::INFINITY; GROUPS.len()];
+    for ((fit, k), kept) in fits.iter().zip(GROUPS).zip(&mut criteria) {
+        let Some((Settled { at, cov }, spread_px)) = *fit else { continue };
+        let (loss, inside) = loss(matches, &at, least);
+        let criterion = loss + k as f64 * (2.0 * inside).max(2.0).ln();
+        *kept = criterion;
+        let is_near = |b: &Plane| corners_apart(&b.to_from, &at, middle) <= least_px;
+        if best.as_ref().is_none_or(|(b, plane)| criterion < *b && !(plane.n_numbers == 2 && is_near(plane))) {
+            let share = inside / all.max(f64::MIN_POSITIVE);
+            best = Some((criterion, Plane { to_from: at, spread_px, share, n_numbers: k, cov }));
         }
     }
-    best.map(|(_, plane)| plane)
+    let (_, mut plane) = best?;
+    plane.cov = averaged(&plane.to_from, &fits, &criteria, middle);
+    Some(plane)
+}
+
+/// The covariance about the chosen motion where the others may be true as well: each with the probability that its criterion gives it (A. Raftery, *Sociological Methodology* 25, 1995).
+fn averaged(
+    chosen: &Homography,
+    fits: &[Option<(Settled, f64)>; GROUPS.len()],
+    criteria: &[f64; GROUPS.len()],
+    middle: Vector2<f64>,
+) -> MotionCov {
+    let least = criteria.iter().copied().fold(f64::INFINITY, f64::min);
+    let (mut sum, mut all) = (MotionCov::zeros(), 0.0);
+    for (fit, criterion) in fits.iter().zip(criteria) {
+        let Some((Settled { at, cov }, _)) = fit else { continue };
+        let weight = (-0.5 * (criterion - least)).exp();
+        if weight < LEAST_PROBABILITY {
+            continue;
+        }
+        let off = difference(chosen, at, middle);
+        sum += weight * (cov + off * off.transpose());
+        all += weight;
+    }
+    sum /= all;
+    sum[(0, 0)] += COMMON_PX * COMMON_PX;
+    sum[(1, 1)] += COMMON_PX * COMMON_PX;
+    sum
+}
+
+/// The eight numbers of the small motion from what one motion makes of the points to what another does, about the middle.
+fn difference(from: &Homography, to: &Homography, middle: Vector2<f64>) -> SVector<f64, 8> {
+    let d = from.inverse().then(to);
+    let (at, a) = (d.shift_at(middle), d.linear_at(middle));
+    let centred = Homography::shift(middle).then(&d).then(&Homography::shift(-d.apply(middle)));
+    let m = centred.matrix();
+    SVector::from([
+        at.x,
+        at.y,
+        0.5 * (a[(1, 0)] - a[(0, 1)]),
+        0.5 * (a[(0, 0)] + a[(1, 1)]) - 1.0,
+        0.5 * (a[(0, 0)] - a[(1, 1)]),
+        0.5 * (a[(0, 1)] + a[(1, 0)]),
+        -m[(2, 0)],
+        -m[(2, 1)],
+    ])
+}
+
+/// The farthest distance between what two motions make of the image's corners, px.
+pub(super) fn corners_apart(a: &Homography, b: &Homography, middle: Vector2<f64>) -> f64 {
+    if a.is_shift() && b.is_shift() {
+        return (a.shift_at(middle) - b.shift_at(middle)).norm();
+    }
+    let corners =
+        [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)].map(|(x, y)| Vector2::new(x * middle.x, y * middle.y));
+    corners.into_iter().map(|c| (a.apply(c) - b.apply(c)).norm()).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -168,7 +329,7 @@ mod tests {
     /// The largest error of a fit at the corners, and its numbers.
     fn error(truth: [f64; 8], seed: u64) -> (f64, usize) {
         let truth = correction(&SVector::from(truth), MIDDLE, MIDDLE.x).unwrap();
-        let found = fit(&matches(&truth, seed), &Homography::identity(), MIDDLE).unwrap();
+        let found = fit(&matches(&truth, seed), &Homography::identity(), MIDDLE, Limits::NONE).unwrap();
         let corners = [(0.0, 0.0), (511.0, 0.0), (0.0, 269.0), (511.0, 269.0)].map(|(x, y)| Vector2::new(x, y));
         let far = corners.into_iter().map(|c| (found.to_from.apply(c) - truth.apply(c)).norm()).fold(0.0, f64::max);
         (far, found.n_numbers)
@@ -195,8 +356,33 @@ mod tests {
     }
 
     #[test]
+    fn the_covariance_is_that_of_the_errors_in_every_group() {
+        // NEES of a corner over many fits, 2 in the mean; every third match is off by up to a pixel.
+        let kinds = [
+            [0.4, -0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.4, -0.3, 0.5, -0.4, 0.0, 0.0, 0.0, 0.0],
+            [0.4, -0.3, 0.3, -0.2, 0.4, 0.3, 0.0, 0.0],
+            [0.4, -0.3, 0.2, 0.1, -0.2, 0.1, 0.5, 0.4],
+        ];
+        for truth in kinds {
+            let truth = correction(&SVector::from(truth), MIDDLE, MIDDLE.x).unwrap();
+            let (mut sum, n) = (0.0, 300);
+            for seed in 0..n {
+                let found = fit(&matches(&truth, 1000 + seed), &Homography::identity(), MIDDLE, Limits::NONE).unwrap();
+                for corner in [Vector2::new(0.0, 0.0), Vector2::new(511.0, 200.0)] {
+                    let (at, e) = (truth.apply(corner), found.to_from.apply(corner) - truth.apply(corner));
+                    let j = motion_jacobian(at - MIDDLE);
+                    sum += 0.5 * e.dot(&(j * found.cov * j.transpose()).cholesky().unwrap().solve(&e));
+                }
+            }
+            let nees = sum / n as f64;
+            assert!((1.6..2.7).contains(&nees), "{truth:?}: {nees}");
+        }
+    }
+
+    #[test]
     fn too_few_matches_have_no_plane() {
         let few: Vec<Match> = matches(&Homography::identity(), 1).into_iter().take(7).collect();
-        assert!(fit(&few, &Homography::identity(), MIDDLE).is_none());
+        assert!(fit(&few, &Homography::identity(), MIDDLE, Limits::NONE).is_none());
     }
 }

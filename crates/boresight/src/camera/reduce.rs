@@ -22,6 +22,29 @@ pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>, sums: &mut Vec<f32>)
     }
 }
 
+/// Means over blocks of `factor` x `factor` pixels along a row of them, from that block on.
+pub(super) fn blocks_of<T: Copy>(
+    image: &Image<T>,
+    factor: usize,
+    (x, y): (usize, usize),
+    value: impl Fn(T) -> f32,
+    out: &mut [f32],
+) {
+    out.fill(0.0);
+    for r in y * factor..(y + 1) * factor {
+        let row = &image.row(r)[x * factor..(x + out.len()) * factor];
+        if factor == 1 {
+            out.iter_mut().zip(row).for_each(|(o, p)| *o = value(*p));
+            return;
+        }
+        for (o, block) in out.iter_mut().zip(row.chunks_exact(factor)) {
+            *o += block.iter().map(|p| value(*p)).sum::<f32>();
+        }
+    }
+    let scale = 1.0 / (factor * factor) as f32;
+    out.iter_mut().for_each(|o| *o *= scale);
+}
+
 /// Mean over blocks of `factor` x `factor` pixels; `sums` is scratch memory.
 pub(super) fn blocks<T: Copy>(
     image: &Image<T>,

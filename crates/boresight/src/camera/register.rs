@@ -38,7 +38,7 @@ pub(crate) struct PlanePatches {
 
 /// Where the plane of one image lies in another.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Registration {
+pub struct Registration {
     /// From the patches' image to the other.
     pub to_from: Homography,
     /// Robust deviation of the patches from it, px an axis: their noise, and what is no plane.
@@ -118,7 +118,7 @@ impl PlanePatches {
         }
         let found = n as f64 / n_inside.max(1) as f64;
         let middle = 0.5 * Vector2::new(own.width() as f64 - 1.0, own.height() as f64 - 1.0);
-        let plane = plane::fit(&matches[..n], predicted, middle)?;
+        let plane = plane::fit(&matches[..n], predicted, middle, plane::Limits::NONE)?;
         Some(Registration { to_from: plane.to_from, spread_px: plane.spread_px, found })
     }
 

@@ -1,20 +1,20 @@
 //! Steady ground: positions turned into the coordinates of the first scan's background, and back into the image's.
 //!
-//! Source: composition of the scans' similarities; covariances to first order.
+//! Source: composition of the scans' motions; covariances to first order.
 //! Detections go to the ground before tracking: position, box, and R = A⁻¹ (R + C) A⁻ᵀ, where C is the covariance of where the background lies
 //! at that place ([`CameraMotion::cov_at`]). Tracks come back into the image after it, wholly: position, velocity, covariance, box, innovation.
-//! Symbols: x = A g + t (image from ground); S, the motion since the scan before; u = (x - S⁻¹ x) / dt, the ground's own velocity in the image there (px/s);
+//! Symbols: x = H g (image from ground), A = dx/dg there; S, the motion since the scan before; u = (x - S⁻¹ x) / dt, the ground's own velocity in the image there (px/s);
 //! v_image = A v_ground + u; B = du/dx.
-//! Limits: boxes keep their sides along the image's axes; numbers of the tracker's configuration in px are px of the first scan (at a zoom of 2 they are 2 px
+//! Limits: what a perspective adds to a velocity's covariance within that of its position is left out; boxes keep their sides along the image's axes; numbers of the tracker's configuration in px are px of the first scan (at a zoom of 2 they are 2 px
 //! of the image); where the motion is unknown the ground is taken to stand still in the image.
 
-use crate::{CameraMotion, Detection, Extent, Scan, Similarity, Timestamp, TrackState};
+use crate::{CameraMotion, Detection, Extent, Homography, MotionCov, Scan, Timestamp, TrackState};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 /// Where the first scan's background lies in the image now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SteadyGround {
-    image_from_ground: Similarity,
+    image_from_ground: Homography,
     /// The last scan's motion, and the time it took, s.
     motion: Option<CameraMotion>,
     dt_s: f64,
@@ -26,7 +26,7 @@ impl SteadyGround {
     /// Returns the ground as it lies in `scan`, the next one.
     pub fn after(self, scan: &Scan) -> Self {
         let motion = scan.camera_motion.filter(CameraMotion::is_finite);
-        let step = motion.map_or(Similarity::identity(), |m| m.now_from_before);
+        let step = motion.map_or(Homography::identity(), |m| m.now_from_before);
         Self {
             image_from_ground: self.image_from_ground.then(&step),
             motion,
@@ -69,15 +69,15 @@ impl SteadyGround {
         self.image_from_ground.apply(on_ground)
     }
 
-    /// How much larger the ground looks than in the first scan.
-    pub(crate) fn zoom(self) -> f64 {
-        self.image_from_ground.zoom()
+    /// How much larger the ground looks at a place on it than in the first scan.
+    pub(crate) fn zoom_at(self, on_ground: Vector2<f64>) -> f64 {
+        self.image_from_ground.zoom_at(on_ground)
     }
 
     /// From the image to the ground, and the motion whose uncertainty counts.
-    fn way_to_ground(self) -> (Similarity, Option<CameraMotion>) {
+    fn way_to_ground(self) -> (Homography, Option<CameraMotion>) {
         // Exactly known motions change no covariance, not even in the last bit.
-        (self.image_from_ground.inverse(), self.motion.filter(|m| m.cov != Matrix4::zeros()))
+        (self.image_from_ground.inverse(), self.motion.filter(|m| m.cov != MotionCov::zeros()))
     }
 
     /// Turns tracks on the ground into the image's.
@@ -90,17 +90,18 @@ impl SteadyGround {
     fn track_in_image(&self, t: &mut TrackState) {
         let (mean, cov) = (&mut t.kinematics.mean, &mut t.kinematics.cov);
         let image = &self.image_from_ground;
-        let at = image.apply(Vector2::new(mean[0], mean[2]));
-        let mut velocity = image.turn(Vector2::new(mean[1], mean[3]));
+        let on_ground = Vector2::new(mean[0], mean[2]);
+        let at = image.apply(on_ground);
+        let mut velocity = image.turn_at(on_ground, Vector2::new(mean[1], mean[3]));
         let step = self.motion.filter(|_| self.dt_s > 0.0);
         let mut of_place = Matrix2::zeros();
         if let Some(m) = step.filter(|m| !m.now_from_before.is_identity()) {
             let back = m.now_from_before.inverse();
             velocity -= back.shift_at(at) / self.dt_s;
-            of_place = (Matrix2::identity() - back.linear()) / self.dt_s;
+            of_place = (Matrix2::identity() - back.linear_at(at)) / self.dt_s;
         }
         if !(image.is_shift() && of_place == Matrix2::zeros()) {
-            let a = image.linear();
+            let a = image.linear_at(on_ground);
             let mut transform = by_axis(&a, &a);
             let coupled = of_place * a;
             for i in 0..2 {
@@ -111,7 +112,7 @@ impl SteadyGround {
             let turned = transform * *cov * transform.transpose();
             *cov = 0.5 * (turned + turned.transpose());
         }
-        if let Some(m) = step.filter(|m| m.cov != Matrix4::zeros()) {
+        if let Some(m) = step.filter(|m| m.cov != MotionCov::zeros()) {
             let c = m.cov_at(at);
             *cov += by_axis(&Matrix2::zeros(), &(c / (self.dt_s * self.dt_s)));
             if t.detection.is_none() {
@@ -122,21 +123,21 @@ impl SteadyGround {
         (mean[0], mean[1], mean[2], mean[3]) = (at.x, velocity.x, at.y, velocity.y);
         t.extent = moved(t.extent, image);
         if let Some(i) = t.innovation.as_mut().filter(|_| !image.is_shift()) {
-            i.innovation = image.turn(i.innovation);
-            i.cov = image.turn_cov(&i.cov);
+            i.innovation = image.turn_at(on_ground, i.innovation);
+            i.cov = image.turn_cov_at(on_ground, &i.cov);
         }
     }
 }
 
 /// Turns a detection to the ground.
 #[inline]
-fn to_ground(d: &mut Detection, ground: &Similarity, motion: Option<&CameraMotion>) {
+fn to_ground(d: &mut Detection, ground: &Homography, motion: Option<&CameraMotion>) {
     // Measured over frames between which the ground moved: it is not the velocity on it.
     d.velocity = None;
     if let Some(m) = motion {
         d.cov += m.cov_at(d.position);
     }
-    d.cov = ground.turn_cov(&d.cov);
+    d.cov = ground.turn_cov_at(d.position, &d.cov);
     d.position = ground.apply(d.position);
     d.extent = moved(d.extent, ground);
 }
@@ -154,20 +155,20 @@ fn by_axis(position: &Matrix2<f64>, velocity: &Matrix2<f64>) -> Matrix4<f64> {
 }
 
 /// A box around the place where its middle comes to lie, zoomed, its sides along the axes.
-fn moved(e: Extent, by: &Similarity) -> Extent {
+fn moved(e: Extent, by: &Homography) -> Extent {
     if by.is_shift() {
         let corner = by.apply(Vector2::new(e.left_px, e.top_px));
         return Extent { left_px: corner.x, top_px: corner.y, ..e };
     }
     let middle = Vector2::new(e.left_px + 0.5 * e.width_px, e.top_px + 0.5 * e.height_px);
-    let zoom = by.zoom();
+    let zoom = by.zoom_at(middle);
     Extent::around(by.apply(middle), zoom * e.width_px, zoom * e.height_px)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Detection, FrameIndex, MotionBasis, TrackId, TrackStatus};
+    use crate::{Detection, FrameIndex, MotionBasis, Similarity, TrackId, TrackStatus};
     use boresight_filters::Gaussian;
     use nalgebra::Vector4;
 
@@ -193,9 +194,14 @@ mod tests {
 
     fn turning() -> CameraMotion {
         CameraMotion {
-            now_from_before: Similarity::about(Vector2::new(160.0, 120.0), Vector2::new(3.0, -1.0), 0.02, 1.01),
+            now_from_before: Homography::of_similarity(&Similarity::about(
+                Vector2::new(160.0, 120.0),
+                Vector2::new(3.0, -1.0),
+                0.02,
+                1.01,
+            )),
             centre_px: Vector2::new(160.0, 120.0),
-            cov: Matrix4::zeros(),
+            cov: MotionCov::zeros(),
             basis: MotionBasis::Measured,
         }
     }
@@ -231,7 +237,7 @@ mod tests {
     #[test]
     fn an_uncertain_motion_widens_detections_and_what_is_only_predicted() {
         let motion = CameraMotion {
-            cov: Matrix4::from_diagonal(&Vector4::new(0.5, 0.5, 1e-4, 0.0)),
+            cov: MotionCov::from_diagonal(&[0.5, 0.5, 1e-4, 0.0, 0.0, 0.0, 0.0, 0.0].into()),
             basis: MotionBasis::Held,
             ..turning()
         };
@@ -241,7 +247,7 @@ mod tests {
         let mut on_ground = Scan::default();
         ground.scan_on_ground(&now, &mut on_ground);
         // 100 px to the right a turn moves along y: 0.1 + 0.5 + 1e-4 x 100².
-        let back = motion.now_from_before.turn_cov(&on_ground.detections[0].cov);
+        let back = motion.now_from_before.turn_cov_at(on_ground.detections[0].position, &on_ground.detections[0].cov);
         assert!((back - Matrix2::new(0.7, 0.05, 0.05, 1.6)).norm() < 1e-9, "{back}");
         let still = track(Vector4::new(260.0, 0.0, 120.0, 0.0), Matrix4::zeros(), Extent::default(), None);
         let mut states = [still.clone(), TrackState { detection: Some(0), ..still }];

@@ -52,7 +52,7 @@ impl WideSearch {
         }
         let start = Homography::of_similarity(&Similarity::shift(Vector2::from(shift)));
         let middle = 0.5 * Vector2::new(self.own.width() as f64 - 1.0, self.own.height() as f64 - 1.0);
-        let small = plane::fit(matches, &start, middle)?.to_from;
+        let small = plane::fit(matches, &start, middle, plane::Limits::NONE)?.to_from;
         let grow = Homography::of_blocks(factor);
         Some(grow.inverse().then(&small).then(&grow))
     }

@@ -5,7 +5,7 @@
 //! Limits: one plane; where the motion is unknown for more than a tenth of the frames the ground is not steady, and the image is drawn instead.
 
 use super::picture::Picture;
-use crate::{CameraMotion, Similarity, View};
+use crate::{CameraMotion, Homography, View};
 use nalgebra::Vector2;
 
 /// How far the ground moves from one picture to the next, as a share of the frame's width.
@@ -20,9 +20,9 @@ const STILL_SHARE: f64 = 0.02;
 #[derive(Debug)]
 pub(super) struct Ground {
     /// From the newest frame to the ground of the first.
-    pub first_from_now: Similarity,
+    pub first_from_now: Homography,
     /// Pictures with the way from each to the ground.
-    pub pictures: Vec<(Picture, Similarity)>,
+    pub pictures: Vec<(Picture, Homography)>,
     far: f64,
     /// Farthest that a corner came from its place, as a share of the width.
     moved: f64,
@@ -33,7 +33,7 @@ pub(super) struct Ground {
 impl Default for Ground {
     fn default() -> Self {
         Self {
-            first_from_now: Similarity::identity(),
+            first_from_now: Homography::identity(),
             pictures: Vec::new(),
             far: FAR,
             moved: 0.0,
@@ -61,7 +61,7 @@ impl Ground {
         self.moved = from_home.iter().fold(self.moved, |a, b| a.max(b / w.max(1.0)));
         let middle = corners[4];
         let here = self.first_from_now.apply(middle);
-        let near = |(_, first_from): &(Picture, Similarity)| (first_from.apply(middle) - here).norm() < self.far * w;
+        let near = |(_, first_from): &(Picture, Homography)| (first_from.apply(middle) - here).norm() < self.far * w;
         if !self.pictures.iter().any(near) {
             if self.pictures.len() >= MOST_PICTURES {
                 let mut k = 0;

@@ -4,7 +4,7 @@ use super::collect::{Collected, TrackLog};
 use super::curves::css_colour;
 use super::picture::Picture;
 use super::text::short;
-use crate::Similarity;
+use crate::Homography;
 use maud::{Markup, html};
 use nalgebra::Vector2;
 use std::fmt::Write;
@@ -101,10 +101,12 @@ pub(super) fn section(seen: &Collected, order: &[&TrackLog], detailed: &[&TrackL
     }
 }
 
-/// A picture where it was taken on the ground.
-fn laid(picture: &Picture, first_from: &Similarity) -> Markup {
+/// A picture where it was taken on the ground; a perspective is drawn as the affine map that it is about the picture's middle.
+fn laid(picture: &Picture, first_from: &Homography) -> Markup {
     let Some(url) = picture.data_url() else { return Markup::default() };
-    let (l, at) = (first_from.linear(), first_from.apply(Vector2::zeros()));
+    let middle = 0.5 * Vector2::new(picture.width as f64, picture.height as f64);
+    let l = first_from.linear_at(middle);
+    let at = first_from.apply(middle) - l * middle;
     let numbers = [l[(0, 0)], l[(1, 0)], l[(0, 1)], l[(1, 1)], at.x, at.y].map(|v| short(v, 7)).join(" ");
     html! {
         image href=(url) x="-0.5" y="-0.5" width=(picture.width) height=(picture.height) transform={ "matrix(" (numbers) ")" } preserveAspectRatio="none" {}

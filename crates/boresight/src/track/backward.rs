@@ -277,7 +277,8 @@ impl Walk<'_> {
         let config = &self.back.config;
         let (mut best, mut n_around) = (None::<Likely>, 0.0);
         let variance = belief.cov[(0, 0)].max(belief.cov[(2, 2)]) + self.noise_px2;
-        let half = AROUND_PX.max((variance * config.gate()).sqrt() * past.ground.zoom());
+        let half = AROUND_PX
+            .max((variance * config.gate()).sqrt() * past.ground.zoom_at(Vector2::new(belief.mean[0], belief.mean[2])));
         let is_around = |off: Vector2<f64>| off.x.abs() <= half && off.y.abs() <= half;
         // What was seen before the scan's time lies where the target was then.
         let oldest_s = past.scan.detections.iter().map(|d| d.age_ns).max().unwrap_or(0) as f64 * 1e-9;

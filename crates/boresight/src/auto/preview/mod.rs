@@ -23,7 +23,7 @@ use crate::io::{Colour, MOST_BYTES, Replay, frames_ahead};
 use crate::report::{ContactSheet, SheetMark, SheetPicture, SheetRow};
 use crate::vision::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, Error, ErrorKind, Frame, FrameSource, Result, Scan, Similarity, SourceInfo, Timestamp};
+use crate::{Config, Error, ErrorKind, Frame, FrameSource, Homography, Result, Scan, SourceInfo, Timestamp};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -209,8 +209,8 @@ fn read_runs(input: &OsStr, base: &Config, colour: Colour, runs: &[Vec<u64>]) ->
 fn grounds(runs: &[Vec<Frame>]) -> Vec<Vec<Ground>> {
     let of = |run: &Vec<Frame>| {
         let mut motion = CameraMotionEstimator::default();
-        let step = |f: &Frame| motion.step(&f.pixels).map_or(Similarity::identity(), |s| s.now_from_before);
-        let steps: Vec<Similarity> = run.iter().map(step).collect();
+        let step = |f: &Frame| motion.step(&f.pixels).map_or(Homography::identity(), |s| s.now_from_before);
+        let steps: Vec<Homography> = run.iter().map(step).collect();
         ground::follow(run, &steps)
     };
     runs.iter().map(of).collect()

@@ -38,7 +38,7 @@ fn a_pan_of_2_to_5_px_a_frame_over_any_texture_is_never_unknown() {
         let mut source = scene((320, 240), length, [pan, 0.3 * pan], 0.0, 0.0, 60);
         let frames = frames(&mut source);
         let mut camera = CameraMotionEstimator::default();
-        let mut ground = Similarity::identity();
+        let mut ground = Homography::identity();
         for (k, frame) in frames.iter().enumerate() {
             let motion = camera.step(&frame.pixels);
             let Some(motion) = motion else {
@@ -69,8 +69,8 @@ fn turn_and_zoom_are_measured_to_a_twentieth_of_a_degree_and_of_a_percent() {
             let motion = motion.unwrap_or_else(|| panic!("turn {turn}, zoom {zoom}: unknown in frame {k}"));
             assert_eq!(motion.basis, MotionBasis::Measured, "turn {turn}, zoom {zoom}, frame {k}");
             let (now, truth) = (motion.now_from_before, truth(&source, k as u64));
-            squares[0] += (now.angle_rad() - truth.angle_rad()).to_degrees().powi(2);
-            squares[1] += (100.0 * (now.zoom() / truth.zoom() - 1.0)).powi(2);
+            squares[0] += (now.angle_rad_at(motion.centre_px) - truth.angle_rad()).to_degrees().powi(2);
+            squares[1] += (100.0 * (now.zoom_at(motion.centre_px) / truth.zoom() - 1.0)).powi(2);
             let error = now.shift_at(motion.centre_px) - truth.shift_at(motion.centre_px);
             assert!(error.norm() < 0.3, "turn {turn}, zoom {zoom}, frame {k}: off by {error}");
         }
@@ -92,7 +92,7 @@ fn a_fixed_camera_under_noise_has_exactly_no_motion() {
                 (0..100).for_each(|y| image.row_mut(y).fill(150));
             }
             if let Some(motion) = camera.step(&Pixels::Gray8(image)) {
-                assert!(motion.now_from_before.is_identity() && motion.cov == Matrix4::zeros());
+                assert!(motion.now_from_before.is_identity() && motion.cov == MotionCov::zeros());
                 n += 1;
             }
         }
