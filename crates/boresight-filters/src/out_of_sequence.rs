@@ -335,6 +335,31 @@ mod tests {
         assert!((exact.cov - approximate.cov).norm() < 0.02 * exact.cov.norm());
     }
 
+    /// One measurement of weight 1 is that measurement, none at all is no update.
+    #[test]
+    fn a_weighted_update_stands_in_the_history_and_one_of_no_weight_does_not() {
+        let (cv, first) = start();
+        let fresh = Kf::<Cv, 4>::from_point(cv, &first, 2.0).unwrap();
+        let mut in_order = fresh.clone();
+        for (dt_s, m) in [(0.5, z(1)), (0.2, late(1)), (0.3, z(2))] {
+            in_order.predict(dt_s).unwrap();
+            in_order.correct(&m).unwrap();
+        }
+        for how in [Late::Retrodict, Late::Replay] {
+            let mut wrapped = OutOfSequence::<_, Cv, 8>::new(fresh.clone(), how);
+            wrapped.predict(0.5).unwrap();
+            wrapped.correct(&z(1)).unwrap();
+            wrapped.predict(0.5).unwrap();
+            let before = wrapped.clone();
+            wrapped.correct_weighted([Weighted { measurement: z(9), weight: 0.0 }].into_iter()).unwrap();
+            assert_eq!(wrapped, before);
+            wrapped.correct_weighted([Weighted { measurement: z(2), weight: 1.0 }].into_iter()).unwrap();
+            // It cannot be run again, so both ways go back over it: exact for one update.
+            wrapped.correct_late(0.3, &late(1)).unwrap();
+            same((in_order.belief(), wrapped.belief()), 1e-11);
+        }
+    }
+
     #[test]
     fn too_old_a_measurement_is_refused_and_changes_nothing() {
         let (cv, first) = start();

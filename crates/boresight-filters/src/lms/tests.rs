@@ -95,6 +95,7 @@ fn the_watchdog_restarts_the_weights_when_the_mean_nis_doubles() {
     };
     let calm = after(41.9);
     assert_eq!((calm.trips, calm.cov[(0, 0)]), (0, 0.3));
+    assert_eq!(after(42.0).trips, 0, "the limit itself is not beyond it");
     let upset = after(42.1);
     assert_eq!((upset.trips, upset.weights), (1, SMatrix::identity()));
     assert!((upset.cov[(0, 0)] - 3.0).abs() < 1e-15 && upset.noise[2] == upset.cov[(2, 2)]);

@@ -121,3 +121,36 @@ impl<T: Real> Model<6, T> for ConstantAcceleration<T> {
         lift_to_acceleration(kinematics, self.start_std)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// p + v dt + a dt²/2, v + a dt, a, with dt = 1/4 s.
+    #[test]
+    fn a_step_is_that_of_a_constant_acceleration() {
+        let m = ConstantAcceleration::<f64>::continuous(0.4, 1.0).unwrap();
+        let at = SVector::from([1.0, 2.0, 16.0, -3.0, 4.0, -32.0]);
+        assert_eq!(m.moved(0.25, &at), SVector::from([2.0, 6.0, 16.0, -3.0, -4.0, -32.0]));
+        assert_eq!(m.inverse_transition(0.25, &at).unwrap() * m.moved(0.25, &at), at);
+    }
+
+    #[test]
+    fn two_steps_of_white_jerk_are_one_step_of_both_times() {
+        let m = ConstantAcceleration::<f64>::continuous(0.4, 1.0).unwrap();
+        let phi = m.transition(0.7, &SVector::zeros());
+        let twice = phi * m.process_noise(0.2) * phi.transpose() + m.process_noise(0.7);
+        assert!((twice - m.process_noise(0.9)).norm() < 1e-14 * twice.norm());
+    }
+
+    /// dt²/2, dt, 1 of one jump of the acceleration, times its variance 9.
+    #[test]
+    fn a_jump_of_the_acceleration_moves_all_three_states() {
+        let q = ConstantAcceleration::<f64>::discrete(3.0, 1.0).unwrap().process_noise(0.5);
+        for (i, j, want) in
+            [(0, 0, 9.0 / 64.0), (0, 1, 9.0 / 16.0), (1, 2, 4.5), (5, 5, 9.0), (3, 5, 1.125), (0, 3, 0.0)]
+        {
+            assert_eq!(q[(i, j)], want, "{i} {j}");
+        }
+    }
+}

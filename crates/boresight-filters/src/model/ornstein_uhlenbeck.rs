@@ -82,6 +82,15 @@ mod tests {
         assert!((twice - m.process_noise(1.0)).norm() < 1e-12 * twice.norm());
     }
 
+    /// Two steps by the same closed form would both be wrong by a constant.
+    #[test]
+    fn the_closed_form_and_the_integral_agree_where_both_hold() {
+        let m = OrnsteinUhlenbeck::new(2.0, 0.7).unwrap();
+        let closed = m.process_noise(0.42); // z = 0.6, above the limit of 0.5
+        let exact: SMatrix<f64, 4, 4> = both_axes(&noise_integral(2.0 * 4.0 / 0.7, 0.42, |s| m.response(s)));
+        assert!((closed - exact).abs().max() < 1e-10 * exact.max(), "closed {closed} integral {exact}");
+    }
+
     #[test]
     fn the_velocity_of_a_long_gap_is_the_stationary_one() {
         let m = OrnsteinUhlenbeck::new(2.0, 0.7).unwrap();

@@ -3,8 +3,10 @@
 //! `docs/theory/filters.md` (independent reference, 200 steps): relative error 0.99 conventional, 0.74 Joseph, 1.2e-6
 //! U-D.
 
-use boresight_filters::model::{ConstantAcceleration, ConstantVelocity, Dense};
-use boresight_filters::{CovarianceForm, Gaussian, GaussianFilter, Kf, Measurement, SquareRoot, Srif, Start, Ud};
+use boresight_filters::model::{ConstantAcceleration, ConstantVelocity, Dense, Model, OrnsteinUhlenbeck, Singer};
+use boresight_filters::{
+    CovarianceForm, FilterError, Gaussian, GaussianFilter, Kf, Measurement, SquareRoot, Srif, Start, Ud,
+};
 use nalgebra::{Matrix2, Matrix4, SMatrix, SVector, Vector2, Vector4};
 
 type Cv = Dense<ConstantVelocity<f32>>;
@@ -52,23 +54,59 @@ fn in_f64_the_factored_forms_agree_on_the_same_problem_and_joseph_keeps_three_di
     assert!((run(Kf::start(model, start()).unwrap()).cov - exact.cov).norm() < 1e-3 * exact.cov.norm());
 }
 
-#[test]
-fn three_states_an_axis_by_factors_are_those_of_joseph() {
-    let model = ConstantAcceleration::discrete(3.0, 5.0).unwrap();
-    let cov = SMatrix::<f64, 6, 6>::from_diagonal(&SVector::from([4.0, 9.0, 25.0, 1.0, 16.0, 9.0]));
-    let belief = Gaussian { mean: SVector::zeros(), cov };
-    let mut ud = Ud::<_, 6>::start(model, belief).unwrap();
-    let mut kf = Kf::<_, 6>::start(model, belief).unwrap();
+/// Sixty scans by the factored forms beside Joseph's without the way of two axes side by side.
+fn factors_beside_joseph<const N: usize, M: Model<N> + Copy>(name: &str, model: M, variances: SVector<f64, N>) {
+    let belief = Gaussian { mean: SVector::zeros(), cov: SMatrix::from_diagonal(&variances) };
+    let mut kf = Kf::<_, N>::start(Dense(model), belief).unwrap();
+    let mut apart = Kf::<_, N>::start(model, belief).unwrap();
+    let mut ud = Ud::<_, N>::start(model, belief).unwrap();
+    let mut srif = Srif::<_, N>::start(model, belief).unwrap();
+    let mut root = SquareRoot::<_, N>::start(model, belief).unwrap();
     for k in 0..60 {
         let t = f64::from(k) * 0.1;
         // Uncorrelated axes of different noise: the way of two axes side by side.
         let z = Measurement { position: Vector2::new(t * t, 3.0 * t), cov: Matrix2::new(0.7, 0.0, 0.0, 1.9) };
-        ud.predict(0.1).unwrap();
-        kf.predict(0.1).unwrap();
-        ud.correct(&z).unwrap();
-        kf.correct(&z).unwrap();
-        let scale = kf.belief().cov.amax();
-        assert!((ud.belief().cov - kf.belief().cov).amax() < 1e-10 * scale, "scan {k}");
-        assert!((ud.belief().mean - kf.belief().mean).amax() < 1e-9, "scan {k}");
+        fn step<const N: usize>(f: &mut impl GaussianFilter<N, Real = f64>, z: &Measurement) -> Gaussian<N> {
+            f.predict(0.1).unwrap();
+            f.correct(z).unwrap();
+            f.belief()
+        }
+        let want = step(&mut kf, &z);
+        let [a, b] = [step(&mut apart, &z), step(&mut ud, &z)];
+        let [c, d] = [step(&mut srif, &z), step(&mut root, &z)];
+        for (form, got) in [("kf", a), ("ud", b), ("srif", c), ("root", d)] {
+            assert!((got.cov - want.cov).amax() < 1e-10 * want.cov.amax(), "{name} by {form}, scan {k}");
+            assert!((got.mean - want.mean).amax() < 1e-9, "{name} by {form}, scan {k}");
+        }
     }
+}
+
+/// One, two and three columns of noise an axis, two and three states.
+#[test]
+fn every_count_of_states_and_of_noise_by_factors_is_that_of_joseph() {
+    let four = SVector::from([4.0, 9.0, 1.0, 16.0]);
+    let six = SVector::from([4.0, 9.0, 25.0, 1.0, 16.0, 9.0]);
+    factors_beside_joseph("velocity, steps", ConstantVelocity::discrete(3.0).unwrap(), four);
+    factors_beside_joseph("velocity, white", ConstantVelocity::continuous(3.0).unwrap(), four);
+    factors_beside_joseph("forgetting velocity", OrnsteinUhlenbeck::new(3.0, 0.8).unwrap(), four);
+    factors_beside_joseph("acceleration, steps", ConstantAcceleration::discrete(3.0, 5.0).unwrap(), six);
+    factors_beside_joseph("acceleration, white", ConstantAcceleration::continuous(3.0, 5.0).unwrap(), six);
+    factors_beside_joseph("singer", Singer::new(3.0, 0.8).unwrap(), six);
+}
+
+/// The largest number plus a step is none; factors and covariance stay numbers.
+#[test]
+fn a_mean_that_overflows_is_an_error_and_leaves_the_belief() {
+    fn overflows<F: GaussianFilter<4, Real = f64>>(mut f: F) {
+        let before = f.belief();
+        assert!(matches!(f.predict(1.0), Err(FilterError::NotFinite(_))));
+        assert_eq!(f.belief(), before);
+    }
+    let model = ConstantVelocity::discrete(1.0).unwrap();
+    let belief = Gaussian { mean: Vector4::new(1.5e308, 1.5e308, 0.0, 0.0), cov: Matrix4::identity() };
+    overflows(Kf::start(model, belief).unwrap());
+    overflows(Kf::start(Dense(model), belief).unwrap());
+    overflows(Ud::start(model, belief).unwrap());
+    overflows(Ud::start(Dense(model), belief).unwrap());
+    overflows(SquareRoot::start(model, belief).unwrap());
 }
