@@ -5,25 +5,13 @@ use boresight::track::TrackerParameters;
 /// Moves that are said, as a share of the value.
 const SAID_SHARE: f64 = 0.1;
 
-/// The keys of parameters, with their values.
-fn values(p: &TrackerParameters) -> [(&'static str, f64); 8] {
-    [
-        ("detection-covariance-scale", p.detection_covariance_scale),
-        ("extra-noise-px", p.extra_noise_px),
-        ("extra-noise-per-height", p.extra_noise_per_height),
-        ("acceleration-density-px2-per-s3", p.acceleration_density_px2_per_s3),
-        ("acceleration-density-per-height2-per-s3", p.acceleration_density_per_height2_per_s3),
-        ("detection-probability", p.detection_probability),
-        ("redetection-probability", p.redetection_probability.unwrap_or(p.detection_probability)),
-        ("clutter-density-per-px2", p.clutter_density_per_px2),
-    ]
-}
-
 /// What moved by more than a tenth, from the values that were said last to those now; `None` if nothing did.
 pub fn words(said: &TrackerParameters, now: &TrackerParameters) -> Option<String> {
-    let moved = |(before, after): &((&str, f64), (&str, f64))| (after.1 - before.1).abs() > SAID_SHARE * before.1;
-    let pairs = values(said).into_iter().zip(values(now)).filter(moved);
-    let said: Vec<String> = pairs.map(|(before, after)| format!("{} {} -> {}", after.0, before.1, after.1)).collect();
+    let pairs = said.values().into_iter().zip(now.values()).filter_map(|((key, before), (_, after))| {
+        let (before, after) = before.zip(after)?;
+        ((after - before).abs() > SAID_SHARE * before).then(|| format!("{key} {before} -> {after}"))
+    });
+    let said: Vec<String> = pairs.collect();
     (!said.is_empty()).then(|| said.join(", "))
 }
 

@@ -56,6 +56,10 @@ pub struct Counts {
     pub dropped: AtomicU64,
     /// Scans whose time ran back, that the tracker refused, or frames that the detector refused.
     pub refused: AtomicU64,
+    /// Scans that came late and were taken at their own time.
+    pub late: AtomicU64,
+    /// Scans that came too late and were left out.
+    pub too_late: AtomicU64,
     /// Lines of detections that could not be read.
     pub bad_lines: AtomicU64,
     /// Times that the source was lost.
@@ -158,6 +162,14 @@ impl Board {
     /// Says a line to people.
     pub fn say(&self, line: &str) {
         (self.say)(line);
+    }
+
+    /// Counts a scan that came too late, and says the first.
+    pub(crate) fn too_late(&self) {
+        if self.counts.too_late.fetch_add(1, Ordering::Relaxed) == 0 {
+            let name = &self.source;
+            self.say(&format!("warning: {name}: a scan came too late and is left out, and others like it; input.late-s says how late it may come"));
+        }
     }
 
     /// Sets the state and says it, if it or its reason is new; returns whether it is.

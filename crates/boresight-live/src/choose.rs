@@ -59,7 +59,11 @@ impl Kept {
         match arrived.content {
             Content::Scan(mut scan) | Content::Adapted(mut scan, _) => {
                 scan.index.0 = self.scans.len() as u64;
-                self.scans.push(scan);
+                // One that came late takes its place: here there is time.
+                let at = self.scans.partition_point(|s| s.time <= scan.time);
+                self.scans.insert(at, scan);
+                self.clocks.insert(at, (arrived.at, arrived.wall));
+                return true;
             }
             Content::Frame(mut frame) => {
                 let mut info = arrived.info.as_deref().cloned().unwrap_or_else(|| info_of(&frame, label));

@@ -36,7 +36,9 @@ pub use on_earth::OnEarth;
 pub use output::{LiveOutput, Shown};
 #[cfg(feature = "nats")]
 pub use publish::Nats;
-pub use publish::{Asterix, AsterixOptions, Broker, Cot, CotOptions, Lines, Mqtt, Target, Udp, publisher};
+pub use publish::{
+    Asterix, AsterixOptions, Broker, Cot, CotOptions, Lines, Mqtt, Target, Udp, ZenohAddress, publisher,
+};
 pub use record::{Record, RecordOptions};
 pub use run::{RunOptions, run};
 pub use run_all::{OneRun, run_all};

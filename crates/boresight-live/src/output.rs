@@ -2,7 +2,7 @@
 
 use crate::event::{Event, TrackReport, When};
 use boresight::track::TrackerParameters;
-use boresight::{Config, Result, View};
+use boresight::{Config, Result, Scan, View};
 
 /// One frame after it was tracked, read only.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +31,13 @@ pub trait LiveOutput: Send {
     /// # Errors
     /// What could not be written; the run says it, counts it and goes on.
     fn put(&mut self, shown: &Shown<'_>) -> Result<()>;
+    /// Takes a scan that came late: its tracks are seen with the next frame.
+    /// # Errors
+    /// As [`LiveOutput::put`].
+    fn late(&mut self, scan: &Scan, arrived_unix_s: f64) -> Result<()> {
+        let _ = (scan, arrived_unix_s);
+        Ok(())
+    }
     /// Takes an event that belongs to no frame: the run's state.
     fn event(&mut self, event: &Event) {
         let _ = event;

@@ -207,6 +207,13 @@ impl<'o> Live<'o> {
         {
             self.adapt(stages, parameters);
         }
+        if let Content::Scan(scan) | Content::Adapted(scan, _) = &mut arrived.content
+            && stages.last.is_some_and(|(newest, _)| scan.time < newest)
+        {
+            scan.index = index;
+            self.late(stages, scan, unix_s(arrived.wall));
+            return Ok(());
+        }
         let frame = match &mut arrived.content {
             Content::Frame(frame) => {
                 // The frames that reach the tracker are numbered, so that the record has no holes that a reader would fill.
@@ -235,6 +242,22 @@ impl<'o> Live<'o> {
             self.board.latency.add(arrived.at.elapsed().as_secs_f64());
         }
         Ok(())
+    }
+
+    /// A scan of a time before the newest.
+    fn late(&mut self, stages: &mut Stages, scan: &Scan, arrived_unix_s: f64) {
+        let counts = &self.board.counts;
+        match stages.take_late(scan) {
+            Ok(true) => {
+                add(&counts.late, 1);
+                add(&counts.detections, scan.detections.len() as u64);
+                let failed =
+                    self.outputs.iter_mut().filter_map(|output| output.late(scan, arrived_unix_s).err()).count();
+                add(&counts.record_failures, failed as u64);
+            }
+            Ok(false) => self.board.too_late(),
+            Err(e) => self.refuse(&e),
+        }
     }
 
     fn settled(&mut self, config: &Config) {

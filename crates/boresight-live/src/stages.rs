@@ -4,7 +4,7 @@ use crate::board::Board;
 use crate::choose::{Ready, info_of};
 use crate::tune::Change;
 use boresight::auto::Adaptation;
-use boresight::track::{TrackerParameters, Tracking};
+use boresight::track::{OutOfOrder, TrackerParameters, Tracking};
 use boresight::vision::Detector;
 use boresight::vision::threshold::ThresholdConfig;
 use boresight::{
@@ -60,13 +60,20 @@ fn numbered<'t>(
     out
 }
 
+/// The tracker of a configuration; `takes_late`: scans may come late by their times.
+fn tracking(config: &Config, takes_late: bool) -> Result<Box<dyn Tracking>> {
+    let tracking = track::build(&config.tracker)?;
+    let takes_late = takes_late && config.input.late_s > 0.0;
+    Ok(if takes_late { Box::new(OutOfOrder::new(tracking, config.input.late_s)) } else { tracking })
+}
+
 impl Stages {
     /// The stages of what is ready; what was kept stays with the caller.
     /// # Errors
     /// A tracker that cannot be built.
     pub fn of(ready: Ready) -> Result<(Self, Vec<crate::source::Arrived>)> {
         let stages = Self {
-            tracking: track::build(&ready.config.tracker)?,
+            tracking: tracking(&ready.config, ready.detector.is_none())?,
             adaptation: ready.adaptation,
             next: None,
             config: ready.config,
@@ -93,6 +100,20 @@ impl Stages {
         self.n_tracks = tracks.len();
         self.next = self.adaptation.as_mut().and_then(|a| a.step(&self.scan, tracks));
         Ok((&self.scan, numbered(tracks, self.first_id, &mut self.last_id, &mut self.renumbered)))
+    }
+
+    /// Takes a scan of a time before the newest; what it changes is seen with the next one. `false` if it is too late.
+    /// # Errors
+    /// What the tracker refuses.
+    pub fn take_late(&mut self, scan: &Scan) -> Result<bool> {
+        let late_ns = self.last.map_or(0, |(newest, _)| newest.ns.saturating_sub(scan.time.ns));
+        if late_ns > Timestamp::from_secs_f64(self.config.input.late_s).ns {
+            return Ok(false);
+        }
+        let tracks = self.tracking.step(scan)?;
+        self.n_tracks = tracks.len();
+        numbered(tracks, self.first_id, &mut self.last_id, &mut self.renumbered);
+        Ok(true)
     }
 
     /// What the scans so far say for those that come, once.
@@ -140,7 +161,7 @@ impl Stages {
             // Built with the next frame.
             self.is_stale = true;
         } else {
-            self.tracking = track::build(&config.tracker)?;
+            self.tracking = tracking(&config, self.detector.is_none())?;
             self.first_id = self.last_id;
             self.n_tracks = 0;
             if let Some(adaptation) = &mut self.adaptation {

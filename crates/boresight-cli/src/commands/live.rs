@@ -69,7 +69,7 @@ pub struct Args {
     /// A name of this machine by which browsers may call the page, besides its numbers and localhost. Can be repeated.
     #[arg(long = "host", value_name = "NAME", requires = "serve")]
     hosts: Vec<String>,
-    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. With `[world]` in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT (Cursor on Target), asterix+udp://HOST:PORT?sac=N&sic=N. Can be repeated.
+    /// Publish events: `-` (JSON lines), udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC; zenoh/KEY by the program boresight-zenoh; nats://.. in a build with the feature `nats`; `?cbor` behind an address for CBOR. With `[world]` in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT (Cursor on Target), asterix+udp://HOST:PORT?sac=N&sic=N. Can be repeated.
     #[arg(long, value_name = "URL")]
     publish: Vec<String>,
     /// Updates of each track a second that are published, at most.

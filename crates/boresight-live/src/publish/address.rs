@@ -1,6 +1,7 @@
 //! Where events go, from what stands on the command line.
 
 use super::earth_address::{AsterixOptions, CotOptions, split};
+use super::zenoh_address::ZenohAddress;
 use crate::cbor::Form;
 use boresight::{Error, ErrorKind, Result};
 
@@ -12,9 +13,9 @@ const MQTT_PORT: u16 = 1883;
 const NATS_PORT: u16 = 4222;
 /// What is understood.
 const KNOWN: &str = if cfg!(feature = "nats") {
-    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT, ?cbor behind it for CBOR; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
+    "give -, udp://HOST:PORT, mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC or nats://[USER:PASSWORD@]HOST[:PORT]/SUBJECT, ?cbor behind it for CBOR; zenoh/KEY?connect=tcp/HOST:PORT; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
 } else {
-    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC, ?cbor behind it for CBOR; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
+    "give -, udp://HOST:PORT or mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC, ?cbor behind it for CBOR; zenoh/KEY?connect=tcp/HOST:PORT; with a [world] in the configuration cot+udp://HOST:PORT, cot+tcp://HOST:PORT or asterix+udp://HOST:PORT?sac=N&sic=N"
 };
 
 /// A place for events.
@@ -34,6 +35,8 @@ pub enum Target {
     /// A NATS server.
     #[cfg(feature = "nats")]
     Nats(Broker),
+    /// A zenoh network, by a program of its own.
+    Zenoh(ZenohAddress),
     /// Cursor on Target.
     Cot {
         /// Over TCP instead of as datagrams.
@@ -104,7 +107,7 @@ impl Broker {
 }
 
 impl Target {
-    /// Reads `-`; or, with `?cbor` behind it where events shall be CBOR, `udp://HOST:PORT`, `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC` or, with the feature `nats`, `nats://..`.
+    /// Reads `-`; or, with `?cbor` behind it where events shall be CBOR, `udp://HOST:PORT`, `mqtt://[USER:PASSWORD@]HOST[:PORT]/TOPIC` `zenoh/KEY` or, with the feature `nats`, `nats://..`.
     /// # Errors
     /// [`ErrorKind::Config`] for anything else.
     pub fn parse(text: &str) -> Result<Self> {
@@ -119,6 +122,9 @@ impl Target {
         };
         if text == "-" {
             return Ok(Self::Standard);
+        }
+        if let Some(rest) = text.strip_prefix("zenoh/") {
+            return ZenohAddress::parse(rest).map(Self::Zenoh).map_err(wrong);
         }
         let Some((scheme, rest)) = text.split_once("://") else { return Err(wrong("expected an address")) };
         let only_place = |place: &str| -> Result<String> {
@@ -163,6 +169,7 @@ impl Target {
             "nats" => Err(Error::new(ErrorKind::Config, "this build does not speak nats://")
                 .at(&shown)
                 .hint("build it with: cargo install --path crates/boresight-cli --features nats")),
+            "zenoh" => Err(wrong("a key of zenoh follows one slash: zenoh/site/camera")),
             other => Err(wrong(&format!("{other}:// is not spoken here"))),
         }
     }
@@ -184,6 +191,7 @@ impl Target {
                 })?;
                 Self::Asterix { address: address.clone(), options: AsterixOptions { sic, ..*options } }
             }
+            Self::Zenoh(address) => Self::Zenoh(address.below(name)),
             Self::Standard | Self::Udp { .. } | Self::Cot { .. } => self.clone(),
         })
     }
@@ -249,6 +257,28 @@ mod tests {
             Target::parse("mqtt://u:secret@h/t").unwrap()
         );
         assert!(!said.contains("secret"), "{said}");
+    }
+
+    #[test]
+    fn a_key_of_zenoh_and_how_its_network_is_found() {
+        let zenoh = |text: &str| match Target::parse(text) {
+            Ok(Target::Zenoh(address)) => address.command().words,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(zenoh("zenoh/site/cam"), ["site/cam", "--acknowledge"]);
+        assert_eq!(
+            zenoh("zenoh/a?connect=tcp/10.0.0.1:7447&cbor&config=z.json5"),
+            ["a", "--acknowledge", "--connect", "tcp/10.0.0.1:7447", "--cbor", "--config", "z.json5"]
+        );
+        let Target::Zenoh(north) = Target::parse("zenoh/a?cbor").unwrap().of_source("north", 0).unwrap() else {
+            panic!("zenoh")
+        };
+        assert_eq!(north.command().words, ["a/north", "--acknowledge", "--cbor"]);
+        for bad in
+            ["zenoh/", "zenoh//a", "zenoh/a/", "zenoh/a/*", "zenoh/-a", "zenoh/a?fast", "zenoh/a?connect=", "zenoh://a"]
+        {
+            assert!(Target::parse(bad).unwrap_err().to_string().contains("zenoh/"), "{bad}");
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The wire: events to standard output, datagrams, a broker; places on Earth as Cursor on Target and ASTERIX.
+//! The wire: events to standard output, datagrams, a broker, a program; places on Earth as Cursor on Target and ASTERIX.
 
 mod address;
 mod asterix;
@@ -13,8 +13,10 @@ mod mqtt;
 #[cfg(feature = "nats")]
 mod nats;
 mod open;
+mod program;
 mod udp;
 mod unplaced;
+mod zenoh_address;
 
 pub use address::{Broker, Target};
 pub use asterix::Asterix;
@@ -26,3 +28,4 @@ pub use mqtt::Mqtt;
 pub use nats::Nats;
 pub use open::publisher;
 pub use udp::Udp;
+pub use zenoh_address::ZenohAddress;

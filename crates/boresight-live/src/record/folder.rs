@@ -9,7 +9,7 @@ use super::segment::Segment;
 use crate::board::Board;
 use crate::output::{LiveOutput, Shown};
 use boresight::track::TrackerParameters;
-use boresight::{Config, Error, ErrorKind, PixelKind, Result, io};
+use boresight::{Config, Error, ErrorKind, PixelKind, Result, Scan, io};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -160,6 +160,22 @@ impl Record {
         io::write_whole(self.dir.join("manifest.json"), &text)
     }
 
+    /// Writes, unless the last try failed a moment ago.
+    fn unless_it_rests(&mut self, write: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        if self.rests_until.is_some_and(|until| Instant::now() < until) {
+            return Err(
+                Error::new(ErrorKind::Output, "the record rests: it could not be written").at(self.dir.display())
+            );
+        }
+        let outcome = write(self);
+        self.rests_until = outcome.is_err().then(|| Instant::now() + REST);
+        if outcome.is_err() {
+            // What is half written stays readable; the next try begins a segment of its own.
+            self.close();
+        }
+        outcome
+    }
+
     fn write(&mut self, shown: &Shown<'_>) -> Result<()> {
         let is_full = |(segment, since): &(Segment, Instant)| {
             self.told(&segment.entry).bytes >= self.options.segment_bytes || since.elapsed() >= self.options.segment_age
@@ -221,18 +237,16 @@ impl LiveOutput for Record {
     }
 
     fn put(&mut self, shown: &Shown<'_>) -> Result<()> {
-        if self.rests_until.is_some_and(|until| Instant::now() < until) {
-            return Err(
-                Error::new(ErrorKind::Output, "the record rests: it could not be written").at(self.dir.display())
-            );
-        }
-        let outcome = self.write(shown);
-        self.rests_until = outcome.is_err().then(|| Instant::now() + REST);
-        if outcome.is_err() {
-            // What is half written stays readable; the next try begins a segment of its own.
-            self.close();
-        }
-        outcome
+        self.unless_it_rests(|record| record.write(shown))
+    }
+
+    fn late(&mut self, scan: &Scan, arrived_unix_s: f64) -> Result<()> {
+        self.unless_it_rests(|record| {
+            if record.open.is_none() {
+                record.roll()?;
+            }
+            record.open.as_mut().map_or(Ok(()), |(segment, _)| segment.put_late(scan, arrived_unix_s))
+        })
     }
 
     fn finish(&mut self) {

@@ -9,7 +9,7 @@ use crate::motion::MotionLine;
 use crate::output::Shown;
 use boresight::io::{self, DetectionsCsv, JsonLines, Output, TracksCsv};
 use boresight::track::TrackerParameters;
-use boresight::{Error, ErrorKind, Result, Sink};
+use boresight::{Error, ErrorKind, Result, Scan, Sink, View};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -100,6 +100,16 @@ impl Segment {
         entry.times_s = Some([entry.times_s.map_or(time_s, |t| t[0]), time_s]);
         entry.arrived_unix_s = Some([entry.arrived_unix_s.map_or(at, |a| a[0]), at]);
         Ok(())
+    }
+
+    /// Writes a scan that came late, to the lines alone: the tables are in the order of time.
+    /// # Errors
+    /// [`ErrorKind::Output`] if it cannot be written.
+    pub fn put_late(&mut self, scan: &Scan, arrived_unix_s: f64) -> Result<()> {
+        // The lines are the first part.
+        let Some(lines) = self.parts.first_mut() else { return Ok(()) };
+        lines.sink.put(&View { frame: None, scan, tracks: &[] })?;
+        self.write_out(&format!("{{\"arrived_unix_s\":{arrived_unix_s},\"late\":true,"))
     }
 
     /// Hands what the sinks made to the files; the line of JSON begins with `head` instead of its brace.

@@ -12,11 +12,15 @@ const EDGES_S: [f64; 10] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5
 /// A number of a source: its name, its kind, what it is, and how it is had; `None`: it is not known yet.
 type Number = (&'static str, &'static str, &'static str, fn(&Board) -> Option<f64>);
 
-const NUMBERS: [Number; 31] = [
+const NUMBERS: [Number; 27] = [
     ("frames_total", "counter", "Frames or scans that came from the source.", |b| count(&b.counts.arrived)),
     ("frames_tracked_total", "counter", "Frames that went through detector and tracker.", |b| count(&b.counts.tracked)),
     ("frames_dropped_total", "counter", "Frames that a newer one replaced.", |b| count(&b.counts.dropped)),
     ("frames_refused_total", "counter", "Frames that detector or tracker refused.", |b| count(&b.counts.refused)),
+    ("scans_late_total", "counter", "Scans that came late and were taken at their own time.", |b| {
+        count(&b.counts.late)
+    }),
+    ("scans_too_late_total", "counter", "Scans that came too late and were left out.", |b| count(&b.counts.too_late)),
     ("bad_lines_total", "counter", "Lines of detections that could not be read.", |b| count(&b.counts.bad_lines)),
     ("source_lost_total", "counter", "Times that the source was lost.", |b| count(&b.counts.lost)),
     ("detections_total", "counter", "Detections.", |b| count(&b.counts.detections)),
@@ -56,24 +60,6 @@ const NUMBERS: [Number; 31] = [
     ("nis_lately", "gauge", "The same over the last half minute or so, where the parameters follow the scans.", |b| {
         b.notes().nis_lately
     }),
-    ("tracker_detection_covariance_scale", "gauge", "Factor on the covariances that detections state.", |b| {
-        b.parameters().map(|p| p.detection_covariance_scale)
-    }),
-    ("tracker_extra_noise_px", "gauge", "Noise of a position beyond what is stated.", |b| {
-        b.parameters().map(|p| p.extra_noise_px)
-    }),
-    ("tracker_acceleration_density_px2_per_s3", "gauge", "Density of the white acceleration.", |b| {
-        b.parameters().map(|p| p.acceleration_density_px2_per_s3)
-    }),
-    ("tracker_detection_probability", "gauge", "Probability that a target is detected.", |b| {
-        b.parameters().map(|p| p.detection_probability)
-    }),
-    ("tracker_redetection_probability", "gauge", "The same after a miss.", |b| {
-        b.parameters().and_then(|p| p.redetection_probability)
-    }),
-    ("tracker_clutter_density_per_px2", "gauge", "False detections per square pixel and scan.", |b| {
-        b.parameters().map(|p| p.clutter_density_per_px2)
-    }),
     ("nis_count", "gauge", "Innovations behind the mean.", |b| b.mean_nis().map(|n| n.1 as f64)),
 ];
 
@@ -98,6 +84,24 @@ pub fn text(boards: &[&Board], n_refused: u64) -> String {
             if let Some(value) = value(board) {
                 let _ = writeln!(out, "boresight_{name}{{source=\"{}\"}} {value}", label(&board.source));
             }
+        }
+    }
+    // The parameters that a run may change by itself, named by their keys.
+    let parameters: Vec<_> = boards.iter().map(|board| board.parameters().map(|p| p.values())).collect();
+    for k in 0..parameters.iter().flatten().map(|values| values.len()).next().unwrap_or(0) {
+        let mut begun = false;
+        for (board, values) in boards.iter().zip(&parameters) {
+            let Some((key, Some(value))) = values.map(|values| values[k]) else { continue };
+            let name = format!("tracker_{}", key.replace('-', "_"));
+            if !std::mem::replace(&mut begun, true) {
+                head(
+                    &mut out,
+                    &name,
+                    "gauge",
+                    &format!("What the tracker assumes now: tracker.{key} of the configuration."),
+                );
+            }
+            let _ = writeln!(out, "boresight_{name}{{source=\"{}\"}} {value}", label(&board.source));
         }
     }
     head(&mut out, "requests_refused_total", "counter", "Requests that were refused.");
@@ -133,11 +137,20 @@ mod tests {
     #[test]
     fn every_number_stands_once_under_each_source_and_a_name_cannot_break_its_line() {
         let boards = [Board::new("north", |_| {}), Board::new("a\"b\\c\nd", |_| {})];
+        let config = boresight::Config::default().tracker;
+        boards[1].assumes(boresight::track::TrackerParameters::of(&config));
         let text = text(&[&boards[0], &boards[1]], 3);
         let lines = |start: &str| text.lines().filter(|l| l.starts_with(start)).count();
         assert_eq!((lines("# TYPE boresight_frames_total "), lines("boresight_frames_total{")), (1, 2), "{text}");
         assert_eq!((lines("# TYPE boresight_latency_seconds "), lines("boresight_latency_seconds_count{")), (1, 2));
         assert!(text.contains("boresight_tracks{source=\"a\\\"b\\\\c\\nd\"} 0\n"), "{text}");
+        let extra =
+            format!("boresight_tracker_extra_noise_px{{source=\"a\\\"b\\\\c\\nd\"}} {}\n", config.extra_noise_px);
+        assert!(text.contains(&extra), "{extra} {text}");
+        assert_eq!(
+            (lines("# TYPE boresight_tracker_extra_noise_px "), lines("boresight_tracker_extra_noise_px{")),
+            (1, 1)
+        );
         assert!(text.contains("boresight_requests_refused_total 3\n"));
     }
 }

@@ -51,13 +51,13 @@ impl Address {
         }
         if let Some(socket) = &mut self.socket {
             self.gives_lines = true;
-            return Ok(Box::new(DetectionLines::new(BufReader::new(socket.connect()?))));
+            return Ok(Box::new(DetectionLines::new(BufReader::new(socket.connect()?), self.input.late_s)));
         }
         if self.name == "-" {
             if begins_as_json(&mut stdin().lock()) {
                 self.gives_lines = true;
                 // The lock cannot move to the reader's thread; the buffer beneath is the same.
-                return Ok(Box::new(DetectionLines::new(BufReader::new(stdin()))));
+                return Ok(Box::new(DetectionLines::new(BufReader::new(stdin()), self.input.late_s)));
             }
         } else if !self.is_stream()
             && let Ok(file) = File::open(&self.name)
@@ -65,7 +65,7 @@ impl Address {
             let mut reader = BufReader::new(file);
             if begins_as_json(&mut reader) {
                 self.gives_lines = true;
-                return Ok(Box::new(DetectionLines::new(reader)));
+                return Ok(Box::new(DetectionLines::new(reader, self.input.late_s)));
             }
             if io::is_table(&self.name) {
                 return Err(Error::new(ErrorKind::Unsupported, "a table does not happen: it is there already")

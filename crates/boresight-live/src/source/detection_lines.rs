@@ -104,13 +104,16 @@ pub struct DetectionLines<R> {
     n_lines: u64,
     n_bad: u64,
     has_stamps: bool,
+    late_ns: i64,
     warnings: Vec<String>,
 }
 
 impl<R: BufRead + Send> DetectionLines<R> {
-    /// Lines of this reader.
-    pub fn new(reader: R) -> Self {
-        Self { reader, line: Vec::new(), n_given: 0, n_lines: 0, n_bad: 0, has_stamps: true, warnings: Vec::new() }
+    /// Lines of this reader, which may come so late, s, by their times.
+    pub fn new(reader: R, late_s: f64) -> Self {
+        let late_ns = Timestamp::from_secs_f64(late_s).ns;
+        let (line, warnings) = (Vec::new(), Vec::new());
+        Self { reader, line, n_given: 0, n_lines: 0, n_bad: 0, has_stamps: true, late_ns, warnings }
     }
 
     /// Reads a line into `self.line`; of one that is too long only its beginning is kept. `false` at the end.
@@ -164,6 +167,10 @@ impl<R: BufRead + Send> Feed for DetectionLines<R> {
         self.has_stamps
     }
 
+    fn late_ns(&self) -> Option<i64> {
+        Some(self.late_ns)
+    }
+
     fn info(&self) -> Option<&SourceInfo> {
         None
     }
@@ -182,7 +189,7 @@ mod tests {
     use super::*;
 
     fn all(text: &[u8]) -> (Vec<Scan>, u64) {
-        let mut lines = DetectionLines::new(std::io::BufReader::with_capacity(16, text));
+        let mut lines = DetectionLines::new(std::io::BufReader::with_capacity(16, text), 1.0);
         let mut scans = Vec::new();
         while let Some(Content::Scan(scan)) = lines.next().unwrap() {
             scans.push(scan);

@@ -35,6 +35,10 @@ pub trait Feed: Send {
     fn has_stamps(&self) -> bool {
         true
     }
+    /// How far a stamp may lie before the newest and is late, ns; `None` where stamps only run back when the stream's clock begins anew.
+    fn late_ns(&self) -> Option<i64> {
+        None
+    }
     /// What is known of the frames; `None` for detections.
     fn info(&self) -> Option<&SourceInfo>;
     /// Lines that could not be read, so far.

@@ -24,7 +24,12 @@ impl Feed for Paced {
     fn next(&mut self) -> Result<Option<Content>> {
         let Some(content) = self.feed.next()? else { return Ok(None) };
         let stamp = content.stamp();
+        let is_late = |last: Timestamp| {
+            self.feed.late_ns().is_some_and(|late| stamp < last && last.ns.saturating_sub(stamp.ns) <= late)
+        };
         let due = match self.last {
+            // Its time is over: it is handed out at once, and those behind it keep theirs.
+            Some((last, _)) if is_late(last) => return Ok(Some(content)),
             Some((last, when)) => when + Duration::from_secs_f64(stamp.seconds_since(last).clamp(0.0, LONGEST_S)),
             None => Instant::now(),
         };
@@ -35,6 +40,10 @@ impl Feed for Paced {
 
     fn has_stamps(&self) -> bool {
         self.feed.has_stamps()
+    }
+
+    fn late_ns(&self) -> Option<i64> {
+        self.feed.late_ns()
     }
 
     fn info(&self) -> Option<&SourceInfo> {

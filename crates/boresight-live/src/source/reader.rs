@@ -119,10 +119,14 @@ impl Reader {
             let Some(mut content) = next? else { return Ok(()) };
             let (at, wall) = (Instant::now(), SystemTime::now());
             let stamp = feed.has_stamps().then(|| content.stamp());
-            let time = self.line.at(stamp, at);
-            restamp(&mut content, self.n_read, time);
+            let time = self.line.at_or_late(stamp, at, feed.late_ns());
             self.n_read += 1;
             self.board.counts.arrived.store(self.n_read, Ordering::Relaxed);
+            let Some(time) = time else {
+                self.board.too_late();
+                continue;
+            };
+            restamp(&mut content, self.n_read - 1, time);
             let arrived = Arrived { content, info: info.clone(), at, wall };
             if self.slot.is_closed() {
                 return Ok(());

@@ -125,11 +125,20 @@ impl Adaptation {
 
     /// Leaves alone what a key of the configuration (`tracker.extra-noise-px`) says by hand.
     pub fn freeze(&mut self, key: &str) {
-        let is = |part: &str| key.contains(part);
-        self.frozen.measurement |= is("extra-noise") || is("detection-covariance-scale");
-        self.frozen.motion |= is("acceleration-");
-        self.frozen.detection |= is("detection-probability");
-        self.frozen.clutter |= is("clutter-density");
+        let frozen = &mut self.frozen;
+        match key.trim() {
+            "tracker.detection-covariance-scale" | "tracker.extra-noise-px" | "tracker.extra-noise-per-height" => {
+                frozen.measurement = true;
+            }
+            "tracker.acceleration-density-px2-per-s3" | "tracker.acceleration-density-per-height2-per-s3" => {
+                frozen.motion = true;
+            }
+            "tracker.detection-probability" | "tracker.redetection-probability" => frozen.detection = true,
+            "tracker.clutter-density-per-px2" => frozen.clutter = true,
+            // The table as a whole.
+            "tracker" => *frozen = Frozen { measurement: true, motion: true, detection: true, clutter: true },
+            _ => {}
+        }
     }
 
     /// Takes what a tracker that began anew assumes: its tracks are others, and so are what is frozen.

@@ -49,6 +49,9 @@ pub struct InputConfig {
     /// Layout of headerless frames; needed for raw input only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw: Option<RawFormat>,
+    /// How late a scan of detections may come to a live run by its time stamp, s, 0..=60: up to that it is taken at its own time, and the scans behind it again.
+    /// Longer costs memory and, with each late scan, time. Of no effect on frames and tables.
+    pub late_s: f64,
     /// How a table of detections is read; of no effect on frames.
     pub table: TableOptions,
     /// What is mended of grey frames before anything is detected: dark and flat frames, bad pixels, columns.
@@ -65,6 +68,7 @@ impl Default for InputConfig {
             page_step: o.page_step,
             first_page: o.first_page,
             raw: None,
+            late_s: 1.0,
             table: Default::default(),
             sensor: SensorConfig::default(),
         }
@@ -96,6 +100,11 @@ impl InputConfig {
             return Err(Error::new(ErrorKind::Config, "expected a rate above 0 frames/s")
                 .at(format!("{at}.rate-hz = {}", self.rate_hz))
                 .hint(format!("leave it out for {ASSUMED_RATE_HZ} frames/s")));
+        }
+        if !(0.0..=60.0).contains(&self.late_s) {
+            return Err(Error::new(ErrorKind::Config, "expected a time from 0 to 60 s")
+                .at(format!("{at}.late-s = {}", self.late_s))
+                .hint("1 waits for a sensor on a slow network; 0 takes scans in order only"));
         }
         if self.max_pixels == 0 {
             return Err(Error::new(ErrorKind::Config, "expected a number of pixels above 0")

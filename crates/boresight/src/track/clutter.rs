@@ -80,6 +80,7 @@ impl ClutterConfig {
 }
 
 /// The density in use.
+#[derive(Clone)]
 pub(super) struct Clutter {
     config: ClutterConfig,
     given: f64,

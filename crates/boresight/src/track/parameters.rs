@@ -46,6 +46,20 @@ impl TrackerParameters {
         }
     }
 
+    /// All of them by the names of their keys in the tracker's configuration, in its order; none where it is not set.
+    pub fn values(&self) -> [(&'static str, Option<f64>); 8] {
+        [
+            ("detection-covariance-scale", Some(self.detection_covariance_scale)),
+            ("extra-noise-px", Some(self.extra_noise_px)),
+            ("extra-noise-per-height", Some(self.extra_noise_per_height)),
+            ("acceleration-density-px2-per-s3", Some(self.acceleration_density_px2_per_s3)),
+            ("acceleration-density-per-height2-per-s3", Some(self.acceleration_density_per_height2_per_s3)),
+            ("detection-probability", Some(self.detection_probability)),
+            ("redetection-probability", self.redetection_probability),
+            ("clutter-density-per-px2", Some(self.clutter_density_per_px2)),
+        ]
+    }
+
     /// The configuration with them.
     /// # Errors
     /// A value outside its range.
@@ -69,6 +83,24 @@ impl TrackerParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_is_named_by_its_key_and_none_is_missing() {
+        let config = TrackerConfig { redetection_probability: Some(0.6), ..TrackerConfig::default() };
+        let parameters = TrackerParameters::of(&config);
+        let serde_json::Value::Object(fields) = serde_json::to_value(parameters).unwrap() else { panic!("an object") };
+        let named = |(key, value): (&str, Option<f64>)| (key.replace('-', "_"), value.unwrap());
+        let mut all: Vec<(String, f64)> = parameters.values().map(named).to_vec();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        let mut fields: Vec<(String, f64)> = fields.into_iter().map(|(k, v)| (k, v.as_f64().unwrap())).collect();
+        fields.sort_by(|a, b| a.0.cmp(&b.0));
+        assert_eq!(all, fields);
+        // The names are keys of a file.
+        for (key, value) in parameters.values() {
+            let set = format!("tracker.{key}={:?}", value.unwrap());
+            assert!(crate::Config::default().with(&set).is_ok(), "{set}");
+        }
+    }
 
     #[test]
     fn what_is_taken_out_of_a_configuration_goes_back_in_and_nonsense_does_not() {

@@ -92,7 +92,7 @@ pub(super) enum Identity {
 }
 
 /// Tracks that were lost.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Reidentification {
     /// The oldest first.
     lost: VecDeque<Lost>,

@@ -7,7 +7,7 @@
 
 use super::backward::Backward;
 use super::parameters::TrackerParameters;
-use super::tracking::Tracking;
+use super::tracking::{Tracking, renumber_states};
 use crate::camera::SteadyGround;
 use crate::{Result, Scan, TrackId, TrackState};
 
@@ -56,6 +56,22 @@ impl Tracking for Stabilised {
 
     fn renamed(&self) -> &[(TrackId, TrackId)] {
         self.inner.renamed()
+    }
+
+    fn twin(&self) -> Option<Box<dyn Tracking>> {
+        let twin = Self::new(self.inner.twin()?, self.field_px);
+        Some(Box::new(Self { ground: self.ground, ..twin }))
+    }
+
+    fn next_id(&self) -> TrackId {
+        self.inner.next_id()
+    }
+
+    fn renumber(&mut self, next: TrackId, pairs: &[(TrackId, TrackId)]) -> &[TrackState] {
+        renumber_states(&mut self.states, pairs);
+        let inner = self.inner.renumber(next, pairs);
+        // As in a step: a tracker that was not steadied has the states itself.
+        if self.ground.has_moved() || self.field_px.is_some() { &self.states } else { inner }
     }
 
     fn retrospective_s(&self) -> f64 {

@@ -30,7 +30,7 @@ use super::step::plot_time::look_ahead;
 use super::step::predict::predict;
 use super::step::report::report;
 use super::step::update::update;
-use super::tracking::Tracking;
+use super::tracking::{Tracking, renumber_states};
 use crate::{Error, ErrorKind, Result, Scan, Timestamp, TrackId, TrackState, TrackStatus};
 use boresight_filters::Weighted;
 
@@ -305,6 +305,35 @@ impl Tracking for Tracker {
 
     fn renamed(&self) -> &[(TrackId, TrackId)] {
         &self.renamed
+    }
+
+    fn twin(&self) -> Option<Box<dyn Tracking>> {
+        let twin = Self::new(&self.config).ok()?;
+        Some(Box::new(Self {
+            clock: self.clock,
+            tracks: self.tracks.clone(),
+            next_id: self.next_id,
+            clutter: self.clutter.clone(),
+            cost: self.cost.clone(),
+            pending: self.pending.clone(),
+            lost: self.lost.clone(),
+            ..twin
+        }))
+    }
+
+    fn next_id(&self) -> TrackId {
+        TrackId(self.next_id)
+    }
+
+    fn renumber(&mut self, next: TrackId, pairs: &[(TrackId, TrackId)]) -> &[TrackState] {
+        self.next_id = self.next_id.max(next.0);
+        renumber_states(&mut self.states, pairs);
+        for t in &mut self.tracks {
+            if let Some((_, to)) = pairs.iter().find(|(from, _)| from.0 == t.id) {
+                t.id = to.0;
+            }
+        }
+        &self.states
     }
 
     fn retrospective_s(&self) -> f64 {

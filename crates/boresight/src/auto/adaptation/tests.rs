@@ -178,3 +178,23 @@ fn what_the_innovations_hardly_tell_does_not_wander() {
     let most = densities.windows(2).map(|w| (w[1] / w[0]).ln().abs()).fold(0.0, f64::max);
     assert!(most < 2f64.ln(), "a factor of two from one update to the next: {densities:?}");
 }
+
+#[test]
+fn a_key_is_known_by_its_whole_name() {
+    let config = config();
+    let frozen_by = |key: &str| {
+        let mut a = Adaptation::of(&config).unwrap();
+        a.freeze(key);
+        a.frozen
+    };
+    for (key, _) in TrackerParameters::of(&config).values() {
+        assert_ne!(frozen_by(&format!("tracker.{key}")), Frozen::default(), "{key}");
+    }
+    for other in
+        ["tracker.confirmation.existence.detection-probability", "detector.extra-noise-px", "tracker.coast-s", ""]
+    {
+        assert_eq!(frozen_by(other), Frozen::default(), "{other}");
+    }
+    let all = Frozen { measurement: true, motion: true, detection: true, clutter: true };
+    assert_eq!(frozen_by("tracker"), all);
+}

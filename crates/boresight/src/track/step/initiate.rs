@@ -34,7 +34,7 @@ struct Unassociated {
 }
 
 /// What waits for a second point.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::track) struct Pending {
     unassociated: Vec<Unassociated>,
     time: Timestamp,
