@@ -59,6 +59,16 @@ pub struct Found {
     pub spans_s: Vec<[f64; 2]>,
     /// The score that all but [`FAINT_SHARE`] of their detections reach; 0 of none.
     pub least_score: f64,
+    /// Scores of their detections, rising.
+    pub scores: Vec<f32>,
+}
+
+impl Found {
+    /// Detections of targets a scan that score as much or more.
+    pub fn per_scan_from(&self, score: f64) -> f64 {
+        let less = self.scores.partition_point(|s| f64::from(*s) < score);
+        self.per_scan * (self.scores.len() - less) as f64 / self.scores.len().max(1) as f64
+    }
 }
 
 /// What is known of one track.
@@ -116,12 +126,11 @@ pub fn learn(
         let time_s = |k: usize| scans[k].time.ns as f64 * 1e-9;
         let spans_s = targets().map(|t| [time_s(t.first), time_s(t.last)]).collect();
         let mut scores: Vec<f32> = held.iter().map(|h| scans[h.scan].detections[h.detection as usize].score).collect();
+        scores.sort_unstable_by(f32::total_cmp);
         let faint = (FAINT_SHARE * scores.len() as f64) as usize;
-        let least_score = match scores.is_empty() {
-            true => 0.0,
-            false => f64::from(*scores.select_nth_unstable_by(faint, f32::total_cmp).1),
-        };
-        found = Found { n_targets: targets().count(), per_scan: own as f64 / n_scans as f64, spans_s, least_score };
+        let least_score = scores.get(faint).map_or(0.0, |s| f64::from(*s));
+        let per_scan = own as f64 / n_scans as f64;
+        found = Found { n_targets: targets().count(), per_scan, spans_s, least_score, scores };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;

@@ -8,6 +8,7 @@
 //! Limits: a faint target beside a clear one is not looked for.
 
 use super::chains::Chain;
+use super::detection_statistics::{FAINT_SHARE, Found};
 use super::digits::round;
 use super::evidence::Evidence;
 use crate::Config;
@@ -23,7 +24,7 @@ const GAIN_SHARE: f64 = 0.1;
 const FALSE_STARTS: f64 = 0.01;
 
 /// Detections of targets after which it is known what hardly one of them falls short of: of so many some ten do, give or take three.
-pub const ENOUGH_HELD: f64 = 10.0 / super::detection_statistics::FAINT_SHARE;
+pub const ENOUGH_HELD: f64 = 10.0 / FAINT_SHARE;
 
 /// Lowers the least score that starts a track to what the chains show, and says whether it did; `clear_s` lists from when to when clear targets are followed, s.
 pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, reasons: &mut Vec<String>) -> bool {
@@ -55,14 +56,21 @@ pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, rea
     true
 }
 
-/// The score from which on false detections are at most [`FALSE_STARTS`] of those that start a track, with the reason, if it is higher than the one configured; `per_scan` detections a
-/// scan are targets', of a field of `area_px2`. Where all that stands is reported, nothing else tells what a codec makes of noise, which lasts for many frames, from a target.
-pub fn raised(per_scan: f64, area_px2: f64, config: &Config) -> Option<(f64, String)> {
+/// The score from which on false detections are at most [`FALSE_STARTS`] of those that start a track, with the reason, if it is higher than the one configured and there is any: of the
+/// targets `found` only those count that score as much. The field is of `area_px2`. Where all that stands is reported, nothing else tells what a codec makes of noise, which lasts for many
+/// frames, from a target.
+pub fn raised(found: &Found, area_px2: f64, config: &Config) -> Option<(f64, String)> {
     let t = &config.tracker;
     let law = t.score_likelihood.as_ref().filter(|_| t.report == Report::All && t.min_initiation_score > 0.0)?;
-    // Of n false ones of a scan n (s / least)^-k score more than s.
+    // Of n false ones of a scan n (s / least)^-k score more than s; each step upward loses targets, until it is consistent or none is left.
     let n_false = t.clutter_density_per_px2 * area_px2;
-    let score = round(law.least_score * (n_false / (FALSE_STARTS * per_scan)).powf(1.0 / law.clutter_exponent));
+    let asked = |targets: f64| law.least_score * (n_false / (FALSE_STARTS * targets)).powf(1.0 / law.clutter_exponent);
+    let (mut score, mut targets) = (t.min_initiation_score, found.per_scan_from(t.min_initiation_score));
+    while targets > 0.0 && asked(targets) > score {
+        score = asked(targets);
+        targets = found.per_scan_from(score);
+    }
+    let score = round(score);
     let reason = || {
         format!(
             "Detections of {score} start tracks, not of {}: of {n_false:.0} false ones a scan so few score more that they are {} % of all.",
@@ -70,7 +78,7 @@ pub fn raised(per_scan: f64, area_px2: f64, config: &Config) -> Option<(f64, Str
             100.0 * FALSE_STARTS,
         )
     };
-    (score > t.min_initiation_score && score.is_finite()).then(|| (score, reason()))
+    (targets > 0.0 && score > t.min_initiation_score && score.is_finite()).then(|| (score, reason()))
 }
 
 /// The least score that the detector then keeps, with the reason, if it keeps less now: what hardly a detection of a target falls short of (`least_score`), and no more than
@@ -146,13 +154,16 @@ mod tests {
             c.tracker.report = report;
             c.tracker.score_likelihood =
                 Some(ScoreLikelihoodConfig { least_score: 2.5, clutter_exponent: exponent, ..Default::default() });
-            raised(per_scan, 1e6, &c).map(|(score, _)| score)
+            let found = Found { per_scan, scores: vec![25.0; 50], ..Found::default() };
+            raised(&found, 1e6, &c).map(|(score, _)| score)
         };
         // Of 100 false ones 0.5 score more than 2.5 * 200^(1/5), a hundredth of 50.
         assert!((from(50.0, 5.0, Report::All).unwrap() - 7.21).abs() < 0.01);
         assert_eq!(from(50.0, 20.0, Report::All), None, "hardly any scores more than 4");
         assert_eq!(from(50.0, 5.0, Report::Moving), None, "the test of motion decides");
         assert_eq!(from(0.0, 5.0, Report::All), None, "no target, nothing to compare with");
+        // 2.5 * 200^(1/2) is 35: of such a law no score of 25 stands out, and one that no target reaches starts no track.
+        assert_eq!(from(50.0, 2.0, Report::All), None, "no score tells them apart");
     }
     #[test]
     fn what_hardly_a_target_scores_is_not_kept_and_nothing_that_starts_a_track_goes() {

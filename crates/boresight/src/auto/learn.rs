@@ -136,7 +136,7 @@ fn raise(
 ) -> Result<(Option<Found>, bool)> {
     let assumed = choice.clone();
     let found = statistics(scans, area_px2, false_tracks_per_hour, choice)?;
-    let raised = found.as_ref().and_then(|f| initiation_score::raised(f.per_scan, area_px2, &choice.config));
+    let raised = found.as_ref().and_then(|f| initiation_score::raised(f, area_px2, &choice.config));
     let Some((score, reason)) = raised else { return Ok((found, false)) };
     *choice = assumed;
     choice.config.tracker.min_initiation_score = score;

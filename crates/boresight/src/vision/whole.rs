@@ -12,7 +12,7 @@ pub fn sort(values: &mut [f32]) {
         .iter()
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (if v < l { v } else { l }, if v > h { v } else { h }));
     // Few are sorted sooner than so many counts are gone through.
-    if !(high - low < RANGE as f32) || values.len() < RANGE / 8 {
+    if high - low >= RANGE as f32 || values.len() < RANGE / 8 {
         values.sort_unstable_by(f32::total_cmp);
         return;
     }

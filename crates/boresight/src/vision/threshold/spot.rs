@@ -293,11 +293,12 @@ impl SpotDetector {
             let Some(row) = self.response.row(y as usize).get(from as usize..to.max(from) as usize) else { continue };
             let py = cy + f64::from(dy) - c.y;
             for (i, d) in row.iter().enumerate() {
-                if !(*d > 0.0) {
+                let d = d.max(0.0);
+                if d == 0.0 {
                     continue;
                 }
                 let px = (from + i as i64) as f64 - c.x;
-                let d = f64::from(*d);
+                let d = f64::from(d);
                 let r2 = px * px + py * py;
                 if r2 >= outer2 {
                     continue;
