@@ -20,7 +20,7 @@ use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::plane::{self, Limits, corners_apart};
 use super::reduce::{factor, reduce};
 use super::wide::Wide;
-use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity};
+use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity, motion_jacobian};
 use nalgebra::{Matrix3, Matrix4, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,8 @@ pub enum CameraConfig {
 
 /// Motions of the corners below this are none to a camera at rest, reduced px: what compression leaves of a still image.
 const STILL: f64 = 0.2;
+/// χ², 2 degrees of freedom, 1e-4: a corner that has moved by less than this allows may not have moved.
+const CHANCE: f64 = 18.42;
 /// Frames within [`STILL`] after which the camera is at rest.
 const REST_FRAMES: u32 = 10;
 /// An even texture is believed once the image has moved by this, reduced px: a sensor's fixed pattern and a codec's copies never do.
@@ -281,7 +283,7 @@ impl CameraMotionEstimator {
     ) -> (Homography, MotionCov, MotionBasis) {
         let middle = scales.middle;
         let before = self.from_key;
-        self.from_key = self.rest.settle(&before, &found.now_from_key, middle);
+        self.from_key = self.rest.settle(&before, &found, middle);
         let step = if self.from_key == before { Homography::identity() } else { before.inverse().then(&self.from_key) };
         self.turning = found.turned && self.rest.moving;
         // A step over bridged frames is none of one frame.
@@ -342,9 +344,10 @@ impl CameraMotionEstimator {
 
 impl Rest {
     /// Where the background is, by a fit: where it was, as long as the camera is at rest.
-    fn settle(&mut self, before: &Homography, fitted: &Homography, middle: Vector2<f64>) -> Homography {
+    fn settle(&mut self, before: &Homography, found: &Found, middle: Vector2<f64>) -> Homography {
+        let fitted = &found.now_from_key;
         if !self.moving {
-            if corners_apart(fitted, before, middle) <= STILL {
+            if !moves(before, found, middle) {
                 return *before;
             }
             (self.moving, self.began_at, self.n_quiet) = (true, *fitted, 0);
@@ -356,6 +359,17 @@ impl Rest {
         }
         *fitted
     }
+}
+
+/// Whether a corner has moved by more than [`STILL`], and by more than chance.
+fn moves(before: &Homography, found: &Found, middle: Vector2<f64>) -> bool {
+    let corners = [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)];
+    corners.into_iter().map(|(x, y)| Vector2::new(x * middle.x, y * middle.y)).any(|corner| {
+        let to = found.now_from_key.apply(corner);
+        let (e, j) = (to - before.apply(corner), motion_jacobian(to - middle));
+        let chance = (j * found.cov * j.transpose()).cholesky().is_some_and(|c| e.dot(&c.solve(&e)) <= CHANCE);
+        e.norm() > STILL && !chance
+    })
 }
 
 /// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
