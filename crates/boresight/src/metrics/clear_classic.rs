@@ -246,6 +246,29 @@ mod tests {
     }
 
     #[test]
+    fn the_counts_of_sequences_add() {
+        let counts = |first: u64| ClearClassic {
+            matches: first,
+            switches: first + 1,
+            misses: first + 2,
+            false_positives: first + 3,
+            fragmentations: first + 4,
+            mostly_tracked: first + 5,
+            partially_tracked: first + 6,
+            mostly_lost: first + 7,
+            transfers: first + 8,
+            ascends: first + 9,
+            migrates: first + 10,
+            distance_sum: first as f64 / 4.0,
+        };
+        let both = ClearClassic::combined(&[counts(20), counts(30)]);
+        assert_eq!((both.matches, both.switches, both.misses, both.false_positives), (50, 52, 54, 56));
+        assert_eq!((both.fragmentations, both.mostly_tracked, both.partially_tracked), (58, 60, 62));
+        assert_eq!((both.mostly_lost, both.transfers, both.ascends, both.migrates), (64, 66, 68, 70));
+        assert_eq!(both.distance_sum, 12.5);
+    }
+
+    #[test]
     fn the_last_match_is_carried_over_a_gap() {
         // Result 7 follows the truth, is away for a frame, and comes back beside a better box 8: 7 keeps it.
         let truth = table(&[(0, 1, 0.0), (1, 1, 0.0), (2, 1, 0.0)]);

@@ -323,4 +323,26 @@ mod tests {
         assert_eq!(alphas()[2], 0.15000000000000002);
         assert_eq!(alphas()[18], 0.9500000000000001);
     }
+
+    #[test]
+    fn sequences_together_weigh_association_and_place_by_their_matches() {
+        let one = |tp: f64, missed: f64, x: f64| Hota {
+            tp: [tp; N_ALPHA],
+            fn_: [missed; N_ALPHA],
+            fp: [2.0 * missed; N_ALPHA],
+            ass_a: [x; N_ALPHA],
+            ass_re: [x / 2.0; N_ALPHA],
+            ass_pr: [x / 4.0; N_ALPHA],
+            loc_a: [x / 8.0; N_ALPHA],
+        };
+        // 30 matches at 0.4 and 10 at 0.8: 0.5.
+        let h = Hota::combined(&[one(30.0, 5.0, 0.4), one(10.0, 7.0, 0.8)]);
+        let last = |c: Curve| c[N_ALPHA - 1];
+        assert_eq!((last(h.tp), last(h.fn_), last(h.fp)), (40.0, 12.0, 24.0));
+        for (got, want) in [(h.ass_a, 0.5), (h.ass_re, 0.25), (h.ass_pr, 0.125), (h.loc_a, 0.0625)] {
+            assert!((last(got) - want).abs() < 1e-15, "{} {want}", last(got));
+        }
+        assert!((last(h.hota()) - (40.0 / 76.0 * 0.5_f64).sqrt()).abs() < 1e-15);
+        assert!((last(h.owta()) - (40.0 / 52.0 * 0.5_f64).sqrt()).abs() < 1e-15);
+    }
 }

@@ -88,4 +88,13 @@ mod tests {
         let i = identity(20, 20, 2, &[(0, 0), (0, 1), (1, 0)], &[9, 8, 8]);
         assert_eq!(i.idtp, 16);
     }
+
+    #[test]
+    fn precision_is_of_the_result_and_recall_of_the_truth() {
+        // 6 rows in common of 10 in the truth and 8 in the result.
+        let i = identity(10, 8, 1, &[(0, 0)], &[6]);
+        assert_eq!((i.idp(), i.idr(), i.idf1()), (0.75, 0.6, 6.0 / 9.0));
+        let both = Identity::combined(&[i, identity(5, 5, 1, &[(0, 0)], &[5])]);
+        assert_eq!((both.idtp, both.idfn, both.idfp), (11, 4, 2));
+    }
 }

@@ -220,6 +220,8 @@ mod tests {
         // A colour pixel counts as three values.
         let rgb = |v: [u8; 3]| Pixels::Rgb8(Image::from_vec(1, 1, vec![v]).unwrap());
         assert_eq!(compare_pixels(&rgb([1, 2, 3]), &rgb([1, 2, 6]), None).unwrap().mse, 3.0);
+        let wide = |v: [u8; 3]| Pixels::Rgb8(Image::from_vec(2, 1, vec![[0; 3], v]).unwrap());
+        assert_eq!(compare_pixels(&wide([1, 2, 3]), &wide([1, 2, 6]), None).unwrap().mse, 1.5);
         let float = || Pixels::GrayF32(Image::from_vec(1, 1, vec![0.5]).unwrap());
         assert!(compare_pixels(&float(), &float(), None).unwrap_err().to_string().contains("no largest value"));
         assert_eq!(compare_pixels(&float(), &float(), Some(1.0)).unwrap().mse, 0.0);

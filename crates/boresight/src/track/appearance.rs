@@ -33,3 +33,22 @@ impl Appearance {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Extent;
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn size_and_sum_go_a_share_of_the_way_and_the_class_is_the_newest() {
+        let at = Vector2::zeros();
+        let d = |w, h| Detection::at(at, Matrix2::identity()).with_extent(Extent::around(at, w, h));
+        let mut a = Appearance::of(&Detection { sum: 10.0, class: Some(ClassId(1)), ..d(8.0, 4.0) });
+        assert_eq!(a, Appearance { size: [8.0, 4.0], sum: 10.0, class: Some(ClassId(1)) });
+        a.follow(&Detection { sum: 30.0, class: None, ..d(12.0, 2.0) }, 0.25);
+        assert_eq!(a, Appearance { size: [9.0, 3.5], sum: 15.0, class: Some(ClassId(1)) });
+        a.follow(&Detection { sum: 15.0, class: Some(ClassId(3)), ..d(9.0, 3.5) }, 0.25);
+        assert_eq!(a, Appearance { size: [9.0, 3.5], sum: 15.0, class: Some(ClassId(3)) });
+    }
+}

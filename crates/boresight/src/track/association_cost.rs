@@ -210,6 +210,8 @@ pub fn giou(a: &Extent, b: &Extent) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ClassId;
+    use nalgebra::{Matrix2, Vector2};
 
     #[test]
     fn overlap_of_two_boxes_follows_the_definitions() {
@@ -219,5 +221,93 @@ mod tests {
         assert!((iou(&a, &b) - 1.0 / 7.0).abs() < 1e-15);
         assert!((giou(&a, &b) - (1.0 / 7.0 - 2.0 / 9.0)).abs() < 1e-15);
         assert_eq!(iou(&Extent::default(), &Extent::default()), 0.0);
+    }
+
+    /// A track of 8 x 4 px, sum 100, class 1.
+    fn seen() -> Appearance {
+        Appearance { size: [8.0, 4.0], sum: 100.0, class: Some(ClassId(1)) }
+    }
+
+    fn detection(width_px: f64, height_px: f64, sum: f64) -> Detection {
+        let extent = Extent::around(Vector2::new(50.0, 20.0), width_px, height_px);
+        let d = Detection::at(Vector2::new(50.0, 20.0), Matrix2::identity()).with_extent(extent);
+        Detection { sum, class: Some(ClassId(1)), ..d }
+    }
+
+    /// What a pair of that track where the detection is costs by one term.
+    fn cost(config: AssociationCostConfig, d: &Detection) -> f64 {
+        AssociationCost::new(&config).cost(50.0, 20.0, &seen(), d)
+    }
+
+    #[test]
+    fn each_term_is_the_square_of_its_deviations_and_they_add() {
+        let size = AssociationCostConfig { size_log_std: Some(0.2), ..Default::default() };
+        let intensity = AssociationCostConfig { intensity_log_std: Some(0.5), ..Default::default() };
+        let class = AssociationCostConfig { class_cost: Some(7.0), ..Default::default() };
+        let (twice, e) = (2f64.ln() / 0.2, std::f64::consts::E);
+        // Twice as wide and a quarter as high: one and two doublings.
+        assert!((cost(size.clone(), &detection(16.0, 1.0, 100.0)) - 5.0 * twice * twice).abs() < 1e-9);
+        assert_eq!(cost(size.clone(), &detection(0.0, 4.0, 100.0)), 0.0, "nothing is known of a size of zero");
+        assert!((cost(intensity.clone(), &detection(8.0, 4.0, 100.0 * e)) - 4.0).abs() < 1e-9, "two deviations");
+        let other = Detection { class: Some(ClassId(2)), ..detection(8.0, 4.0, 100.0) };
+        assert_eq!((cost(class.clone(), &other), cost(class.clone(), &detection(8.0, 4.0, 100.0))), (7.0, 0.0));
+        assert_eq!(cost(class.clone(), &Detection { class: None, ..other }), 0.0);
+        let all = AssociationCostConfig {
+            size_log_std: size.size_log_std,
+            intensity_log_std: intensity.intensity_log_std,
+            class_cost: class.class_cost,
+            overlap: Some(OverlapConfig { weight: 6.0, ..OverlapConfig::default() }),
+            learn: false,
+        };
+        // Twice as wide, e times as bright, another class, half of the union shared.
+        let d = Detection { class: Some(ClassId(2)), ..detection(16.0, 4.0, 100.0 * e) };
+        assert!((cost(all.clone(), &d) - (twice * twice + 4.0 + 7.0 + 6.0 * 0.5)).abs() < 1e-9);
+        // Three deviations of both sides and of the sum, the prices as they are.
+        assert_eq!(all.budget(), 18.0 + 9.0 + 7.0 + 6.0);
+        assert_eq!(AssociationCostConfig { class_cost: Some(80.0), ..all }.budget(), 18.0 + 9.0 + 50.0 + 6.0);
+        assert_eq!(AssociationCostConfig::default().budget(), 0.0);
+    }
+
+    #[test]
+    fn overlap_is_of_boxes_grown_on_each_side_and_too_little_forbids_the_pair() {
+        let overlap = |buffer: f64, min_overlap: f64| AssociationCostConfig {
+            overlap: Some(OverlapConfig { kind: OverlapKind::Iou, weight: 10.0, min_overlap, buffer }),
+            ..Default::default()
+        };
+        // 8 x 4 px six px further right: 2 of 14 px are shared; grown by half on each side 16 px wide, 10 of 22.
+        let at = |buffer, min| {
+            AssociationCost::new(&overlap(buffer, min)).cost(44.0, 20.0, &seen(), &detection(8.0, 4.0, 1.0))
+        };
+        assert!((at(0.0, 0.0) - 10.0 * (1.0 - 2.0 / 14.0)).abs() < 1e-12);
+        assert!((at(0.5, 0.0) - 10.0 * (1.0 - 10.0 / 22.0)).abs() < 1e-12);
+        assert_eq!((at(0.0, 0.2), at(0.5, 0.2).is_finite()), (f64::INFINITY, true));
+        // 4 px wide in place of 8: 36 to 52 px and 46 to 54 px, 6 of 18.
+        let thin = AssociationCost::new(&overlap(0.5, 0.0)).cost(44.0, 20.0, &seen(), &detection(4.0, 4.0, 1.0));
+        assert!((thin - 10.0 * (1.0 - 6.0 / 18.0)).abs() < 1e-12);
+        // Above each other by 3 px of 4: grown by a quarter 6 px high, 3 of 9.
+        let below = AssociationCost::new(&overlap(0.25, 0.0)).cost(50.0, 17.0, &seen(), &detection(8.0, 4.0, 1.0));
+        assert!((below - 10.0 * (1.0 - 3.0 / 9.0)).abs() < 1e-12);
+        // 2 px high in place of 4: 14 to 20 px and 18.5 to 21.5 px, 1.5 of 7.5.
+        let flat = AssociationCost::new(&overlap(0.25, 0.0)).cost(50.0, 17.0, &seen(), &detection(8.0, 2.0, 1.0));
+        assert!((flat - 10.0 * (1.0 - 1.5 / 7.5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_learnt_moves_by_its_share_towards_the_pair_that_was_made() {
+        let config = AssociationCostConfig {
+            size_log_std: Some(0.2),
+            intensity_log_std: Some(0.5),
+            learn: true,
+            ..Default::default()
+        };
+        let mut cost = AssociationCost::new(&config);
+        cost.learn(&seen(), &detection(16.0, 4.0, 400.0));
+        let ln2 = 2f64.ln();
+        // The mean of both sides' squares, one doubling and none; two doublings of the sum.
+        assert!((cost.variance[0] - (0.04 + 0.005 * (0.5 * ln2 * ln2 - 0.04))).abs() < 1e-12);
+        assert!((cost.variance[1] - (0.25 + 0.005 * (4.0 * ln2 * ln2 - 0.25))).abs() < 1e-12);
+        let mut given = AssociationCost::new(&AssociationCostConfig { learn: false, ..config });
+        given.learn(&seen(), &detection(16.0, 4.0, 400.0));
+        assert_eq!(given.variance, [0.2f64.powi(2), 0.25]);
     }
 }

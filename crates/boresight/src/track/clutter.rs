@@ -195,4 +195,28 @@ mod tests {
         }
         assert!((clutter.density() - 0.002).abs() < 1e-6);
     }
+
+    #[test]
+    fn each_cell_learns_what_was_seen_in_it_and_not_taken() {
+        let config = ClutterMapConfig { cell_px: 10.0, memory_s: 1.0, ..ClutterMapConfig::default() };
+        let mut clutter = Clutter::new(&ClutterConfig::Map(config), 1e-5);
+        // Two free ones in the first cell, one in the next, one taken in the third.
+        let seen = scan(&[(1.0, 1.0), (12.0, 1.0), (25.0, 1.0), (2.0, 8.0)]);
+        for _ in 0..200 {
+            clutter.learn(&seen, &[false, false, true, false], 0.1);
+        }
+        assert!((clutter.at(9.0, 9.0) - 0.02).abs() < 1e-6, "{}", clutter.at(9.0, 9.0));
+        assert!((clutter.at(19.0, 9.0) - 0.01).abs() < 1e-6, "{}", clutter.at(19.0, 9.0));
+        assert_eq!(clutter.at(25.0, 1.0), 1e-5);
+    }
+
+    #[test]
+    fn without_an_area_it_is_that_of_the_box_in_which_anything_was_seen() {
+        let mut clutter = Clutter::new(&ClutterConfig::PerScan(PerScanConfig::default()), 1e-5);
+        for _ in 0..2000 {
+            clutter.learn(&scan(&[(10.0, 5.0), (50.0, 25.0), (20.0, 10.0)]), &[false; 3], 1.0);
+        }
+        // 3 in 40 x 20 px.
+        assert!((clutter.density() - 3.0 / 800.0).abs() < 1e-9, "{}", clutter.density());
+    }
 }

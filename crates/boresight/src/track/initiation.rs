@@ -176,3 +176,40 @@ pub fn from_two_points(
     }
     Gaussian { mean: Vector4::new(z.x, velocity.x, z.y, velocity.y), cov }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// State [x, vx, y, vy]; the covariance of position i and velocity j stands at (2 i, 2 j + 1) and mirrored.
+    #[test]
+    fn a_velocity_that_came_with_the_point_brings_its_covariances_scaled() {
+        let r = Matrix2::new(1.0, 0.2, 0.2, 2.0);
+        let velocity = DetectedVelocity {
+            mean: Vector2::new(3.0, -4.0),
+            cov: Matrix2::new(5.0, 0.5, 0.5, 6.0),
+            with_position: Matrix2::new(0.1, 0.3, 0.4, 0.6),
+        };
+        let b = from_velocity(&Vector2::new(10.0, 20.0), &r, &velocity, 2.0);
+        assert_eq!(b.mean, Vector4::new(10.0, 3.0, 20.0, -4.0));
+        #[rustfmt::skip]
+        let want = Matrix4::new(
+            1.0, 0.2, 0.2, 0.6,
+            0.2, 10.0, 0.8, 1.0,
+            0.2, 0.8, 2.0, 1.2,
+            0.6, 1.0, 1.2, 12.0,
+        );
+        assert!((b.cov - want).abs().max() < 1e-15, "{}", b.cov);
+    }
+
+    /// v = (z₂ - z₁)/dt: Var v = (R₁ + R₂)/dt², Cov(z₂, v) = R₂/dt.
+    #[test]
+    fn two_points_give_the_covariances_of_their_difference() {
+        let (r1, r2) = (Matrix2::new(1.0, 0.1, 0.1, 2.0), Matrix2::new(3.0, 0.3, 0.3, 4.0));
+        let b = from_two_points(&Vector2::new(1.0, 2.0), &r1, &Vector2::new(2.0, 4.0), &r2, 0.5);
+        assert_eq!(b.mean, Vector4::new(2.0, 2.0, 4.0, 4.0));
+        assert_eq!((b.cov[(0, 1)], b.cov[(0, 3)], b.cov[(3, 2)]), (6.0, 0.6, 8.0));
+        assert!((b.cov[(1, 1)] - 16.0).abs() < 1e-12 && (b.cov[(1, 3)] - 1.6).abs() < 1e-12);
+        assert_eq!(b.cov, b.cov.transpose());
+    }
+}

@@ -210,3 +210,79 @@ fn a_gate_larger_than_the_square_of_false_detections_is_searched_whole() {
     };
     assert_eq!(scene.back(&config, 40).len(), 40);
 }
+
+/// Three scans `DT_S` apart with a detection of 0.3 px noise and 8 x 4 px that moves by 4 px to the right; the last one is 12 x 2 px.
+fn passing() -> Scene {
+    let scan = |k: u32| {
+        let at = Vector2::new(100.0 + 4.0 * f64::from(k), 50.0);
+        let (w, h) = if k == 2 { (12.0, 2.0) } else { (8.0, 4.0) };
+        let d = Detection::at(at, Matrix2::identity() * 0.09).with_extent(Extent::around(at, w, h));
+        Scan::at(FrameIndex(u64::from(k)), Timestamp::from_secs_f64(f64::from(k) * DT_S)).with_detections(vec![d])
+    };
+    Scene::of((0..3).map(scan).collect(), vec![Vector4::zeros(); 3])
+}
+
+/// The walk after the passing target's own three detections, the last first.
+fn walk_of<'a>(back: &'a Backward, scene: &Scene) -> Walk<'a> {
+    let own = (0..3).map(|k| Own { scan: &scene.scans[k], ground: scene.grounds[k], detection: 0 });
+    back.begin(own).unwrap()
+}
+
+#[test]
+fn the_walk_begins_with_the_velocity_and_the_size_of_its_own_detections() {
+    let back = Backward::of(&TrackerConfig { appearance_gain: 0.25, ..config() }).unwrap();
+    let scene = passing();
+    let walk = walk_of(&back, &scene);
+    let belief = walk.filter.belief();
+    // 100 px/s, reversed; three places of 0.3 px tell it to 0.3 / (√2 · 0.04) = 5.3 px/s, a prior of 87 px/s pulls by 0.4 %.
+    assert!((belief.mean[0] - 100.0).abs() < 0.3 && (belief.mean[1] + 100.0).abs() < 2.0, "{}", belief.mean);
+    assert!((belief.cov[(1, 1)].sqrt() - 5.3).abs() < 0.2, "{}", belief.cov);
+    // From 12 x 2 px two quarters of the way to 8 x 4 px.
+    assert_eq!(walk.side_px, [12.0 - 1.0 - 0.75, 2.0 + 0.5 + 0.375]);
+}
+
+#[test]
+fn a_detection_within_the_gate_is_looked_at_and_one_beyond_is_not() {
+    let back = Backward::of(&config()).unwrap();
+    let belief = Gaussian { mean: Vector4::new(50.0, 0.0, 60.0, 0.0), cov: nalgebra::Matrix4::identity() * 0.4 };
+    // S = 0.4 + 0.09 px²; the gate of 99.9 % is 13.8: 2.60 px.
+    for (off, within) in [(0.0, true), (2.2, true), (2.59, true), (2.61, false)] {
+        let mut past = passing();
+        past.scans[0].detections[0].position = Vector2::new(50.0 + off, 60.0);
+        let past = Scene::of(past.scans, past.truth);
+        let scene = passing();
+        let (likely, _) = walk_of(&back, &scene).look(&past.past(0), Vector2::new(50.0, 60.0), &belief);
+        assert_eq!(likely.is_some(), within, "{off} px");
+        assert!(likely.is_none_or(|l| (l.innovation.nis - off * off / 0.49).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn the_likelier_of_two_is_taken_whatever_their_order() {
+    let back = Backward::of(&config()).unwrap();
+    let belief = Gaussian { mean: Vector4::new(50.0, 0.0, 60.0, 0.0), cov: nalgebra::Matrix4::identity() * 0.4 };
+    for (near, far) in [([50.1, 60.0], [51.2, 61.2]), ([50.1, 60.0], [48.8, 58.8])] {
+        for order in [[near, far], [far, near]] {
+            let mut past = passing();
+            past.scans[0].detections =
+                order.map(|at| Detection::at(Vector2::from(at), Matrix2::identity() * 0.09)).to_vec();
+            let past = Scene::of(past.scans, past.truth);
+            let scene = passing();
+            let (likely, _) = walk_of(&back, &scene).look(&past.past(0), Vector2::new(50.0, 60.0), &belief);
+            assert_eq!(order[likely.unwrap().detection as usize], near);
+        }
+    }
+}
+
+/// Half a second of (4, -2) px/s in reversed time lies behind what was seen earlier; its variance comes on top.
+#[test]
+fn what_was_seen_before_its_scan_is_carried_there_with_the_velocitys_variance() {
+    let mut belief = Gaussian { mean: Vector4::new(0.0, 4.0, 0.0, -2.0), cov: nalgebra::Matrix4::zeros() };
+    (belief.cov[(1, 1)], belief.cov[(3, 3)]) = (8.0, 12.0);
+    (belief.cov[(1, 3)], belief.cov[(3, 1)]) = (2.0, 2.0);
+    let m = Measurement::isotropic(10.0, 20.0, 1.0);
+    let c = carried(m, 500_000_000, &belief);
+    assert_eq!(c.position, Vector2::new(8.0, 21.0));
+    assert_eq!(c.cov, Matrix2::new(3.0, 0.5, 0.5, 4.0));
+    assert_eq!(carried(m, 0, &belief), m);
+}
