@@ -17,6 +17,7 @@ mod limit;
 mod link_table;
 mod mot;
 mod mot_table;
+mod mutants;
 mod operating_curves;
 mod video_check;
 
@@ -57,6 +58,8 @@ enum Chore {
     LinkTable(link_table::Args),
     /// Tracks from MOTChallenge detections beside SORT's: HOTA, IDF1, MOTA.
     MotTable(mot_table::Args),
+    /// How strong the tests are: mutants of one build, switched on one by one.
+    Mutants(mutants::Args),
     /// Delay and share held against the false tracks that are allowed, written to docs/operating-curves.md.
     OperatingCurves(operating_curves::Args),
     /// Compare decoded video with ffmpeg's frames, live.
@@ -78,6 +81,7 @@ fn main() -> anyhow::Result<()> {
         Chore::Limit(args) => limit::run(&args),
         Chore::LinkTable(args) => link_table::run(&args),
         Chore::MotTable(args) => mot_table::run(&args),
+        Chore::Mutants(args) => mutants::run(&args),
         Chore::OperatingCurves(args) => operating_curves::run(&args),
         Chore::VideoCheck(args) => video_check::run(&args),
     }

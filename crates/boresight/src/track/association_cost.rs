@@ -281,9 +281,15 @@ mod tests {
         assert!((at(0.0, 0.0) - 10.0 * (1.0 - 2.0 / 14.0)).abs() < 1e-12);
         assert!((at(0.5, 0.0) - 10.0 * (1.0 - 10.0 / 22.0)).abs() < 1e-12);
         assert_eq!((at(0.0, 0.2), at(0.5, 0.2).is_finite()), (f64::INFINITY, true));
+        // 4 px wide in place of 8: 36 to 52 px and 46 to 54 px, 6 of 18.
+        let thin = AssociationCost::new(&overlap(0.5, 0.0)).cost(44.0, 20.0, &seen(), &detection(4.0, 4.0, 1.0));
+        assert!((thin - 10.0 * (1.0 - 6.0 / 18.0)).abs() < 1e-12);
         // Above each other by 3 px of 4: grown by a quarter 6 px high, 3 of 9.
         let below = AssociationCost::new(&overlap(0.25, 0.0)).cost(50.0, 17.0, &seen(), &detection(8.0, 4.0, 1.0));
         assert!((below - 10.0 * (1.0 - 3.0 / 9.0)).abs() < 1e-12);
+        // 2 px high in place of 4: 14 to 20 px and 18.5 to 21.5 px, 1.5 of 7.5.
+        let flat = AssociationCost::new(&overlap(0.25, 0.0)).cost(50.0, 17.0, &seen(), &detection(8.0, 2.0, 1.0));
+        assert!((flat - 10.0 * (1.0 - 1.5 / 7.5)).abs() < 1e-12);
     }
 
     #[test]
