@@ -5,7 +5,7 @@
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
 //! is chosen by what they say ([`super::plane`]).
-//! Against a key frame errors do not add up. A camera at rest stays exactly at rest until its corners have moved by [`STILL`]; it comes to rest
+//! Against a key frame errors do not add up. A camera at rest stays exactly at rest until a patch has moved by [`STILL`]; it comes to rest
 //! again after [`REST_FRAMES`] within that.
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
 //! again or, where the last frame is found, replaced. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
@@ -38,7 +38,7 @@ pub enum CameraConfig {
 
 /// Motions of the corners below this are none to a camera at rest, reduced px: what compression leaves of a still image.
 const STILL: f64 = 0.2;
-/// χ², 2 degrees of freedom, 1e-4: a corner that has moved by less than this allows may not have moved.
+/// χ², 2 degrees of freedom, 1e-4: a place that has moved by less than this allows may not have moved.
 const CHANCE: f64 = 18.42;
 /// Frames within [`STILL`] after which the camera is at rest.
 const REST_FRAMES: u32 = 10;
@@ -283,7 +283,8 @@ impl CameraMotionEstimator {
     ) -> (Homography, MotionCov, MotionBasis) {
         let middle = scales.middle;
         let before = self.from_key;
-        self.from_key = self.rest.settle(&before, &found, middle);
+        let places = self.key.patches.iter().map(|p| p.middle());
+        self.from_key = self.rest.settle(&before, &found, middle, places);
         let step = if self.from_key == before { Homography::identity() } else { before.inverse().then(&self.from_key) };
         self.turning = found.turned && self.rest.moving;
         // A step over bridged frames is none of one frame.
@@ -343,11 +344,17 @@ impl CameraMotionEstimator {
 }
 
 impl Rest {
-    /// Where the background is, by a fit: where it was, as long as the camera is at rest.
-    fn settle(&mut self, before: &Homography, found: &Found, middle: Vector2<f64>) -> Homography {
+    /// Where the background is, by a fit: where it was, as long as the camera is at rest. `places` are those that the fit rests on.
+    fn settle(
+        &mut self,
+        before: &Homography,
+        found: &Found,
+        middle: Vector2<f64>,
+        places: impl Iterator<Item = Vector2<f64>>,
+    ) -> Homography {
         let fitted = &found.now_from_key;
         if !self.moving {
-            if !moves(before, found, middle) {
+            if !moves(before, found, middle, places) {
                 return *before;
             }
             (self.moving, self.began_at, self.n_quiet) = (true, *fitted, 0);
@@ -361,12 +368,16 @@ impl Rest {
     }
 }
 
-/// Whether a corner has moved by more than [`STILL`], and by more than chance.
-fn moves(before: &Homography, found: &Found, middle: Vector2<f64>) -> bool {
-    let corners = [(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (2.0, 2.0)];
-    corners.into_iter().map(|(x, y)| Vector2::new(x * middle.x, y * middle.y)).any(|corner| {
-        let to = found.now_from_key.apply(corner);
-        let (e, j) = (to - before.apply(corner), motion_jacobian(to - middle));
+/// Whether one of the places has moved by more than [`STILL`], and by more than chance. Corners without patches, as a sky's, are extrapolated: they say nothing of a camera at rest.
+fn moves(
+    before: &Homography,
+    found: &Found,
+    middle: Vector2<f64>,
+    mut places: impl Iterator<Item = Vector2<f64>>,
+) -> bool {
+    places.any(|place| {
+        let to = found.now_from_key.apply(place);
+        let (e, j) = (to - before.apply(place), motion_jacobian(to - middle));
         let chance = (j * found.cov * j.transpose()).cholesky().is_some_and(|c| e.dot(&c.solve(&e)) <= CHANCE);
         e.norm() > STILL && !chance
     })

@@ -33,7 +33,9 @@ pub fn run(python: &Path, pairs: &[Pair], film: &[Image<u8>]) -> Result<Peers> {
     let out = Command::new(python).arg(script).arg(&folder).output()?;
     ensure!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let mut peers = Peers::default();
-    for row in csv::ReaderBuilder::new().has_headers(false).flexible(true).from_path(folder.join("answers.csv"))?.records() {
+    for row in
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_path(folder.join("answers.csv"))?.records()
+    {
         let row = row?;
         let field = |i: usize| row.get(i).context("a short row");
         let (method, k, time_s) = (field(0)?, field(1)?, field(2)?.parse::<f64>()?);
