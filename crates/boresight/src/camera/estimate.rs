@@ -104,6 +104,8 @@ struct Found {
     turned: bool,
     /// Whether it shows in enough of the image to be the background's beyond doubt.
     covers: bool,
+    /// Patches of the reduced frame that were found.
+    n_coarse: usize,
 }
 
 /// The frame's sizes.
@@ -204,6 +206,7 @@ impl CameraMotionEstimator {
             least_turn_px: if self.turning { 0.0 } else { STILL },
             agree_px,
         })?;
+        let n_coarse = self.matches.len();
         // What is no similarity bends the coarse matches already.
         let limits = Limits { least_px: STILL, most_px: BEND * agree_px };
         let start =
@@ -230,9 +233,9 @@ impl CameraMotionEstimator {
             covers = n_for.max(n_agree) as f64 >= LEAST_COVER * n_cells as f64;
         }
         let found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
-            Some(fine) => Found { covers, ..fine },
+            Some(fine) => Found { covers, n_coarse, ..fine },
             // Nothing else speaks for it.
-            None => Found { covers: false, ..coarse },
+            None => Found { covers: false, n_coarse, ..coarse },
         };
         let moved = corners_apart(&found.now_from_key, &Homography::identity(), middle) > BELIEVED;
         let key = if at_last { &self.last } else { &self.key };
@@ -270,6 +273,7 @@ impl CameraMotionEstimator {
             cov: scaled_cov(&plane.cov, 1.0 / scale),
             turned: plane.n_numbers > 2,
             covers: true,
+            n_coarse: 0,
         })
     }
 
@@ -303,7 +307,7 @@ impl CameraMotionEstimator {
         let linear = self.from_key.similarity_at(middle);
         let turned = linear.angle_rad().abs() > KEY_TURN || linear.zoom().ln().abs() > KEY_TURN;
         // Soon too few patches would be left to agree; a camera at rest keeps its key frame, and with it its place.
-        let few = self.rest.moving && self.matches.len() < MIN_PATCHES + 2;
+        let few = self.rest.moving && found.n_coarse < MIN_PATCHES + 2;
         // The last frame's own pixels are gone: this one is as good a key, unless its even texture must first be seen to move.
         let blunt = at_last && !self.key.even;
         if far || turned || few || blunt {
@@ -397,7 +401,13 @@ fn coarse(
     if is_similar {
         let fit = fit(matches, &expected(similarity(predicted), similarity(last)), weights)?;
         let now_from_key = Homography::of_similarity(&fit.now_from_key);
-        return Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: fit.turned, covers: true });
+        return Some(Found {
+            now_from_key,
+            cov: of_similarity(&fit.cov),
+            turned: fit.turned,
+            covers: true,
+            n_coarse: 0,
+        });
     }
     let none = Similarity::identity();
     matches.iter_mut().for_each(|m| m.from = predicted.apply(m.from));
@@ -406,7 +416,7 @@ fn coarse(
     matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
     let fit = fit?;
     let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
-    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true })
+    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
 }
 
 /// A similarity's covariance among the eight numbers.

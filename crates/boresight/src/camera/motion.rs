@@ -23,8 +23,8 @@ pub struct CameraPath {
 impl CameraPath {
     /// Variance of where the background lies now against where it lay at `start`, px² per axis, mean over the image.
     ///
-    /// Measured steps are known against a key frame, so that only the errors of both ends count, and what was held in between is made up for. It stays
-    /// where the key frame was not found again.
+    /// Measured steps are known against a key frame, so that only the errors of both ends count, and what was held in between is made up for. Where the key frame was not
+    /// found again, another view has begun, and nothing is known of how far it lies from the last one.
     pub fn variance_since(&self, start: &Self) -> f64 {
         start.step_variance_px2 + self.step_variance_px2 + self.held_variance_px2 - start.held_variance_px2
     }
@@ -40,7 +40,9 @@ impl CameraPath {
             self.step_variance_px2 = 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
             match m.basis {
                 MotionBasis::Held => self.bridge_px2 = self.step_variance_px2,
-                MotionBasis::Resumed => self.held_variance_px2 += std::mem::take(&mut self.bridge_px2),
+                // Another view: how far it lies from the last one nobody knows, anywhere in the image's size. A side's square over 12 is a half side's over 3, and that of one axis in the
+                // mean is the spread.
+                MotionBasis::Resumed => self.held_variance_px2 += std::mem::take(&mut self.bridge_px2).max(spread),
                 MotionBasis::Measured => self.bridge_px2 = 0.0,
             }
         } else {
@@ -74,6 +76,7 @@ mod tests {
         let motion = |basis, variance: f64| {
             let mut m = CameraMotion::exact_shift(Vector2::new(1.0, 0.0));
             (m.basis, m.cov[(0, 0)], m.cov[(1, 1)]) = (basis, variance, variance);
+            m.centre_px = Vector2::new(160.0, 120.0);
             m
         };
         let variance_after = |last| {
@@ -91,7 +94,8 @@ mod tests {
             path.variance_since(&start)
         };
         assert_eq!(variance_after(MotionBasis::Measured), 0.25);
-        assert_eq!(variance_after(MotionBasis::Resumed), 9.25);
+        // 320 x 240 px: a place anywhere in it has the variance (320² + 240²) / 24 an axis.
+        assert!((variance_after(MotionBasis::Resumed) - (0.25 + 160_000.0 / 24.0)).abs() < 1e-9);
     }
 
     #[test]
