@@ -340,17 +340,17 @@ mod tests {
     fn a_weighted_update_stands_in_the_history_and_one_of_no_weight_does_not() {
         let (cv, first) = start();
         let fresh = Kf::<Cv, 4>::from_point(cv, &first, 2.0).unwrap();
-        let mut in_order = fresh.clone();
+        let mut in_order = fresh;
         for (dt_s, m) in [(0.5, z(1)), (0.2, late(1)), (0.3, z(2))] {
             in_order.predict(dt_s).unwrap();
             in_order.correct(&m).unwrap();
         }
         for how in [Late::Retrodict, Late::Replay] {
-            let mut wrapped = OutOfSequence::<_, Cv, 8>::new(fresh.clone(), how);
+            let mut wrapped = OutOfSequence::<_, Cv, 8>::new(fresh, how);
             wrapped.predict(0.5).unwrap();
             wrapped.correct(&z(1)).unwrap();
             wrapped.predict(0.5).unwrap();
-            let before = wrapped.clone();
+            let before = wrapped;
             wrapped.correct_weighted([Weighted { measurement: z(9), weight: 0.0 }].into_iter()).unwrap();
             assert_eq!(wrapped, before);
             wrapped.correct_weighted([Weighted { measurement: z(2), weight: 1.0 }].into_iter()).unwrap();

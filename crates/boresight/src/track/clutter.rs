@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn each_cell_learns_what_was_seen_in_it_and_not_taken() {
-        let config = ClutterMapConfig { cell_px: 10.0, memory_s: 1.0, ..ClutterMapConfig::default() };
+        let config = ClutterMapConfig { cell_px: 10.0, memory_s: 1.0 };
         let mut clutter = Clutter::new(&ClutterConfig::Map(config), 1e-5);
         // Two free ones in the first cell, one in the next, one taken in the third.
         let seen = scan(&[(1.0, 1.0), (12.0, 1.0), (25.0, 1.0), (2.0, 8.0)]);

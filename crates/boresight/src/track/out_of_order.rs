@@ -17,6 +17,7 @@ use std::collections::{BTreeMap, VecDeque};
 const COPIES: i64 = 8;
 
 /// What the tracker was given.
+#[expect(clippy::large_enum_variant, reason = "nearly all are scans, and a box of each would be an allocation a scan")]
 enum Given {
     Scan(Scan),
     Parameters(TrackerParameters),

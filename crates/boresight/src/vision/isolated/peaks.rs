@@ -31,6 +31,10 @@ pub fn find<T: Pixel>(
     peaks: &mut Vec<Peak>,
 ) {
     peaks.clear();
+    // The border's pixels are none.
+    if image.width() < 3 || image.height() < 3 {
+        return;
+    }
     let (columns, dark) = (cells.size().0, bar.sign < 0.0);
     let (width, small) = (image.width(), SideClass::of(1));
     let Some(finite) = T::band(f64::MIN, f64::MAX) else { return };
