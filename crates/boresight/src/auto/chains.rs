@@ -38,12 +38,11 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Whether it goes with another one, as a thing's edge or shadow goes with the thing: in most of the scans with both they touch. `same` gives the other's number of each
-    /// of its scans.
-    pub fn goes_with(&self, other: &Self, same: &[Option<usize>]) -> bool {
+    /// Whether it goes with another one, as a thing's edge or shadow goes with the thing: in most of the scans with both they touch.
+    pub fn goes_with(&self, other: &Self) -> bool {
         let (mut both, mut near) = (0usize, 0usize);
         for (k, a) in &self.hits {
-            if let Some((_, b)) = other.hits.iter().find(|h| same.get(*k) == Some(&Some(h.0))) {
+            if let Some((_, b)) = other.hits.iter().find(|h| h.0 == *k) {
                 both += 1;
                 near += usize::from((a.at - b.at).norm() <= a.side_px + b.side_px + 2.0);
             }

@@ -12,7 +12,9 @@ use crate::Scan;
 
 /// Why the choice is not borne out by its first pass, whose chains are `evidence`; nothing if it is.
 pub(super) fn lost(evidence: &Evidence, scans: &[Scan], choice: &Choice, instead: &Choice) -> Option<String> {
-    let n_detections: usize = scans.iter().take(evidence.times_s.len()).map(|s| s.detections.len()).sum();
+    // Those that the chains were looked for in: scans in which nothing could be seen were not.
+    let looked = scans.iter().filter(|s| !s.blind).take(evidence.times_s.len());
+    let n_detections: usize = looked.map(|s| s.detections.len()).sum();
     let share = evidence.n_hits() as f64 / n_detections.max(1) as f64;
     (share < LEAST_EXPLAINED).then(|| {
         let [name, other] = [choice, instead].map(|c| c.config.detector.threshold.name());
@@ -59,5 +61,18 @@ mod tests {
         assert_eq!(reason(2), None);
         assert!(reason(18).is_some_and(|r| r.contains("10 %")), "{:?}", reason(18));
         assert!(lost(&Evidence::default(), &[], &choice, &choice).is_some(), "nothing seen bears nothing out");
+    }
+
+    #[test]
+    fn scans_in_which_nothing_could_be_seen_do_not_count() {
+        let choice = Choice::alone(Config::default(), Vec::new());
+        // Two of sixteen go somewhere; of the detections of the first forty of all scans it would be two of eight.
+        let mut late = scans(14);
+        let blind = |k: u64| Scan { blind: true, ..Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * k as f64)) };
+        late.iter_mut().for_each(|s| s.time = Timestamp::from_ns(s.time.ns + 800_000_000));
+        let late: Vec<Scan> = (0..20).map(blind).chain(late).collect();
+        let evidence = Evidence::of_scans(&late, 9e4);
+        assert_eq!(evidence.times_s.len(), 40);
+        assert!(lost(&evidence, &late, &choice, &choice).is_some());
     }
 }

@@ -109,10 +109,7 @@ impl Evidence {
 
     /// Gain of those chains that go with none of `other`, nats, beyond that of the surrogates.
     pub fn gain_beside(&self, other: &Self) -> f64 {
-        // A detector may have been blind in scans in which the other one saw.
-        let at = |t: &f64| other.times_s.binary_search_by(|o| o.total_cmp(t)).ok();
-        let same: Vec<Option<usize>> = self.times_s.iter().map(at).collect();
-        let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o, &same)));
+        let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o)));
         own.map(|c| c.gain).sum::<f64>() - self.by_chance[1]
     }
 
