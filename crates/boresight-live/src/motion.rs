@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn a_motion_comes_back_bit_by_bit() {
-        for basis in [MotionBasis::Measured, MotionBasis::Held, MotionBasis::Resumed] {
+        for basis in [MotionBasis::Measured, MotionBasis::Held, MotionBasis::Resumed, MotionBasis::Cut] {
             comes_back(basis);
         }
     }

@@ -27,6 +27,8 @@ pub enum MotionBasis {
     Held,
     /// Seen again, but only against the scan before, which was held: what was not known of the place there is never made up for.
     Resumed,
+    /// Another view has begun: nothing of before is seen any more, and nothing is known of how far it lies from it.
+    Cut,
 }
 
 impl MotionBasis {
@@ -36,12 +38,13 @@ impl MotionBasis {
             Self::Measured => "measured",
             Self::Held => "held",
             Self::Resumed => "resumed",
+            Self::Cut => "cut",
         }
     }
 
     /// The basis of a word, if it is one.
     pub fn of_word(word: &str) -> Option<Self> {
-        [Self::Measured, Self::Held, Self::Resumed].into_iter().find(|b| b.word() == word)
+        [Self::Measured, Self::Held, Self::Resumed, Self::Cut].into_iter().find(|b| b.word() == word)
     }
 }
 
@@ -77,7 +80,13 @@ impl CameraMotion {
 
     /// The shift, if it was measured in this scan.
     pub fn measured_shift_px(&self) -> Option<Vector2<f64>> {
-        (self.basis != MotionBasis::Held && self.is_finite()).then(|| self.shift_px())
+        (matches!(self.basis, MotionBasis::Measured | MotionBasis::Resumed) && self.is_finite())
+            .then(|| self.shift_px())
+    }
+
+    /// Whether another view has begun.
+    pub fn is_cut(&self) -> bool {
+        self.basis == MotionBasis::Cut
     }
 
     /// Covariance of where the background lies at a point of the image, px².

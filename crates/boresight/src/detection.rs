@@ -207,6 +207,11 @@ impl Scan {
         Self { camera_motion, ..self }
     }
 
+    /// Whether another view begins with it: of what was known before nothing holds any more.
+    pub fn is_cut(&self) -> bool {
+        self.camera_motion.is_some_and(|m| m.is_cut())
+    }
+
     /// As one in which nothing could be detected, or not.
     pub fn with_blind(self, blind: bool) -> Self {
         Self { blind, ..self }

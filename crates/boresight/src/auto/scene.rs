@@ -32,8 +32,9 @@ const MIN_AREA: u32 = 6;
 const LOOKS: usize = 12;
 /// Score from which an isolated blob explains what moves there: that from which it would start a track.
 const BLOB_SCORE: f64 = 6.0;
-/// A camera that came no farther than this share of the frame's width stands still.
-const STILL_SHARE: f64 = 0.004;
+/// A camera that came no farther than this share of the frame's width stands still, or nods about its place: half of the least side of what moves
+/// ([`super::moving`]), so that its own motion makes no such thing.
+const STILL_SHARE: f64 = 0.01;
 /// Least difference from the background that counts as moving in 8-bit frames, counts: above what codecs leave.
 const MIN_COUNTS: f32 = 12.0;
 
@@ -110,7 +111,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     for g in &grids {
         // No time passes: the background stays what it is.
         background.update(g, 0.0)?;
-        edges_moved += edges.iter().filter(|&&(x, y)| background.moving().get(x, y)).count();
+        edges_moved += edges.iter().filter(|e| e.has_moved(g)).count();
         clusters.begin(g.width());
         all += background.moving().count();
         for y in 0..g.height() {
@@ -156,8 +157,24 @@ fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
     }
 }
 
-/// The pixels of the background whose neighbour to the right or below differs so far that a shift of one pixel shows.
-fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(usize, usize)> {
+/// A pixel of the background that differs so far from its neighbour to the right or below that a shift of one pixel shows.
+struct Edge {
+    x: usize,
+    y: usize,
+    mean: f32,
+    /// How far it differs.
+    step: f32,
+}
+
+impl Edge {
+    /// Whether a frame has something else there. The pixel's own deviation does not count: an edge that moves makes it as large as the edge.
+    fn has_moved(&self, grid: &Image<f32>) -> bool {
+        (grid.row(self.y)[self.x] - self.mean).abs() > 0.5 * self.step
+    }
+}
+
+/// The edges of the background.
+fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<Edge> {
     let at = |x: usize, y: usize| background.mean(x, y).unwrap_or(0.0);
     let mut noise: Vec<f32> = (0..w * h).step_by(7).filter_map(|i| background.deviation(i % w, i / w)).collect();
     let middle = noise.len() / 2;
@@ -165,7 +182,11 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<(
     let least = (16.0 * typical).max(if bytes { 2.0 * MIN_COUNTS } else { f32::MIN_POSITIVE });
     let inside = (0..h.saturating_sub(1)).flat_map(|y| (0..w.saturating_sub(1)).map(move |x| (x, y)));
     inside
-        .filter(|&(x, y)| (at(x + 1, y) - at(x, y)).abs() > least || (at(x, y + 1) - at(x, y)).abs() > least)
+        .map(|(x, y)| {
+            let mean = at(x, y);
+            Edge { x, y, mean, step: (at(x + 1, y) - mean).abs().max((at(x, y + 1) - mean).abs()) }
+        })
+        .filter(|e| e.step > least)
         .collect()
 }
 
@@ -181,7 +202,7 @@ fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (
         steps.push(step.map_or(Homography::identity(), |s| s.now_from_before));
         if let Some(step) = step {
             moved = moved.then(&step.now_from_before);
-            if step.basis != MotionBasis::Held {
+            if matches!(step.basis, MotionBasis::Measured | MotionBasis::Resumed) {
                 said += 1;
                 // A turn and a zoom about the middle show at the corners.
                 let (w, h) = (frame.pixels.width() as f64, frame.pixels.height() as f64);

@@ -5,10 +5,10 @@
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
 //! is chosen by what they say ([`super::plane`]).
-//! Against a key frame errors do not add up. A camera at rest stays exactly at rest until a patch has moved by [`STILL`]; it comes to rest
-//! again after [`REST_FRAMES`] within that.
+//! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
 //! again or, where the last frame is found, replaced. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
+//! Where nothing is found and the frame as a whole is another one ([`super::other_view`]), another view has begun ([`MotionBasis::Cut`]), and all begins anew.
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
@@ -17,11 +17,14 @@ use super::find_patch::{SEARCH, Vote, find, vote};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match, fit};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
+use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
 use super::reduce::{factor, reduce};
+use super::rest::{Rest, STILL};
+use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
 use super::wide::Wide;
-use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity, motion_jacobian};
-use nalgebra::{Matrix3, Matrix4, Vector2};
+use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity};
+use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -36,12 +39,6 @@ pub enum CameraConfig {
     Moving,
 }
 
-/// Motions of the corners below this are none to a camera at rest, reduced px: what compression leaves of a still image.
-const STILL: f64 = 0.2;
-/// χ², 2 degrees of freedom, 1e-4: a place that has moved by less than this allows may not have moved.
-const CHANCE: f64 = 18.42;
-/// Frames within [`STILL`] after which the camera is at rest.
-const REST_FRAMES: u32 = 10;
 /// An even texture is believed once the image has moved by this, reduced px: a sensor's fixed pattern and a codec's copies never do.
 const BELIEVED: f64 = 1.0;
 /// The key frame is replaced when it has moved by this share of the image, or turned (rad) or grown (logarithm) by this.
@@ -68,6 +65,7 @@ pub struct CameraMotionEstimator {
     key: KeyFrame,
     fine: FinePatches,
     wide: Wide,
+    view: OtherView,
     /// The last frame: where the key frame is not found it takes its place.
     last: KeyFrame,
     key_is_last: bool,
@@ -87,15 +85,6 @@ pub struct CameraMotionEstimator {
     weights: Vec<f64>,
 }
 
-/// Whether the camera is at rest; it is at first.
-#[derive(Clone, Copy, Debug, Default)]
-struct Rest {
-    moving: bool,
-    /// Where it was when the last quiet time began, and how many frames that is ago.
-    began_at: Homography,
-    n_quiet: u32,
-}
-
 /// Where the key frame's background lies now, reduced px.
 #[derive(Clone, Copy, Debug)]
 struct Found {
@@ -108,20 +97,11 @@ struct Found {
     n_coarse: usize,
 }
 
-/// The frame's sizes.
-#[derive(Clone, Copy, Debug)]
-struct Scales {
-    /// The reduced frame's middle, reduced px.
-    middle: Vector2<f64>,
-    /// Side of a block of the frame that becomes a reduced pixel, and a fine one.
-    factor: usize,
-    fine: usize,
-}
-
 impl CameraMotionEstimator {
     /// Takes the next frame and returns the background's motion since the last one; `None` where nothing can be said.
     pub fn step(&mut self, pixels: &Pixels) -> Option<CameraMotion> {
         reduce(pixels, &mut self.now, &mut self.sums);
+        self.view.take(&self.now);
         let middle = 0.5 * Vector2::new(self.now.width() as f64 - 1.0, self.now.height() as f64 - 1.0);
         let scales = Scales { middle, factor: factor(pixels.width()), fine: fine_factor(pixels.width()) };
         if (self.key.image.width(), self.key.image.height()) != (self.now.width(), self.now.height()) {
@@ -129,6 +109,12 @@ impl CameraMotionEstimator {
             return None;
         }
         let mut found = self.find(pixels, &scales);
+        let last = if self.key_is_last { &self.key.image } else { &self.last.image };
+        if found.is_none() && self.view.is_other(last, &self.now) {
+            self.start_anew(pixels, &scales);
+            let nothing = (Homography::identity(), MotionCov::zeros());
+            return Some(full_size(&nothing.0, &nothing.1, MotionBasis::Cut, &scales));
+        }
         let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
         self.n_unsure = if is_unsure { self.n_unsure + 1 } else { 0 };
         if is_unsure && self.n_unsure < UNSURE_FRAMES {
@@ -288,7 +274,7 @@ impl CameraMotionEstimator {
         let middle = scales.middle;
         let before = self.from_key;
         let places = self.key.patches.iter().map(|p| p.middle());
-        self.from_key = self.rest.settle(&before, &found, middle, places);
+        self.from_key = self.rest.settle(&before, (&found.now_from_key, &found.cov), middle, places);
         let step = if self.from_key == before { Homography::identity() } else { before.inverse().then(&self.from_key) };
         self.turning = found.turned && self.rest.moving;
         // A step over bridged frames is none of one frame.
@@ -347,46 +333,6 @@ impl CameraMotionEstimator {
     }
 }
 
-impl Rest {
-    /// Where the background is, by a fit: where it was, as long as the camera is at rest. `places` are those that the fit rests on.
-    fn settle(
-        &mut self,
-        before: &Homography,
-        found: &Found,
-        middle: Vector2<f64>,
-        places: impl Iterator<Item = Vector2<f64>>,
-    ) -> Homography {
-        let fitted = &found.now_from_key;
-        if !self.moving {
-            if !moves(before, found, middle, places) {
-                return *before;
-            }
-            (self.moving, self.began_at, self.n_quiet) = (true, *fitted, 0);
-        } else if corners_apart(fitted, &self.began_at, middle) <= STILL {
-            self.n_quiet += 1;
-            self.moving = self.n_quiet < REST_FRAMES;
-        } else {
-            (self.began_at, self.n_quiet) = (*fitted, 0);
-        }
-        *fitted
-    }
-}
-
-/// Whether one of the places has moved by more than [`STILL`], and by more than chance. Corners without patches, as a sky's, are extrapolated: they say nothing of a camera at rest.
-fn moves(
-    before: &Homography,
-    found: &Found,
-    middle: Vector2<f64>,
-    mut places: impl Iterator<Item = Vector2<f64>>,
-) -> bool {
-    places.any(|place| {
-        let to = found.now_from_key.apply(place);
-        let (e, j) = (to - before.apply(place), motion_jacobian(to - middle));
-        let chance = (j * found.cov * j.transpose()).cholesky().is_some_and(|c| e.dot(&c.solve(&e)) <= CHANCE);
-        e.norm() > STILL && !chance
-    })
-}
-
 /// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
 fn coarse(
     matches: &mut [Match],
@@ -417,37 +363,6 @@ fn coarse(
     let fit = fit?;
     let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
     Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
-}
-
-/// A similarity's covariance among the eight numbers.
-fn of_similarity(cov: &Matrix4<f64>) -> MotionCov {
-    let mut out = MotionCov::zeros();
-    out.fixed_view_mut::<4, 4>(0, 0).copy_from(cov);
-    out
-}
-
-/// A motion of an image in means of blocks of `from` px as that of one in blocks of `to` px: a mean's middle is that of its block.
-fn scaled(motion: &Homography, from: usize, to: usize) -> Homography {
-    let scale = from as f64 / to as f64;
-    if motion.is_shift() {
-        return Homography::shift(scale * motion.shift_at(Vector2::zeros()));
-    }
-    let first = 0.5 * (scale - 1.0);
-    let grow = Homography::of_matrix(Matrix3::new(scale, 0.0, first, 0.0, scale, first, 0.0, 0.0, 1.0));
-    grow.map_or(*motion, |grow| grow.inverse().then(motion).then(&grow))
-}
-
-/// The covariance of the eight numbers where lengths are `scale` times as many pixels.
-fn scaled_cov(cov: &MotionCov, scale: f64) -> MotionCov {
-    let unit = |i: usize| [scale, 1.0, 1.0, 1.0 / scale][i / 2];
-    MotionCov::from_fn(|i, j| cov[(i, j)] * unit(i) * unit(j))
-}
-
-/// A motion of the reduced frame as that of the frame.
-fn full_size(step: &Homography, cov: &MotionCov, basis: MotionBasis, scales: &Scales) -> CameraMotion {
-    let f = scales.factor as f64;
-    let centre_px = f * scales.middle + Vector2::repeat(0.5 * (f - 1.0));
-    CameraMotion { now_from_before: scaled(step, scales.factor, 1), centre_px, cov: scaled_cov(cov, f), basis }
 }
 
 #[cfg(test)]

@@ -42,7 +42,9 @@ impl CameraPath {
                 MotionBasis::Held => self.bridge_px2 = self.step_variance_px2,
                 // Another view: how far it lies from the last one nobody knows, anywhere in the image's size. A side's square over 12 is a half side's over 3, and that of one axis in the
                 // mean is the spread.
-                MotionBasis::Resumed => self.held_variance_px2 += std::mem::take(&mut self.bridge_px2).max(spread),
+                MotionBasis::Resumed | MotionBasis::Cut => {
+                    self.held_variance_px2 += std::mem::take(&mut self.bridge_px2).max(spread)
+                }
                 MotionBasis::Measured => self.bridge_px2 = 0.0,
             }
         } else {

@@ -5,6 +5,7 @@
 //! at that place ([`CameraMotion::cov_at`]). Tracks come back into the image after it, wholly: position, velocity, covariance, box, innovation.
 //! Symbols: x = H g (image from ground), A = dx/dg there; S, the motion since the scan before; u = (x - S⁻¹ x) / dt, the ground's own velocity in the image there (px/s);
 //! v_image = A v_ground + u; B = du/dx.
+//! Where another view begins, its first image is the ground from then on.
 //! Limits: what a perspective adds to a velocity's covariance within that of its position is left out; boxes keep their sides along the image's axes; numbers of the tracker's configuration in px are px of the first scan (at a zoom of 2 they are 2 px
 //! of the image); where the motion is unknown the ground is taken to stand still in the image.
 
@@ -28,7 +29,8 @@ impl SteadyGround {
         let motion = scan.camera_motion.filter(CameraMotion::is_finite);
         let step = motion.map_or(Homography::identity(), |m| m.now_from_before);
         Self {
-            image_from_ground: self.image_from_ground.then(&step),
+            // Of another view nobody knows where it lies: its first image is the ground.
+            image_from_ground: if scan.is_cut() { Homography::identity() } else { self.image_from_ground.then(&step) },
             motion,
             dt_s: self.time.map_or(0.0, |before| scan.time.seconds_since(before)),
             time: Some(scan.time),

@@ -193,6 +193,9 @@ impl Annotator {
     /// Appends to the trails and forgets what is old or ended.
     fn remember(&mut self, view: &View<'_>) {
         let now = view.scan.time;
+        if view.scan.is_cut() {
+            self.trails.clear();
+        }
         // Where the camera moves, trails stay on the ground.
         if let Some(motion) = view.scan.camera_motion.filter(CameraMotion::is_finite) {
             for (_, (x, y)) in self.trails.values_mut().flatten() {

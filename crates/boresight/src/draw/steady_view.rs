@@ -62,7 +62,7 @@ impl SteadyView {
         if !std::mem::replace(&mut self.started, true) {
             return None;
         }
-        let Some(motion) = motion else {
+        let Some(motion) = motion.filter(|m| !m.is_cut()) else {
             self.picture_from_image = Homography::identity();
             return None;
         };

@@ -64,7 +64,9 @@ fn mark(taken: &mut [bool], detection: Option<u32>) {
 mod tests {
     use crate::pipeline::{Input, run};
     use crate::track::{ConfirmationConfig, ExistenceConfig, build};
-    use crate::{Config, Detection, FrameIndex, Result, Scan, Sink, Timestamp, TrackStatus, View};
+    use crate::{
+        CameraMotion, Config, Detection, FrameIndex, MotionBasis, Result, Scan, Sink, Timestamp, TrackStatus, View,
+    };
     use nalgebra::{Matrix2, Vector2};
     use std::ops::ControlFlow;
     use std::sync::{Arc, Mutex};
@@ -90,20 +92,28 @@ mod tests {
             d.score = if k < 30 { 3.0 } else { 9.0 };
             Scan::at(FrameIndex(k), Timestamp::from_ns(k as i64 * 40_000_000)).with_detections(vec![d])
         };
-        let places = |retrospective_s: f64| {
+        let cut = |scan: Scan| {
+            let mut motion = CameraMotion::exact_shift(Vector2::zeros());
+            motion.basis = MotionBasis::Cut;
+            scan.with_camera_motion(Some(motion))
+        };
+        let places_with = |retrospective_s: f64, cut_at: Option<u64>| {
             let mut config = Config::default().tracker;
             config.confirmation = ConfirmationConfig::Existence(ExistenceConfig::default());
             (config.min_initiation_score, config.retrospective_s) = (5.0, retrospective_s);
             let places = Arc::default();
             let sinks: Vec<Box<dyn Sink>> = vec![Box::new(Places(Arc::clone(&places)))];
-            let input = Input::Scans((0..50).map(scan).collect());
+            let input = Input::Scans((0..50).map(|k| if cut_at == Some(k) { cut(scan(k)) } else { scan(k) }).collect());
             run(input, Some(build(&config).unwrap()), sinks, &mut |_| ControlFlow::Continue(()));
             places.lock().unwrap().clone()
         };
+        let places = |retrospective_s: f64| places_with(retrospective_s, None);
         assert!(places(0.0).iter().all(|(k, _)| *k > 30));
         let whole = places(10.0);
         assert_eq!(whole.iter().map(|p| p.0).collect::<Vec<_>>(), (0..50).collect::<Vec<_>>());
         assert!(whole.iter().all(|(k, x)| (x - 50.0 - 2.0 * *k as f64).abs() < 1.0), "{whole:?}");
+        let of_view: Vec<u64> = places_with(10.0, Some(20)).iter().map(|p| p.0).collect();
+        assert_eq!(of_view, (20..50).collect::<Vec<_>>(), "before a cut was another view");
         // Half a second is not held: what was given out stays.
         assert_eq!(places(0.4).first().map(|p| p.0 > 15), Some(true));
     }

@@ -138,14 +138,16 @@ impl Retrospect {
 fn continue_back(queue: &mut VecDeque<Held>, newest: &Held, track: &TrackState, backward: &Backward) -> usize {
     let own = |held: &Held| held.tracks.binary_search_by_key(&track.id, |t| t.id).ok();
     let first = queue.iter().position(|held| own(held).is_some()).unwrap_or(queue.len());
-    if first == 0 {
+    // A track of another view did not begin before it.
+    let view = (0..=first).rev().find(|&i| queue.get(i).unwrap_or(newest).scan.is_cut()).unwrap_or(0);
+    if first == view {
         return 0;
     }
     let taken = queue.range(first..).chain([newest]).filter_map(|held| {
         let detection = held.tracks[own(held)?].detection?;
         Some(Own { scan: &held.scan, ground: held.ground, detection })
     });
-    let states = backward.continue_back(track.id, taken, queue.range(..first).rev().map(Held::past));
+    let states = backward.continue_back(track.id, taken, queue.range(view..first).rev().map(Held::past));
     let n = states.len();
     for (held, state) in queue.range_mut(..first).rev().zip(states) {
         held.take(state.detection);

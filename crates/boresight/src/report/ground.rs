@@ -28,6 +28,8 @@ pub(super) struct Ground {
     moved: f64,
     n_frames: u64,
     n_unknown: u64,
+    /// Whether there was another view, of which nobody knows where it lies.
+    cut: bool,
 }
 
 impl Default for Ground {
@@ -39,6 +41,7 @@ impl Default for Ground {
             moved: 0.0,
             n_frames: 0,
             n_unknown: 0,
+            cut: false,
         }
     }
 }
@@ -49,6 +52,7 @@ impl Ground {
         let motion = view.scan.camera_motion.filter(CameraMotion::is_finite);
         self.n_unknown += u64::from(self.n_frames > 0 && motion.is_none());
         self.n_frames += 1;
+        self.cut |= view.scan.is_cut();
         if let Some(motion) = motion {
             self.first_from_now = motion.now_from_before.inverse().then(&self.first_from_now);
         }
@@ -83,7 +87,7 @@ impl Ground {
 
     /// Whether the camera moves and is known well enough to draw on the ground.
     pub fn is_steadied(&self) -> bool {
-        self.moved > STILL_SHARE && 10 * self.n_unknown <= self.n_frames && !self.pictures.is_empty()
+        !self.cut && self.moved > STILL_SHARE && 10 * self.n_unknown <= self.n_frames && !self.pictures.is_empty()
     }
 
     /// Left, top, width and height of the pictures on the ground, px.

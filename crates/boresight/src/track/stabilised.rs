@@ -133,6 +133,32 @@ mod tests {
     }
 
     #[test]
+    fn where_another_view_begins_all_tracks_end() {
+        // Another thing comes to lie where the first one would be, at rest in a view that has nothing to do with the first.
+        let config = TrackerConfig {
+            reidentification: crate::track::ReidentificationConfig { max_gap_s: 2.0 },
+            ..TrackerConfig::default()
+        };
+        let trackers: [Box<dyn Tracking>; 2] = [
+            Box::new(Tracker::new(&config).unwrap()),
+            Box::new(crate::track::Mht::new(&config, &crate::track::MhtConfig::default()).unwrap()),
+        ];
+        for inner in trackers {
+            let mut steady = Stabilised::new(inner, Some([640.0, 480.0]));
+            let mut ids = [std::collections::BTreeSet::new(), std::collections::BTreeSet::new()];
+            for k in 0..20u64 {
+                let mut now = scan(k, &[(100.0 + k as f64, 20.0)], Some((0.5, 0.0)));
+                if let Some(motion) = now.camera_motion.as_mut().filter(|_| k == 10) {
+                    (motion.basis, motion.now_from_before) = (crate::MotionBasis::Cut, crate::Homography::identity());
+                }
+                let states = steady.step(&now).unwrap();
+                ids[usize::from(k >= 10)].extend(states.iter().map(|s| s.id));
+            }
+            assert!(ids.iter().all(|i| i.len() == 1) && ids[0] != ids[1], "{ids:?}");
+        }
+    }
+
+    #[test]
     fn without_shifts_nothing_changes() {
         let config = TrackerConfig::default();
         let mut plain = Tracker::new(&config).unwrap();

@@ -7,6 +7,7 @@
 //! anything changes. An id is given once; only reidentification hands it on.
 //! Time: every dt comes from the time stamps. A track whose coasting budget ended during a gap is gone before the scan
 //! behind the gap is looked at.
+//! Where another view begins (a film's cut) all tracks end.
 //! A detection may have a time of its own within the scan (a radar's turn): then the filters stay at the scan before until they are updated (`step/plot_time.rs`).
 //! Limits: `max_tracks` tracks.
 
@@ -96,6 +97,14 @@ impl Tracker {
     /// Number of tracks alive.
     pub fn n_tracks(&self) -> usize {
         self.tracks.len()
+    }
+
+    /// Another view has begun: no track has a place in it, and what was learnt of the clutter was learnt of places.
+    fn forget_view(&mut self) {
+        self.tracks.clear();
+        self.pending = Pending::default();
+        self.lost = Reidentification::default();
+        self.clutter = Clutter::new(&self.config.clutter, self.config.clutter_density_per_px2);
     }
 
     /// Deletes what would have been deleted in the scans missing before `now`.
@@ -271,6 +280,9 @@ impl Tracking for Tracker {
         match step_s {
             None => from_initial_tracks(&self.config, scan.time, &mut self.tracks, &mut self.next_id)?,
             Some(_) => self.delete_in_gap(scan.time),
+        }
+        if scan.is_cut() {
+            self.forget_view();
         }
         self.clock.advance(scan);
         let dt_s = step_s.unwrap_or(0.0);

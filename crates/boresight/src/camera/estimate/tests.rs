@@ -131,6 +131,25 @@ fn what_is_not_seen_is_held_and_less_and_less_sure() {
 }
 
 #[test]
+fn a_cut_is_said_and_the_other_view_is_followed() {
+    // The first camera stands, the second moves on.
+    let (mut one, mut other) =
+        (scene((320, 240), 16.0, [0.0, 0.0], 0.0, 0.0, 30), scene((320, 240), 12.0, [3.0, 1.0], 0.0, 0.0, 60));
+    let (one, other) = (frames(&mut one), frames(&mut other));
+    let mut camera = CameraMotionEstimator::default();
+    for f in &one {
+        assert!(camera.step(&f.pixels).is_none_or(|m| !m.is_cut()));
+    }
+    let cut = camera.step(&other[40].pixels).expect("said");
+    assert!(cut.is_cut() && cut.measured_shift_px().is_none() && cut.now_from_before.is_identity());
+    for frame in &other[42..] {
+        camera.step(&frame.pixels);
+    }
+    let motion = camera.step(&other[59].pixels).expect("the other view");
+    assert_eq!(motion.basis, MotionBasis::Measured);
+}
+
+#[test]
 fn another_view_is_followed_from_its_second_frame() {
     let (mut one, mut other) =
         (scene((320, 240), 16.0, [3.0, 0.0], 0.0, 0.0, 30), scene((320, 240), 12.0, [3.0, 1.0], 0.0, 0.0, 60));

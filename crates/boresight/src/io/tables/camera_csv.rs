@@ -1,6 +1,6 @@
 //! `camera.csv`: one row for each frame, how the background moved in the image since the frame before.
 //!
-//! Columns: frame (from 0), time_s, state (`measured`, `held`: not seen, what went before goes on; `unknown`), the point that the row speaks of
+//! Columns: frame (from 0), time_s, state (`measured`; `held`: not seen, what went before goes on; `resumed`: measured against a frame that was held; `cut`: another view; `unknown`), the point that the row speaks of
 //! (the image's middle, px), the background's shift there (px), its turn (rad, from +x towards +y), its growth (zoom, 1 for none), the ten distinct
 //! entries of the covariance of `[dx, dy, angle, ln zoom]` (upper triangle, row by row), and the first eight entries of the homography that takes a pixel of the frame
 //! before to its place now (row by row, the ninth is 1): where that is no more than a similarity the pixel p lies at c + d + zoom R(angle) (p - c). Where the motion is

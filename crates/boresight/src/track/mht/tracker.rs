@@ -134,6 +134,10 @@ impl Tracking for Mht {
         if step_s.is_some() {
             self.delete_in_gap(scan.time);
         }
+        if scan.is_cut() {
+            self.trees.clear();
+            self.clutter = Clutter::new(&self.config.clutter, self.config.clutter_density_per_px2);
+        }
         self.clock.advance(scan);
         let dt_s = step_s.unwrap_or(0.0);
         if scan.blind {
