@@ -236,6 +236,7 @@ impl Assignment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::associate::AssociatorConfig;
 
     fn prior(existence: f64, p_detection: f64, p_gate: f64) -> Prior {
         Prior { p_detection, p_gate, existence, miss_cost: 9.0 }
@@ -284,5 +285,23 @@ mod tests {
         assert!(gates.row(2).is_empty() && gates.prior(1).existence == 0.4);
         gates.reset(1, 1.0);
         assert_eq!((gates.n_tracks(), gates.n_pairs()), (0, 0));
+    }
+
+    #[test]
+    fn the_assignment_of_a_table_is_that_of_its_costs() {
+        // All pairs of two tracks and two detections; straight 1 + 8 or crossed 2 + 5, then straight 1 + 5 or crossed 2 + 8.
+        for (costs, best) in [([[1.0, 2.0], [5.0, 8.0]], [1, 0]), ([[1.0, 2.0], [8.0, 5.0]], [0, 1])] {
+            let mut gates = Gates::new();
+            gates.reset(2, 1.0);
+            for row in costs {
+                for (detection, cost) in (0..).zip(row) {
+                    gates.push(Pair { detection, cost, log_likelihood: 0.0 });
+                }
+                gates.end_row(prior(1.0, 0.9, 0.9));
+            }
+            let mut answer = Assignment::new();
+            AssociatorConfig::default().build().associate(&gates, &mut answer);
+            assert_eq!([0, 1].map(|t| answer.row(t)[0].detection), best);
+        }
     }
 }

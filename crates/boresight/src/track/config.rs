@@ -334,4 +334,13 @@ mod tests {
         // −2 ln 0.01 = 9.2103403719762.
         assert!((TrackerConfig::default().gate() - 9.210_340_371_976_2).abs() < 1e-12);
     }
+
+    #[test]
+    fn a_probability_of_redetection_is_above_zero_and_at_most_one() {
+        let valid = |p: f64| {
+            TrackerConfig { redetection_probability: Some(p), ..TrackerConfig::default() }.validate("tracker").is_ok()
+        };
+        assert_eq!([0.0, -0.1, 1.1, f64::NAN].map(valid), [false; 4]);
+        assert_eq!([1e-9, 0.3, 1.0].map(valid), [true; 3]);
+    }
 }

@@ -315,4 +315,14 @@ mod tests {
         scans[3].tracks.push(double);
         assert!(join(&mut scans, &config(), true).unwrap_err().to_string().contains("frame 3"));
     }
+
+    #[test]
+    fn time_that_runs_back_is_refused_and_time_that_stands_still_is_not() {
+        let mut scans = table(0.0);
+        scans[7].time = scans[6].time;
+        assert_eq!(by_track(&scans).unwrap().len(), 2);
+        scans[7].time = Timestamp::from_ns(scans[6].time.ns - 1);
+        let refused = join(&mut scans, &config(), true).unwrap_err().to_string();
+        assert!(refused.contains("frame 7") && refused.contains("time runs back"), "{refused}");
+    }
 }

@@ -91,3 +91,43 @@ impl Plots {
         (2.0 * gate * (1.12 * p + r)).sqrt() + p.sqrt() / 3.0 + self.shift
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Detection;
+    use boresight_filters::converted::Polar;
+
+    /// One plot of a radar at (10, 20): 100 long with a deviation of 2, at `azimuth_rad` with one of 0.01; read with twice the variance and 3 px² more.
+    fn plots(azimuth_rad: f64) -> Plots {
+        let polar = Polar { range: 100.0, azimuth_rad, range_std: 2.0, azimuth_std_rad: 0.01 };
+        let plot = RadarPlot { polar, sensor: Vector2::new(10.0, 20.0) };
+        let d = Detection::at(Vector2::zeros(), Matrix2::identity()).with_plot(Some(plot));
+        let mut plots = Plots::default();
+        plots.read(&Scan::default().with_detections(vec![d]), RadarUpdate::Extended, 2.0, 3.0);
+        plots
+    }
+
+    #[test]
+    fn a_plot_of_a_sure_prediction_lies_along_and_across_its_line_of_sight() {
+        // Predicted 96 to the right of the sensor: 4 more along, 96 · 0.02 across; variances 2 · 2² + 3 and 2 · (96 · 0.01)² + 3.
+        let predicted = Gaussian { mean: Vector2::new(106.0, 20.0), cov: Matrix2::zeros() };
+        let m = plots(0.02).measured(0, &predicted).unwrap();
+        assert!((m.position - Vector2::new(110.0, 21.92)).norm() < 1e-12, "{}", m.position);
+        assert!((m.cov - Matrix2::new(11.0, 0.0, 0.0, 4.8432)).norm() < 1e-12, "{}", m.cov);
+        // Three deviations of the prediction away is too near; there are no plots but this one.
+        let near = Gaussian { cov: Matrix2::identity() * (32.1 * 32.1), ..predicted };
+        assert!(plots(0.02).measured(0, &near).is_none() && plots(0.02).measured(1, &predicted).is_none());
+    }
+
+    #[test]
+    fn the_square_that_is_searched_is_the_sum_of_gate_second_order_and_shift() {
+        // P of trace 6², farthest sensor 96 away: r = 2 · (2² + 0.96²) + 2 · 3 = 15.8432; second order moves by 6/3 at most; the conversion by 100 (e^(0.01²/2) − 1).
+        let predicted = Gaussian { mean: Vector2::new(106.0, 20.0), cov: Matrix2::identity() * 18.0 };
+        let rest = 2.0 + 0.005_000_125;
+        for gate in [0.0, 9.21] {
+            let want = (2.0 * gate * (1.12 * 36.0 + 15.8432_f64)).sqrt() + rest;
+            assert!((plots(0.0).half_side(&predicted, gate) - want).abs() < 1e-8, "{gate}");
+        }
+    }
+}

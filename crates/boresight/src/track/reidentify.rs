@@ -270,9 +270,11 @@ fn log_sum<const N: usize>(terms: [f64; N]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::{Field, Stay, log_ratio};
     use crate::track::{ReidentificationConfig, Report, Tracker, TrackerConfig, Tracking};
     use crate::{Detection, Extent, FrameIndex, Scan, Timestamp, TrackStatus};
-    use nalgebra::{Matrix2, Vector2};
+    use boresight_filters::Gaussian;
+    use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
     fn config(max_gap_s: f64) -> TrackerConfig {
         TrackerConfig {
@@ -376,5 +378,22 @@ mod tests {
         assert_eq!(ids([2.0, 2.04], 2.5, 2.0), [1]);
         assert_eq!(ids([2.0, 2.04], 2.5, 0.0), [2], "switched off: it was out of the gate");
         assert_eq!(ids([2.0, 2.04], 250.0, 2.0), [2]);
+    }
+
+    #[test]
+    fn whose_a_track_is_does_not_depend_on_the_unit_of_length() {
+        // Slow beside the largest speed, so that what is alike to the one before counts; all lengths in units of 1/`scale` px.
+        let ratio = |scale: f64| {
+            let belief = |mean: [f64; 4]| {
+                let cov = Matrix4::from_diagonal(&Vector4::new(1.0, 0.01, 1.0, 0.02)) * (scale * scale);
+                Gaussian { mean: Vector4::from(mean) * scale, cov }
+            };
+            let stay = Stay { survival_per_s: 0.9, new_per_s: None };
+            let field = Field::new(Some([640.0 * scale, 512.0 * scale]), 30.0 * scale, stay, [2, 1]);
+            let (before, now) = (belief([100.0, 0.1, 50.0, 0.0]), belief([101.0, 0.0, 50.5, 0.1]));
+            log_ratio(&before, 10.0 * scale, &now, 11.0 * scale, 1.5, &field).unwrap()
+        };
+        let off = [1e-3, 0.5, 1e3].map(|scale| (ratio(scale) - ratio(1.0)).abs());
+        assert!(off.iter().all(|o| *o < 1e-9), "{off:?}");
     }
 }

@@ -204,3 +204,27 @@ fn refused(scan: &Scan, i: usize, d: &Detection, finite: bool) -> Error {
         .at(format!("frame {}, detection {i}", scan.index.0))
         .hint("drop such detections before tracking, or mend the detector that makes them")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RadarPlot;
+    use boresight_filters::converted::Polar;
+
+    #[test]
+    fn a_plot_and_its_converted_position_get_the_square_of_the_extra_noise() {
+        // 100 px to the right of the sensor, surely predicted there: variances 2² and (100 · 0.01)², and 3² more.
+        let polar = Polar { range: 100.0, azimuth_rad: 0.0, range_std: 2.0, azimuth_std_rad: 0.01 };
+        let plot = RadarPlot { polar, sensor: Vector2::zeros() };
+        let d = Detection::at(Vector2::new(100.0, 0.0), Matrix2::new(4.0, 0.0, 0.0, 1.0)).with_plot(Some(plot));
+        let (scan, mut table) = (Scan::default().with_detections(vec![d]), ScanTable::default());
+        let at = Predicted { x: 100.0, y: 0.0, cov: Cov2::default(), reach: f64::INFINITY };
+        for update in [RadarUpdate::Converted, RadarUpdate::Extended] {
+            table.read(&scan, 1.0, 3.0, 0.0).unwrap();
+            table.read_plots(&scan, update, 1.0, 3.0);
+            let (position, r) = table.measured(0, scan.detections[0].position, &at);
+            assert!((position - Vector2::new(100.0, 0.0)).norm() < 1e-12, "{update:?}: {position}");
+            assert!((r.matrix() - Matrix2::new(13.0, 0.0, 0.0, 10.0)).norm() < 1e-12, "{update:?}: {r:?}");
+        }
+    }
+}

@@ -90,3 +90,26 @@ pub(super) fn motion_of(d: &Detection, noise: &Cov2, camera: CameraPath, report:
 pub(super) fn place_of(d: &Detection, noise: &Cov2) -> [f64; 3] {
     [d.position.x, d.position.y, noise.xx.max(noise.yy).sqrt()]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::step::initiate::from_initial_tracks;
+    use crate::track::{InitialTrackConfig, TrackerConfig};
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn the_level_of_the_scores_is_their_exponential_mean() {
+        let config = TrackerConfig { initial_tracks: vec![InitialTrackConfig::default()], ..TrackerConfig::default() };
+        let mut tracks = Vec::new();
+        from_initial_tracks(&config, Timestamp::default(), &mut tracks, &mut 1).unwrap();
+        let d = Detection::at(Vector2::zeros(), Matrix2::identity());
+        let mut level_after = |ln: Option<f64>| {
+            tracks[0].follow(&d, 0, &Cov2::default(), ln, 0.25);
+            tracks[0].log_score
+        };
+        // The first one, then a quarter of the way to each: 1, 1 + 2/4, 1.5 − 3/4; a detection that says nothing changes nothing.
+        let levels = [None, Some(1.0), Some(3.0), None, Some(-1.5)].map(&mut level_after);
+        assert_eq!(levels, [None, Some(1.0), Some(1.5), Some(1.5), Some(0.75)]);
+    }
+}

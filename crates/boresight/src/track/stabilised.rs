@@ -86,7 +86,7 @@ impl Tracking for Stabilised {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Tracker, TrackerConfig};
+    use crate::track::{InitialTrackConfig, Tracker, TrackerConfig};
     use crate::{CameraMotion, Detection, Extent, FrameIndex, Timestamp};
     use nalgebra::{Matrix2, Vector2};
 
@@ -166,6 +166,29 @@ mod tests {
         for k in 0..10u64 {
             let now = scan(k, &[(10.0 + k as f64, 20.0)], None);
             assert_eq!(plain.step(&now).unwrap(), steady.step(&now).unwrap());
+        }
+    }
+
+    #[test]
+    fn what_has_left_the_image_is_not_reported() {
+        // Pixels end half a pixel beyond their centres: −0.5 .. 639.5 and −0.5 .. 511.5.
+        let places = [
+            ([-0.4, 9.0], true),
+            ([-0.6, 9.0], false),
+            ([639.4, 9.0], true),
+            ([639.6, 9.0], false),
+            ([9.0, -0.4], true),
+            ([9.0, -0.6], false),
+            ([9.0, 511.4], true),
+            ([9.0, 511.6], false),
+        ];
+        let at = |(position_px, _)| InitialTrackConfig { position_px, ..InitialTrackConfig::default() };
+        let config = TrackerConfig { initial_tracks: places.into_iter().map(at).collect(), ..TrackerConfig::default() };
+        for field_px in [Some([640.0, 512.0]), None] {
+            let mut steady = Stabilised::new(Box::new(Tracker::new(&config).unwrap()), field_px);
+            let states = steady.step(&scan(0, &[], None)).unwrap();
+            let reported = places.map(|(p, _)| states.iter().any(|s| s.position() == Vector2::from(p)));
+            assert_eq!(reported, places.map(|(_, is_inside)| is_inside || field_px.is_none()));
         }
     }
 }

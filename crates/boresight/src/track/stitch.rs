@@ -156,6 +156,7 @@ fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::track::AccelerationNoise;
     use nalgebra::Matrix4;
 
     fn fragment(id: u64, begin_s: f64, end_s: f64, at: impl Fn(f64) -> [f64; 4]) -> Fragment {
@@ -211,5 +212,28 @@ mod tests {
         ];
         let ids: Vec<u64> = stitch(&fragments, &StitchConfig::default()).unwrap().iter().map(|i| i.0).collect();
         assert_eq!(ids, [7, 7, 7, 10]);
+    }
+
+    #[test]
+    fn ends_are_joined_as_far_as_the_quantile_of_chi_square_with_four_degrees_of_freedom() {
+        // At once, S = 0.5 I + 0.5 I: d² is the squared difference of the velocities. 99 % of χ² with 4 degrees of freedom: 13.2767 (tables).
+        let joined = |d2: f64| {
+            let a = fragment(1, 0.0, 1.0, |_| [50.0, 0.0, 50.0, 0.0]);
+            let b = fragment(2, 1.0, 2.0, |_| [50.0, d2.sqrt(), 50.0, 0.0]);
+            let config = StitchConfig { gate_probability: 0.99, max_overlap_s: 0.1, ..StitchConfig::default() };
+            stitch(&[a, b], &config).unwrap()[1] == TrackId(1)
+        };
+        assert_eq!([13.27, 13.28].map(joined), [true, false]);
+    }
+
+    #[test]
+    fn the_misfit_of_two_ends_is_that_of_a_hand_computed_pair() {
+        let (mut a, mut b) =
+            (fragment(1, 0.0, 1.0, |_| [3.0, 0.5, 7.0, 0.0]), fragment(2, 3.0, 4.0, |_| [6.0, 0.5, 7.0, 0.0]));
+        (a.last.cov, b.first.cov) = (Matrix4::identity(), Matrix4::identity());
+        let config = StitchConfig { acceleration: AccelerationNoise::Discrete(0.0), ..StitchConfig::default() };
+        let (d2, log_det) = misfit(&a, &b, 2.0, &config).unwrap();
+        // Each axis: S = [[1 + 2² + 1, 2], [2, 1 + 1]], det 8; 2 px beyond x + 2 vx: d² = 2² · 2/8.
+        assert!((d2 - 1.0).abs() < 1e-12 && (log_det - 64f64.ln()).abs() < 1e-12, "{d2} {log_det}");
     }
 }

@@ -300,6 +300,8 @@ mod tests {
         // Errors (−2, −1, −4, −3) and (4, −1, 0, −3).
         assert!((s.errors.rmspe - 18.0_f64.sqrt()).abs() < 1e-12 && (s.errors.rmsve - 10.0_f64.sqrt()).abs() < 1e-12);
         assert_eq!(s.rsspe, [(0, 20.0_f64.sqrt()), (1, 4.0)]);
+        // 10² + 30² and 20² + 40².
+        assert_eq!(s.norm2, [1000.0, 2000.0]);
         // Position NEES: 4/4 + 16/16 = 2 and 16/4 = 4; with the velocities 1/1 + 9/9 = 2 more.
         assert_eq!(s.nees_by_frame, [(0, 2.0), (1, 4.0)]);
         assert!((s.nees.unwrap().average - 3.0).abs() < 1e-12 && (s.nees4.unwrap().average - 5.0).abs() < 1e-12);

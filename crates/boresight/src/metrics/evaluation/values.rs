@@ -193,3 +193,23 @@ impl StateMeasures {
         parts
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::state::BoundedError;
+
+    #[test]
+    fn shares_within_two_deviations_are_given_where_variances_are_stated() {
+        let row = |x, y| BoundedError { error: [x, 0.0, y, 0.0], bound: [2.0, 1.0, 4.0, 1.0] };
+        // x within 2: three of four; y within 4: one of four.
+        let bounded = vec![row(1.0, 5.0), row(-1.9, -4.1), row(2.1, 3.9), row(0.0, 9.0)];
+        let shares = |s: StateMeasures| -> Vec<(&str, f64)> {
+            let is_share = |v: &Value| v.name.ends_with("2sigma");
+            s.values().into_iter().filter(is_share).map(|v| (v.name, v.value)).collect()
+        };
+        let stated = StateMeasures { bounded, ..StateMeasures::default() };
+        assert_eq!(shares(stated), [("x_in_2sigma", 0.75), ("y_in_2sigma", 0.25)]);
+        assert!(shares(StateMeasures::default()).is_empty());
+    }
+}

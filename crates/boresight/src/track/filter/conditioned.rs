@@ -121,3 +121,32 @@ impl Filter for Conditioned {
         self.filter.kinematics()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use boresight_filters::fuzzy::Correlator;
+    use boresight_filters::model::{ConstantVelocity, Scaled};
+    use boresight_filters::{Fuzzy, Kf, Measurement, Start};
+    use nalgebra::{Matrix2, Matrix4, Vector4};
+
+    #[test]
+    fn the_fuzzy_rule_around_a_form_is_the_fuzzy_filter() {
+        let start = Gaussian { mean: Vector4::new(5.0, 1.0, 6.0, -1.0), cov: Matrix4::identity() };
+        let kf = Kf::<_, 4>::from_kinematics(Scaled::new(ConstantVelocity::continuous(0.1).unwrap()), &start).unwrap();
+        let mut ours = conditioned(Box::new(Tracked(kf)), &InnovationConfig::Fuzzy(Box::default()), None).unwrap();
+        let mut twin = Fuzzy::new(kf, Correlator::default()).unwrap();
+        let (r, weights) = (Matrix2::identity() * 0.5, [&[1.0][..], &[0.6, 0.3], &[], &[1.0], &[0.4]]);
+        for (k, weights) in weights.into_iter().enumerate() {
+            let at = |i: usize| Vector2::new(6.5 + k as f64 - 2.0 * i as f64, 4.0 - 0.5 * k as f64 + i as f64);
+            let hypothesis = |(i, &weight)| Weighted { measurement: Measurement { position: at(i), cov: r }, weight };
+            let seen: Vec<Weighted> = weights.iter().enumerate().map(hypothesis).collect();
+            ours.predict(1.0).unwrap();
+            ours.update(&seen).unwrap();
+            twin.predict(1.0).unwrap();
+            twin.correct_weighted(seen.iter().copied()).unwrap();
+            let off = (ours.predicted().mean - twin.predicted().mean).norm();
+            assert!(off < 1e-9, "update {k}: {off}");
+        }
+    }
+}

@@ -226,3 +226,23 @@ impl DisplacementConfig {
 fn boxed(filter: impl TrackFilter + 'static) -> Box<dyn TrackFilter> {
     Box::new(filter)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix4, Vector4};
+
+    #[test]
+    fn the_displacement_model_takes_the_square_of_its_noise() {
+        // Variances 1 and 2² of position and velocity, 0.5 s a frame: [x(t), x(t−1)] has [[1, 1], [1, 2]], and 2 x(t) − x(t−1) the variance 2; 0.5² more.
+        // Left out, the noise is that of 2 px/s² over a frame: 2 · 0.5² = 0.5 px.
+        let cov = Matrix4::from_diagonal(&Vector4::new(1.0, 4.0, 1.0, 4.0));
+        let start = Gaussian { mean: Vector4::zeros(), cov };
+        for noise_px in [Some(0.5), None] {
+            let config = DisplacementConfig { frame_s: 0.5, noise_px };
+            let mut filter = config.start(&start, AccelerationNoise::Discrete(2.0)).unwrap();
+            filter.predict(0.5).unwrap();
+            assert!((filter.predicted().cov - Matrix2::identity() * 2.25).norm() < 1e-12, "{noise_px:?}");
+        }
+    }
+}

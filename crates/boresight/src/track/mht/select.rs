@@ -151,3 +151,81 @@ impl Select {
         self.picks.pop();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::hypothesis::Hypothesis;
+    use super::*;
+    use crate::Timestamp;
+    use crate::track::scan_table::{Cov2, Predicted};
+    use crate::track::single_track::{Outcome, Track};
+    use crate::track::step::initiate::from_initial_tracks;
+    use crate::track::{InitialTrackConfig, TrackerConfig};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn track() -> Track {
+        let config = TrackerConfig { initial_tracks: vec![InitialTrackConfig::default()], ..TrackerConfig::default() };
+        let mut tracks = Vec::new();
+        from_initial_tracks(&config, Timestamp::default(), &mut tracks, &mut 1).unwrap();
+        tracks.remove(0)
+    }
+
+    /// Leaves of a target: score and the detections of the last two scans.
+    type Leaves = Vec<(f64, [u32; 2])>;
+
+    fn chosen(trees: &[Leaves], max_steps: u32) -> Vec<Option<usize>> {
+        let track = track();
+        let leaf = |&(score, [now, before]): &(f64, [u32; 2])| {
+            let mut path = [NONE; WINDOW];
+            (path[0], path[1]) = (now, before);
+            let predicted = Predicted { x: 0.0, y: 0.0, cov: Cov2::default(), reach: 0.0 };
+            Hypothesis { track: track.clone(), score, path, predicted, outcome: Outcome::default() }
+        };
+        let tree = |t: &Leaves| Tree { id: 0, leaves: t.iter().map(leaf).collect(), chosen: None, unchosen: 0 };
+        let mut trees: Vec<Tree> = trees.iter().map(tree).collect();
+        Select::default().choose(&mut trees, max_steps);
+        trees.iter().map(|t| t.chosen).collect()
+    }
+
+    /// The total score of a choice, if no detection is used twice.
+    fn total(trees: &[Leaves], choice: &[Option<usize>]) -> Option<f64> {
+        let leaves: Vec<_> = trees.iter().zip(choice).filter_map(|(t, c)| Some(t[(*c)?])).collect();
+        let mut used: Vec<(usize, u32)> = leaves.iter().flat_map(|l| l.1.into_iter().enumerate()).collect();
+        used.retain(|u| u.1 != NONE);
+        used.sort_unstable();
+        used.windows(2).all(|w| w[0] != w[1]).then(|| leaves.iter().map(|l| l.0).sum())
+    }
+
+    #[test]
+    fn the_best_target_gives_way_where_both_are_better_off_if_steps_are_left() {
+        // 5 alone, or 4 + 4.5: the bound lets the search go on; without steps the first, greedy set stands.
+        let trees = [vec![(5.0, [0, NONE]), (4.0, [1, NONE])], vec![(4.5, [0, NONE])]];
+        assert_eq!(chosen(&trees, 1000), [Some(1), Some(0)]);
+        assert_eq!(chosen(&trees, 0), [Some(0), None]);
+    }
+
+    #[test]
+    fn no_set_of_compatible_histories_scores_more() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for case in 0..200 {
+            let trees: Vec<Leaves> = (0..rng.random_range(1..6))
+                .map(|_| {
+                    let mut detection = || if rng.random::<f64>() < 0.2 { NONE } else { rng.random_range(0..4) };
+                    let places: Vec<[u32; 2]> = (0..3).map(|_| [detection(), detection()]).collect();
+                    let mut leaves: Leaves =
+                        places.into_iter().map(|p| (f64::from(rng.random_range(-4..20)), p)).collect();
+                    leaves.sort_by(|a, b| b.0.total_cmp(&a.0));
+                    leaves
+                })
+                .collect();
+            // Every choice there is: each target by one of three leaves or by none.
+            let n = trees.len() as u32;
+            let choice = |k: usize| -> Vec<Option<usize>> {
+                (0..n).map(|t| Some(k / 4usize.pow(t) % 4).filter(|leaf| *leaf < 3)).collect()
+            };
+            let best = (0..4usize.pow(n)).filter_map(|k| total(&trees, &choice(k))).fold(0.0, f64::max);
+            assert_eq!(total(&trees, &chosen(&trees, 100_000)), Some(best), "case {case}: {trees:?}");
+        }
+    }
+}

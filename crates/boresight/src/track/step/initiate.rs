@@ -269,8 +269,8 @@ fn second_point(context: &Context<'_>, used: &[bool], first: &Unassociated, dt_s
 #[cfg(test)]
 mod tests {
     use crate::track::{
-        ConfirmationConfig, ExistenceConfig, InitiationConfig, OnePointConfig, TrackerConfig, TwoPointConfig,
-        VelocityBoundsConfig, build,
+        ConfirmationConfig, ExistenceConfig, InitialTrackConfig, InitiationConfig, OnePointConfig, TrackerConfig,
+        TwoPointConfig, VelocityBoundsConfig, build,
     };
     use crate::{Detection, Scan, Timestamp, TrackState};
     use nalgebra::{Matrix2, Vector2};
@@ -376,5 +376,14 @@ mod tests {
             assert_eq!(n(TrackerConfig { min_initiation_score: 5.0, ..existence() }), 3);
             assert_eq!(n(TrackerConfig { min_initiation_score: 5.1, ..existence() }), 0);
         }
+    }
+
+    #[test]
+    fn the_first_reach_of_an_initial_track_is_its_own_spread_and_that_of_a_detection() {
+        let initial = InitialTrackConfig { position_px: [8.0, 5.0], position_std_px: 3.0, ..Default::default() };
+        let config = TrackerConfig { initial_tracks: vec![initial], extra_noise_px: 0.5, ..TrackerConfig::default() };
+        let (mut tracks, mut next_id) = (Vec::new(), 4);
+        super::from_initial_tracks(&config, Timestamp::default(), &mut tracks, &mut next_id).unwrap();
+        assert_eq!((tracks[0].last_place, tracks[0].id, next_id), ([8.0, 5.0, 3.5], 4, 5));
     }
 }

@@ -158,3 +158,34 @@ fn carried(context: &Context<'_>, track: &Track, j: u32, age_ns: u64) -> Option<
     noise.yy += between2 * velocity[(3, 3)];
     Some((j, position, noise))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::scan_table::ScanTable;
+    use crate::track::step::initiate::from_initial_tracks;
+    use crate::track::{InitialTrackConfig, TrackerConfig};
+    use crate::{Detection, Scan};
+    use nalgebra::Matrix2;
+
+    #[test]
+    fn another_detection_is_carried_by_the_tracks_motion_and_as_unsure_as_that_is() {
+        // Seen 0.5 s before the scan, carried 1.5 s back: by −1.5 (2, −1); R = 0.25, the velocity's variance 3² over 1.5².
+        let initial = InitialTrackConfig {
+            velocity_px_per_s: [2.0, -1.0],
+            velocity_std_px_per_s: 3.0,
+            ..InitialTrackConfig::default()
+        };
+        let config = TrackerConfig { initial_tracks: vec![initial], extra_noise_px: 0.0, ..TrackerConfig::default() };
+        let mut tracks = Vec::new();
+        from_initial_tracks(&config, Timestamp::default(), &mut tracks, &mut 1).unwrap();
+        let d = Detection::at(Vector2::new(4.0, 1.0), Matrix2::identity() * 0.25).with_age_ns(500_000_000);
+        let scan = Scan { time: Timestamp::from_secs_f64(2.0), detections: vec![d], ..Scan::default() };
+        let mut table = ScanTable::default();
+        table.read(&scan, 1.0, 0.0, 0.0).unwrap();
+        let context = Context { scan: &scan, table: &table, config: &config, gate: 9.0, dt_s: 2.0 };
+        let (j, position, noise) = carried(&context, &tracks[0], 0, 2_000_000_000).unwrap();
+        assert!(j == 0 && (position - Vector2::new(1.0, 2.5)).norm() < 1e-12, "{position}");
+        assert!((noise.matrix() - Matrix2::identity() * 20.5).norm() < 1e-12, "{noise:?}");
+    }
+}

@@ -268,4 +268,26 @@ mod tests {
             assert!((1.65..2.2).contains(&nis), "{n_clutter} false detections: NIS {nis}");
         }
     }
+
+    #[test]
+    fn the_innovation_of_weighted_detections_is_their_mean_by_likelihood() {
+        let initial = InitialTrackConfig { position_std_px: 1.0, ..InitialTrackConfig::default() };
+        let config = TrackerConfig {
+            associator: AssociatorConfig::Pda(Default::default()),
+            initial_tracks: vec![initial],
+            extra_noise_px: 0.0,
+            clutter_density_per_px2: 1e-9,
+            ..TrackerConfig::default()
+        };
+        let innovation = |places: &[[f64; 2]]| {
+            let detections = places.iter().map(|p| Detection::at(Vector2::from(*p), Matrix2::identity())).collect();
+            let scan = Scan::at(FrameIndex::default(), Timestamp::default()).with_detections(detections);
+            build(&config).unwrap().step(&scan).unwrap()[0].innovation.unwrap().innovation
+        };
+        // The target is predicted at (0, 0), S = 2 I: likelihoods go as e^(−r²/4).
+        assert!((innovation(&[[0.5, -0.25]]) - Vector2::new(0.5, -0.25)).norm() < 1e-9);
+        let (a, b) = ((-0.25f64 / 4.0).exp(), (-1f64 / 4.0).exp());
+        let want = Vector2::new((0.5 * a - b) / (a + b), 0.0);
+        assert!((innovation(&[[0.5, 0.0], [-1.0, 0.0]]) - want).norm() < 1e-9);
+    }
 }

@@ -139,6 +139,7 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
     assert_eq!(kept(&[(10.0, 10.0, 2.0), (10.0, 13.9, 1.0)]), [2.0]);
     assert_eq!(kept(&[(10.0, 10.0, 2.0), (12.0, 12.0, 2.0)]).len(), 1);
     assert_eq!(kept(&[(10.0, 10.0, 1.0), (14.0, 10.0, 2.0)]), [1.0, 2.0], "exactly half the size apart");
+    assert_eq!(kept(&[(10.0, 0.0, 1.0), (10.0, 3.0, 2.0)]), [2.0], "the first in the first row");
     assert_eq!(kept(&[(10.0, 10.0, 3.0), (40.0, 10.0, 1.0), (13.0, 11.0, 2.0), (40.0, 60.0, 4.0)]), [3.0, 1.0, 4.0]);
 }
 
@@ -254,4 +255,23 @@ fn errors_in_noise_are_as_large_as_their_covariance_says() {
         "{mean} {} {within}",
         sum2 / n
     );
+}
+
+#[test]
+fn a_frame_is_searched_as_by_a_new_detector_whatever_came_before() {
+    let config = DetectorConfig::default();
+    let mut old = SpotDetector::new(&SpotConfig::default());
+    let found_by = |finder: &mut SpotDetector, spots: &[(f64, f64, f64)]| {
+        let image = frame(spots);
+        let mut found = Vec::new();
+        finder.find(&TypedFrame { image: &image, raw: &image, colours: None, dt_s: 0.0 }, &config, &mut found).unwrap();
+        found
+    };
+    found_by(&mut old, &[(40.0, 30.0, 200.0), (12.0, 9.0, 90.0)]);
+    let spots = [(20.3, 15.6, 80.0), (50.0, 40.0, 60.0)];
+    let new = found_by(&mut SpotDetector::new(&SpotConfig::default()), &spots);
+    assert_eq!(new.len(), 2);
+    assert_eq!(found_by(&mut old, &spots), new);
+    // So frames may be searched out of order, side by side.
+    assert!(!TargetFinder::<f32>::remembers(&old));
 }
