@@ -8,7 +8,7 @@ use boresight::{Error, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Each format with the name of its file, or its folder.
-const FORMATS: [(Format, &str); 13] = [
+pub const FORMATS: [(Format, &str); 13] = [
     (Format::Geff, "tracks.geff/"),
     (Format::TrackMateXml, "trackmate.xml"),
     (Format::Cvat, "cvat.xml"),

@@ -3,6 +3,7 @@
 //! `config.toml` lists the files of its run. When a run has succeeded, files that an earlier run lists and this one did not make go
 //! (an old `annotated.mp4` beside new tables would show another run); all other files stay. A run that fails changes nothing.
 
+use super::also;
 use super::run_options::Plan;
 use boresight::io::{AtomicFile, is_same_file};
 use boresight::{Error, ErrorKind};
@@ -10,8 +11,8 @@ use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a run can write, and what it may remove if an earlier run says that it wrote it; a name with `/` is a folder.
-const NAMES: [&str; 22] = [
+/// What a run can write beside [`also::FORMATS`]; a name with `/` is a folder.
+const NAMES: [&str; 11] = [
     "tracks.csv",
     "detections.csv",
     "mot.txt",
@@ -22,19 +23,14 @@ const NAMES: [&str; 22] = [
     "report.html",
     "summary.json",
     "thumbnail.png",
-    "tracks.geff/",
-    "trackmate.xml",
-    "cvat.xml",
-    "mot.zip",
-    "napari.npy",
-    "tracks.parquet",
-    "kitti.txt",
-    "trackpy.csv",
-    "trackmate.csv",
-    "btrack.csv",
-    "ultrack.csv",
     "config.toml",
 ];
+
+/// What a run may remove if an earlier run says that it wrote it.
+fn names() -> impl Iterator<Item = &'static str> {
+    NAMES.into_iter().chain(also::FORMATS.map(|(_, name)| name))
+}
+
 /// Starts the line of `config.toml` that lists the files.
 const LIST: &str = "# Files of this run:";
 
@@ -45,7 +41,7 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// A folder that `made` will be written to (names of [`NAMES`]), unless that would replace the input.
+    /// A folder that `made` will be written to (names of [`names`]), unless that would replace the input.
     /// # Errors
     /// Standard output instead of a folder; the input in the place of an output.
     pub fn new(dir: PathBuf, made: Vec<&'static str>, input: &OsStr) -> boresight::Result<Self> {
@@ -104,7 +100,7 @@ impl RunFolder {
     fn left_over(&self, input: &OsStr) -> Vec<PathBuf> {
         let earlier = std::fs::read_to_string(self.path("config.toml")).unwrap_or_default();
         let listed = earlier.lines().find_map(|l| l.strip_prefix(LIST)).unwrap_or_default();
-        let gone = NAMES.iter().filter(|n| listed.split_whitespace().any(|l| l == **n) && !self.makes(n));
+        let gone = names().filter(|n| listed.split_whitespace().any(|l| l == *n) && !self.makes(n));
         gone.map(|n| self.path(n)).filter(|p| !is_same_file(p, Path::new(input))).collect()
     }
 

@@ -1,7 +1,7 @@
 //! The choice: which kind of scene the first frames show, and the configuration that follows, with reasons.
 //!
 //! Source: our own. Tried in this order, the first that fits: a target told by its colour, things that move before a fixed camera, particles,
-//! cells, isolated targets.
+//! cells; else isolated targets, in whose place faint ones or movers on steadied frames may be taken, these with the isolated ones as runner-up.
 
 use super::asked;
 use super::interval::interval_s;

@@ -55,8 +55,8 @@ pub struct Found {
     pub n_targets: usize,
     /// Their detections a scan.
     pub per_scan: f64,
-    /// From when to when each target was followed, s.
-    pub spans_s: Vec<[f64; 2]>,
+    /// From when to when each clear target was followed, s: one of which three of four detections may start a track.
+    pub clear_s: Vec<[f64; 2]>,
     /// The score that all but [`FAINT_SHARE`] of their detections reach; 0 of none.
     pub least_score: f64,
     /// Scores of their detections, rising.
@@ -124,13 +124,16 @@ pub fn learn(
             own += t.own;
         }
         let time_s = |k: usize| scans[k].time.ns as f64 * 1e-9;
-        let spans_s = targets().map(|t| [time_s(t.first), time_s(t.last)]).collect();
-        let mut scores: Vec<f32> = held.iter().map(|h| scans[h.scan].detections[h.detection as usize].score).collect();
+        let score = |h: &Held| scans[h.scan].detections[h.detection as usize].score;
+        let clear_s = clear(&held, |h| f64::from(score(h)) >= config.tracker.min_initiation_score)
+            .map(|id| [time_s(tracks[&id].first), time_s(tracks[&id].last)])
+            .collect();
+        let mut scores: Vec<f32> = held.iter().map(score).collect();
         scores.sort_unstable_by(f32::total_cmp);
         let faint = (FAINT_SHARE * scores.len() as f64) as usize;
         let least_score = scores.get(faint).map_or(0.0, |s| f64::from(*s));
         let per_scan = own as f64 / n_scans as f64;
-        found = Found { n_targets: targets().count(), per_scan, spans_s, least_score, scores };
+        found = Found { n_targets: targets().count(), per_scan, clear_s, least_score, scores };
         let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;
@@ -183,6 +186,16 @@ pub fn learn(
         new_per_hour * (1.0 - e.confirm_probability) / e.confirm_probability,
     ));
     Ok(found)
+}
+
+/// The targets of which three of four detections are so; one that is fainter was followed by luck.
+fn clear(held: &[Held], is_clear: impl Fn(&Held) -> bool) -> impl Iterator<Item = u64> {
+    let mut of_track: BTreeMap<u64, [usize; 2]> = BTreeMap::new();
+    for h in held {
+        let [n, n_clear] = of_track.entry(h.track).or_default();
+        (*n, *n_clear) = (*n + 1, *n_clear + usize::from(is_clear(h)));
+    }
+    of_track.into_iter().filter(|(_, [n, n_clear])| 4 * n_clear >= 3 * n).map(|(id, _)| id)
 }
 
 /// Share of `yes` with the counts of a prior.

@@ -2,8 +2,9 @@
 //!
 //! Source: our own. Of a scene that nobody knows a target is assumed to stand out clearly; what moves and does not would never start a track. Whether it moves is told by the
 //! chains of the first pass ([`super::evidence`]), which know of no such score: those count of which each gains surely more than any in another order of the scans.
-//! How: the score is lowered to what three of four detections of every such chain reach, of those that gain a tenth of what the surest gains. Where one of them is clear, a
-//! faint one counts only if in most of its time no clear target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target.
+//! How: the score is lowered to what three of four detections of every such chain reach, of those that gain a tenth of what the surest gains and in most of whose time no clear
+//! target is followed: beside one, what moves faintly is waves, leaves and reflections as often as another target. They must be surely more than such chains are beside clear targets
+//! (Poisson's deviation, [`STDS`] times).
 //! Where targets are many and all that stands is reported, it is raised instead ([`raised`]), and what scores less than the targets do is not looked for ([`kept`]).
 //! Limits: a faint target beside a clear one is not looked for.
 
@@ -19,6 +20,9 @@ use crate::vision::threshold::ThresholdConfig;
 const MISSED_SHARE: f64 = 0.25;
 /// Share of the surest chain's gain from which another one counts.
 const GAIN_SHARE: f64 = 0.1;
+
+/// Deviations by which chains must be more than expected.
+const STDS: f64 = 3.0;
 
 /// Share of false ones among the detections that may start a track, where targets are many and all that stands is reported.
 const FALSE_STARTS: f64 = 0.01;
@@ -36,8 +40,16 @@ pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, rea
     };
     let most = evidence.sure().map(|c| c.gain).fold(0.0, f64::max);
     let sure = || evidence.sure().filter(|c| c.gain >= GAIN_SHARE * most);
-    let none_clear = sure().all(|c| faintest(c) < assumed);
-    let counting = || sure().filter(|c| none_clear || alone(c));
+    let counting = || sure().filter(|c| alone(c));
+    // What moves faintly while a clear target is followed says how much of that there is at any time.
+    let is_faint = |c: &&Chain| faintest(c) < assumed;
+    let n_alone = counting().filter(is_faint).count();
+    let n_beside = sure().filter(is_faint).count() - n_alone;
+    let [beside_s, alone_s] = times_s(evidence, clear_s);
+    let expected = if n_beside > 0 { n_beside as f64 * alone_s / beside_s } else { 0.0 };
+    if n_alone as f64 <= expected + STDS * expected.sqrt() {
+        return false;
+    }
     let score = round(counting().map(faintest).fold(f64::INFINITY, f64::min));
     // A detector without scores says nothing.
     if !(score > 0.0 && score < assumed) {
@@ -54,6 +66,19 @@ pub fn learn(evidence: &Evidence, clear_s: &[[f64; 2]], config: &mut Config, rea
     ));
     config.tracker.min_initiation_score = score;
     true
+}
+
+/// How long, of the time of the chains, a clear target is followed, and how long none is, s.
+fn times_s(evidence: &Evidence, clear_s: &[[f64; 2]]) -> [f64; 2] {
+    let (Some(&first), Some(&last)) = (evidence.times_s.first(), evidence.times_s.last()) else { return [0.0; 2] };
+    let mut spans: Vec<[f64; 2]> = clear_s.iter().map(|s| s.map(|t| t.clamp(first, last))).collect();
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let (mut beside, mut upto) = (0.0, first);
+    for [from, to] in spans {
+        beside += (to - from.max(upto)).max(0.0);
+        upto = upto.max(to);
+    }
+    [beside, last - first - beside]
 }
 
 /// The score from which on false detections are at most [`FALSE_STARTS`] of those that start a track, with the reason, if it is higher than the one configured and there is any: of the
@@ -101,9 +126,11 @@ fn faintest(chain: &Chain) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sightings::Sighting;
     use super::*;
     use crate::track::ScoreLikelihoodConfig;
     use crate::{Detection, FrameIndex, Scan, Timestamp};
+    use nalgebra::Vector2;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -137,10 +164,45 @@ mod tests {
         assert_eq!(learnt(&[4.5, 3.5], &[]), (3.5, 1));
         assert_eq!(learnt(&[20.0, 3.5], &[[0.0, 1.0]]), (3.5, 1), "the clear one is there for a time only");
         assert_eq!(learnt(&[20.0, 3.5], &[[0.0, 2.4]]), (6.0, 0), "beside a clear one");
-        assert_eq!(learnt(&[5.0, 3.5], &[[0.0, 2.4]]), (3.5, 1), "followed by luck");
         assert_eq!(learnt(&[20.0, 20.0], &[]), (6.0, 0), "clear targets start by themselves");
         assert_eq!(learnt(&[], &[]), (6.0, 0), "false detections are no chains");
         assert_eq!(learnt(&[0.0], &[]), (6.0, 0), "a detector without scores");
+    }
+
+    #[test]
+    fn the_time_with_a_clear_target_is_that_of_its_spans_together() {
+        let evidence = Evidence { times_s: vec![0.0, 5.0, 10.0], ..Evidence::default() };
+        assert_eq!(times_s(&evidence, &[]), [0.0, 10.0]);
+        // 2 to 5 and 4 to 6 are four seconds, 9 to 12 is one of them.
+        assert_eq!(times_s(&evidence, &[[4.0, 6.0], [2.0, 5.0], [9.0, 12.0]]), [5.0, 5.0]);
+        assert_eq!(times_s(&Evidence::default(), &[[0.0, 1.0]]), [0.0; 2]);
+    }
+
+    #[test]
+    fn faint_chains_count_where_they_are_surely_more_than_beside_clear_targets() {
+        // A wave crosses the field every second, and a clear target is followed from the third second on.
+        let wave = |k: usize| Chain {
+            gain: 400.0,
+            moves: true,
+            hits: (0..20)
+                .map(|i| (25 * k + i, Sighting { score: 3.0, ..Sighting::of_box(Vector2::zeros(), 0.1, 3.0) }))
+                .collect(),
+            speeds_px_per_s: Vec::new(),
+        };
+        let evidence = |waves: &[usize]| Evidence {
+            moving: waves.iter().map(|&k| wave(k)).collect(),
+            times_s: (0..250).map(|k| 0.04 * f64::from(k)).collect(),
+            ..Evidence::default()
+        };
+        let lowered = |waves: &[usize], clear_s: &[[f64; 2]]| {
+            let mut config = Config::default();
+            config.tracker.min_initiation_score = 6.0;
+            learn(&evidence(waves), clear_s, &mut config, &mut Vec::new())
+        };
+        let all: Vec<usize> = (0..10).collect();
+        assert!(lowered(&all, &[]), "nothing clear: they may be the targets");
+        assert!(!lowered(&all, &[[3.0, 10.0]]), "three of them are as many as come anyway");
+        assert!(lowered(&[0, 1, 2], &[[3.0, 10.0]]), "none comes while the clear one is there");
     }
 
     #[test]

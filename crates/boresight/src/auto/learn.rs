@@ -10,7 +10,7 @@ use super::evidence::Evidence;
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
-use super::{contest, initiation_score, noise, speed};
+use super::{contest, initiation_score, later_looks, noise, speed};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
 use crate::vision::threshold::ThresholdConfig;
@@ -32,13 +32,30 @@ pub fn learn<E: From<Error>>(
 ) -> Result<Box<dyn Detector>, E> {
     let set = |c: &mut Choice| set(std::mem::take(&mut c.config)).map(|config| c.config = config);
     choice.change(set)?;
-    let detector = learn_set(frames, choice, request)?;
+    let assumed = choice.clone();
+    let mut pass = learn_set(frames, choice, request)?;
+    let info = frames.info().clone();
+    let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
+    if let Some((polarity, reason)) = later {
+        let mut wider = assumed;
+        if let ThresholdConfig::Isolated(isolated) = &mut wider.config.detector.threshold {
+            isolated.polarity = polarity;
+        }
+        wider.reasons.push(reason);
+        let asked = wider.config.detector.clone();
+        wider.change(set)?;
+        // Who says which polarity gets that one.
+        if wider.config.detector == asked {
+            pass = learn_set(frames, &mut wider, request)?;
+            *choice = wider;
+        }
+    }
     choice.change(set)?;
-    Ok(detector)
+    Ok(Box::new(pass))
 }
 
 /// As [`learn`], where what is set is in the configuration.
-fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Box<dyn Detector>> {
+fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<FirstPass> {
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let area_px2 = (info.width * info.height).max(1) as f64;
@@ -73,15 +90,15 @@ fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
         return learn_of_kept(frames, area_px2, choice, request);
     }
     if choice.config.tracker.min_initiation_score > assumed.config.tracker.min_initiation_score {
-        return Ok(Box::new(pass));
+        return Ok(pass);
     }
     let mut fainter = assumed.clone();
-    let clear_s = found.as_ref().map_or(&[][..], |f| &f.spans_s);
+    let clear_s = found.as_ref().map_or(&[][..], |f| &f.clear_s);
     if initiation_score::learn(&evidence, clear_s, &mut fainter.config, &mut fainter.reasons) {
         let more = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut fainter)?;
         if more.is_some_and(|f| f.n_targets > 0) {
             *choice = fainter;
-            return Ok(Box::new(pass));
+            return Ok(pass);
         }
     }
     if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
@@ -95,10 +112,10 @@ fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
                 things.per_scan
             ));
             *choice = still;
-            return Ok(Box::new(pass));
+            return Ok(pass);
         }
     }
-    Ok(Box::new(pass))
+    Ok(pass)
 }
 
 /// The detector of a configuration, which has seen no frame yet, and what lets it detect in several at once.
@@ -112,18 +129,13 @@ fn first_pass(frames: &mut Replay, config: &Config, request: &Request) -> Result
 
 /// Learns from all frames read ahead once it is known what the detector keeps. Other blobs fall away with those left out, so all is detected anew: what is learnt is
 /// learnt of what the run sees.
-fn learn_of_kept(
-    frames: &mut Replay,
-    area_px2: f64,
-    choice: &mut Choice,
-    request: &Request,
-) -> Result<Box<dyn Detector>> {
+fn learn_of_kept(frames: &mut Replay, area_px2: f64, choice: &mut Choice, request: &Request) -> Result<FirstPass> {
     let (mut pass, mut at_once) = first_pass(frames, &choice.config, request)?;
     pass.take_on(frames, &mut at_once, usize::MAX);
     let evidence = Evidence::of_scans(pass.scans(), area_px2);
     speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);
     statistics(pass.scans(), area_px2, request.false_tracks_per_hour, choice)?;
-    Ok(Box::new(pass))
+    Ok(pass)
 }
 
 /// Learns of the scans, and once more with a higher score where targets are many and too many false detections would start tracks; the last of what was found. If the detector is to keep

@@ -22,6 +22,7 @@ mod fixed_blocks;
 mod ground;
 mod initiation_score;
 mod interval;
+mod later_looks;
 mod learn;
 mod looks;
 mod moving;

@@ -15,6 +15,9 @@ use crate::{Config, Frame, Result, SourceInfo};
 const SHARE_OF_FRAMES: f64 = 0.2;
 /// Least longer side of what moves, as a share of the frame's: smaller things are the small targets' matter.
 const LEAST_SIDE: f64 = 0.02;
+/// Most of the frame's width and height that half of what moves may take: what is wider moves as a whole, and is the ground (a camera that nods, a change of exposure). People who stand near are
+/// half as high as the frame.
+const MOST_SHARE: [f64; 2] = [0.5, 0.75];
 /// Least area of what moves, as a share of the frame's.
 const LEAST_AREA: f64 = 0.0004;
 /// Least share of new ground, see [`Scene`]: less is leaves, water, flicker.
@@ -44,6 +47,8 @@ fn fits(scene: &Scene, info: &SourceInfo) -> bool {
     scene.camera == Camera::Fixed
         && scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
         && side >= LEAST_SIDE * info.width.max(info.height) as f64
+        && scene.size_px[0] <= MOST_SHARE[0] * info.width as f64
+        && scene.size_px[1] <= MOST_SHARE[1] * info.height as f64
         && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64
         && scene.novelty >= LEAST_NOVELTY
         && scene.regions <= MOST_REGIONS

@@ -10,7 +10,7 @@ use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, SourceInfo};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// A score from which a blob is surely a thing and not noise.
 const SURE: f64 = 8.0;
@@ -38,6 +38,26 @@ pub struct Side {
     pub side_px: [f64; 2],
     /// Chains of all, sure or not.
     pub chains: Evidence,
+}
+
+impl Side {
+    /// What the scans of one polarity hold, with the chains of their detections.
+    pub fn of(scans: &[Scan], chains: Evidence) -> Self {
+        let (mut n, mut sum, mut sides) = (0usize, 0.0, Vec::new());
+        for d in scans.iter().flat_map(|s| &s.detections).filter(|d| f64::from(d.score) >= SURE) {
+            n += 1;
+            sum += f64::from(d.score).min(100.0);
+            sides.push(d.extent.width_px.max(d.extent.height_px));
+        }
+        sides.sort_by(f64::total_cmp);
+        let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
+        Self {
+            per_frame: n as f64 / scans.len().max(1) as f64,
+            mean_score: sum / n.max(1) as f64,
+            side_px: [at(0.5), at(0.95)],
+            chains,
+        }
+    }
 }
 
 /// What was seen of both polarities.
@@ -121,26 +141,16 @@ pub fn look_at(
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Side> {
+    let scans = looks::scans(&detector(polarity, info), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+    Ok(Side::of(&scans, Evidence::of_looks(&scans, places, ground, info)))
+}
+
+/// What finds isolated targets of that polarity.
+pub(super) fn detector(polarity: Polarity, info: &SourceInfo) -> DetectorConfig {
     let isolated = IsolatedConfig { polarity, min_score: MIN_SCORE, max_side_px: max_side(info), ..Default::default() };
     let mut config = DetectorConfig { threshold: ThresholdConfig::Isolated(isolated), ..Default::default() };
     config.cluster.min_area_px = Some(3);
-    let scans = looks::scans(&config, places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let (mut n, mut sum, mut sides) = (0usize, 0.0, Vec::new());
-    for scan in &scans {
-        for d in scan.detections.iter().filter(|d| f64::from(d.score) >= SURE) {
-            n += 1;
-            sum += f64::from(d.score).min(100.0);
-            sides.push(d.extent.width_px.max(d.extent.height_px));
-        }
-    }
-    sides.sort_by(f64::total_cmp);
-    let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
-    Ok(Side {
-        per_frame: n as f64 / places.len().max(1) as f64,
-        mean_score: sum / n.max(1) as f64,
-        side_px: [at(0.5), at(0.95)],
-        chains: Evidence::of_looks(&scans, places, ground, info),
-    })
+    config
 }
 
 /// The longest side looked for: two fifths of the frame's shorter side.
@@ -183,17 +193,7 @@ pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reason
             evidence.dark.chains.words(),
         )
     });
-    config.detector = DetectorConfig {
-        threshold: ThresholdConfig::Isolated(IsolatedConfig {
-            polarity,
-            min_score: MIN_SCORE,
-            max_side_px: max_side(info),
-            ..Default::default()
-        }),
-        max_detections: Some(5000),
-        ..Default::default()
-    };
-    config.detector.cluster.min_area_px = Some(3);
+    config.detector = DetectorConfig { max_detections: Some(5000), ..detector(polarity, info) };
     config.detector.camera = CameraConfig::Moving;
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();

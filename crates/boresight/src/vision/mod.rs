@@ -1,7 +1,8 @@
 //! From a frame to detections: spatial filters, thresholds, clusters, centroids; never sees tracks.
 //!
 //! A threshold turns one row of pixels into one row of bits (`&[u64]`, bit `x % 64` of word `x / 64` is pixel `x`, bits past
-//! the width are 0); the clusterer turns bit rows into regions with their moments. There is no mask or label image.
+//! the width are 0); the clusterer turns bit rows into regions with their moments. There is no label image, and a mask only of
+//! what moves or has a colour ([`background`], [`colour`]).
 
 mod at_once;
 pub mod background;

@@ -1,4 +1,4 @@
-//! Writes a [`TrackTable`] in any format of text, and says what the format cannot hold.
+//! Writes a [`TrackTable`] in any format, and says what the format cannot hold.
 
 use super::export;
 use super::format::Format;

@@ -69,9 +69,11 @@ fn one(parts: &[Part]) -> f64 {
     }
     let weight: f64 = parts.iter().map(|p| p.weight).sum();
     if weight == 0.0 {
-        return 0.0;
+        return f64::NAN;
     }
-    let mean = |of: fn(&Part) -> f64| parts.iter().map(|p| p.weight * of(p)).sum::<f64>() / weight;
+    // What weighs nothing may be no number.
+    let counted = || parts.iter().filter(|p| p.weight > 0.0);
+    let mean = |of: fn(&Part) -> f64| counted().map(|p| p.weight * of(p)).sum::<f64>() / weight;
     let bound = |dimension, side: usize| bounds(weight, dimension, LEVEL).map_or(f64::NAN, |b| b[side]);
     match parts[0].pooling {
         Pooling::Mean => mean(|p| p.value.value),
@@ -138,7 +140,19 @@ mod tests {
     #[test]
     fn a_sequence_without_a_match_weighs_nothing_in_an_error() {
         let rmse = |value, weight| Part::root_mean_square(Value::lower("RMSE", value, "px"), weight);
-        assert_eq!(pooled([rmse(2.0, 9.0), rmse(0.0, 0.0)].into_iter())[0].value, 2.0);
-        assert_eq!(pooled([rmse(0.0, 0.0), rmse(0.0, 0.0)].into_iter())[0].value, 0.0);
+        assert_eq!(pooled([rmse(2.0, 9.0), rmse(f64::NAN, 0.0)].into_iter())[0].value, 2.0);
+        assert!(pooled([rmse(f64::NAN, 0.0), rmse(f64::NAN, 0.0)].into_iter())[0].value.is_nan());
+    }
+
+    #[test]
+    fn a_result_that_matches_nothing_has_no_error() {
+        let mut o = EvaluateOptions::default();
+        (o.matching, o.max_distance_px) = (Matching::Centre, 5.0);
+        let values = evaluate(&points(0, &[0.0; 4]), &points(0, &[300.0; 4]), &o).unwrap().values();
+        let of = |name: &str| values.iter().find(|v| v.name == name).unwrap().value;
+        for name in ["RMSE", "bias_x", "scatter_y", "SIAP_PA"] {
+            assert!(of(name).is_nan(), "{name}: {}", of(name));
+        }
+        assert_eq!((of("JSC"), of("SIAP_C")), (0.0, 0.0));
     }
 }

@@ -106,7 +106,7 @@ impl Evaluation {
             Value::higher("SIAP_C", f.siap.completeness),
             Value::neither("SIAP_A", f.siap.ambiguity, ""),
             Value::lower("SIAP_S", f.siap.spuriousness, ""),
-            Value::lower("SIAP_PA", f.siap.position_accuracy, "px"),
+            Value::lower("SIAP_PA", if f.siap.completeness > 0.0 { f.siap.position_accuracy } else { f64::NAN }, "px"),
             Value::lower("SIAP_R", f.siap.rate_of_track_number_change, "1/s"),
             Value::higher("SIAP_LS", f.siap.longest_track_segment),
             Value::higher("particle_alpha", f.particle.alpha),
@@ -115,10 +115,14 @@ impl Evaluation {
             Value::higher("JSC_tracks", f.particle.jsc_tracks),
         ]);
         let mut parts: Vec<Part> = values.into_iter().map(by_frames).collect();
-        let ([bias_x, bias_y], [scatter_x, scatter_y]) = (d.bias_px, d.scatter_px);
+        // Of nothing that matches there is no error, least of all the best one.
+        let if_any = |n: u64, v: f64| if n > 0 { v } else { f64::NAN };
+        let ([bias_x, bias_y], [scatter_x, scatter_y]) =
+            (d.bias_px.map(|v| if_any(d.tp, v)), d.scatter_px.map(|v| if_any(d.tp, v)));
+        let rmse = if_any(f.particle.n_matched, f.particle.rmse_px);
         let scatter = |name, value, mean| by_rows(Value::lower(name, value, "px")).pooled(Pooling::Spread { mean });
         parts.extend([
-            Part::root_mean_square(Value::lower("RMSE", f.particle.rmse_px, "px"), f.particle.n_matched as f64),
+            Part::root_mean_square(Value::lower("RMSE", rmse, "px"), f.particle.n_matched as f64),
             by_frames(Value::higher("AP", f.average_precision)),
             by_rows(Value::neither("bias_x", bias_x, "px")),
             by_rows(Value::neither("bias_y", bias_y, "px")),

@@ -9,7 +9,7 @@
 //! even sky scores tens, a branch in a tree hardly above one, whatever their contrasts. Of nested clusters the best score
 //! counts; the cluster at half the height between b and the peak gives box, centroid and covariance.
 //! Dark targets: the same on I <= L.
-//! Symbols: I value (counts); L level (counts); noise standard deviation of a pixel (counts); step smallest difference of two
+//! Symbols: I value (counts); L level (counts); noise standard deviation of a pixel (counts), where it grows with I that at the frame's mean; step smallest difference of two
 //! pixel values (counts, 0 for floats).
 //! Limits: a target that touches the frame's border, or another as bright as itself within its ring, is not isolated. Of blobs near the least score some are lost whose
 //! ring is quieter than the cells of 8 x 8 px around them (`bars`). Cost: one pass over the pixels for the cells and
@@ -26,11 +26,10 @@ use super::nested::{Candidate, Nested};
 use super::peaks::{self, Peak};
 use super::ring::{Cluster, Ring};
 use super::steps::Steps;
-use crate::vision::config::{DetectorConfig, NoiseConfig};
-use crate::vision::noise_level::noise_level;
+use crate::vision::config::DetectorConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::strongest::Strongest;
-use crate::vision::target_finder::{TargetFinder, TypedFrame};
+use crate::vision::target_finder::{PixelNoise, TargetFinder, TypedFrame};
 use crate::vision::threshold::{Polarity, Side};
 use crate::{Detection, Image, Result};
 
@@ -51,6 +50,7 @@ pub struct IsolatedDetector {
     ring: Ring,
     levels: Vec<f64>,
     samples: Vec<f32>,
+    noise: PixelNoise,
     maxima: Vec<u8>,
     peaks: Vec<Peak>,
     candidates: Vec<Candidate>,
@@ -70,6 +70,7 @@ impl IsolatedDetector {
             ring: Ring::default(),
             levels: Vec::new(),
             samples: Vec::new(),
+            noise: PixelNoise::default(),
             maxima: Vec::new(),
             peaks: Vec::new(),
             candidates: Vec::new(),
@@ -80,15 +81,12 @@ impl IsolatedDetector {
 
     /// Appends the isolated blobs of `image` to `out`, the clearest first.
     fn run<T: Pixel>(&mut self, image: &Image<T>, config: &DetectorConfig, out: &mut Vec<Detection>) {
-        let estimated = noise_level(image, &mut self.samples);
-        let noise = match &config.noise {
-            NoiseConfig::Given(g) => g.read_counts,
-            NoiseConfig::Estimated => estimated,
-        };
+        let noise = self.noise.of(image, &config.noise);
+        let typical = variance_at(noise, if noise.1 > 0.0 { mean(image) } else { 0.0 }).sqrt();
         self.cells.read(image);
         for side in [Side::Bright, Side::Dark] {
             if self.isolated.polarity.has(side) {
-                self.side(image, config, side, noise, out);
+                self.side(image, config, side, (typical, noise), out);
             }
         }
         // One side's are in that order already.
@@ -102,7 +100,7 @@ impl IsolatedDetector {
         image: &Image<T>,
         config: &DetectorConfig,
         side: Side,
-        noise: f64,
+        (noise, by_level): (f64, (f64, f64)),
         out: &mut Vec<Detection>,
     ) {
         self.candidates.clear();
@@ -128,7 +126,7 @@ impl IsolatedDetector {
         }
         self.peaks = peaks;
         self.nested.best_of((image.width(), image.height()), &mut self.candidates, |best, shape| {
-            out.extend(detection(image, config, side, best, shape, noise));
+            out.extend(detection(image, config, side, best, shape, by_level));
         });
     }
 
@@ -199,9 +197,22 @@ impl<T: Pixel> TargetFinder<T> for IsolatedDetector {
     }
 }
 
+/// Variance of a pixel's noise at a level, counts²: that at 0 with its growth.
+fn variance_at((at_0, gain): (f64, f64), level: f64) -> f64 {
+    (at_0 + gain * level).max(0.0)
+}
+
+/// Mean of every eighth row.
+fn mean<T: Pixel>(image: &Image<T>) -> f64 {
+    let values = || (0..image.height()).step_by(8).flat_map(|y| image.row(y)).map(|p| f64::from(p.value_f32()));
+    let (n, sum) = values().filter(|v| v.is_finite()).fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    if n > 0.0 { sum / n } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vision::noise_level::noise_level;
     use crate::vision::threshold::ThresholdConfig;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

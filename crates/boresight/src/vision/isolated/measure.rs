@@ -9,22 +9,23 @@ use crate::vision::region::Region;
 use crate::vision::threshold::Side;
 use crate::{Detection, Image};
 
-/// Measures the cluster in the box `shape` at `level`, times the sign of the side; its score is that of `best`. `noise` in counts.
+/// Measures the cluster in the box `shape` at `level`, times the sign of the side; its score is that of `best`; `variance`: of a pixel's noise at 0
+/// (counts²), and its growth with intensity (counts).
 pub fn detection<T: Pixel>(
     image: &Image<T>,
     config: &DetectorConfig,
     side: Side,
     best: &Candidate,
     (shape, level): (&Blob, f64),
-    noise: f64,
+    (variance, gain): (f64, f64),
 ) -> Option<Detection> {
     let sign = if side == Side::Bright { 1.0 } else { -1.0 };
     let region = moments(image, side, shape, sign * level)?;
     let around = Surroundings {
         background: sign * best.background,
         sign,
-        variance: noise * noise,
-        gain: 0.0,
+        variance,
+        gain,
         level: Some(sign * level),
         ground: Some(sign * best.background),
     };
