@@ -7,23 +7,24 @@
 //! is chosen by what they say ([`super::plane`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
-//! again or, where the last frame is found, replaced. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
+//! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
 //! Where nothing is found and the frame as a whole is another one ([`super::other_view`]), another view has begun ([`MotionBasis::Cut`]), and all begins anew.
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
-use super::find_patch::{SEARCH, Vote, find, vote};
+use super::find_patch::{SEARCH, Vote, find, find_near, vote};
 use super::fine::{FinePatches, fine_factor};
-use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match, fit};
+use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
+use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
 use super::reduce::{factor, reduce};
-use super::rest::{Rest, STILL};
+use super::rest::{Rest, STILL, moves};
 use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
 use super::wide::Wide;
-use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels, Similarity};
+use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels};
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,6 +53,8 @@ const LEAST_COVER: f64 = 0.6;
 /// Where this share agrees the others are not asked.
 const CLEAR_COVER: f64 = 0.75;
 const UNSURE_FRAMES: u32 = 3;
+/// Share of the key frame's patches that must lie where they lay, so that the others are not looked for: of patches of another view a third may seem to, by chance.
+const AT_REST: f64 = 0.75;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
 const FINE_FOUND: f64 = 0.5;
 /// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
@@ -83,18 +86,6 @@ pub struct CameraMotionEstimator {
     carried: MotionCov,
     matches: Vec<Match>,
     weights: Vec<f64>,
-}
-
-/// Where the key frame's background lies now, reduced px.
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    now_from_key: Homography,
-    cov: MotionCov,
-    turned: bool,
-    /// Whether it shows in enough of the image to be the background's beyond doubt.
-    covers: bool,
-    /// Patches of the reduced frame that were found.
-    n_coarse: usize,
 }
 
 impl CameraMotionEstimator {
@@ -150,6 +141,9 @@ impl CameraMotionEstimator {
         let along = self.course.next(scales.middle);
         let next = Homography::of_similarity(&along);
         let key_next = self.from_key.then(&next);
+        if let Some(found) = self.look_at_rest(scales.middle) {
+            return Some((found, false));
+        }
         if let Some(found) = self.look(false, &key_next, pixels, scales) {
             return Some((found, false));
         }
@@ -172,6 +166,35 @@ impl CameraMotionEstimator {
             return self.look(true, &next, pixels, scales).map(|f| (f, true));
         }
         None
+    }
+
+    /// Where a camera that was at rest still is: most patches lie where they lay, and their consensus has not moved. Most cameras stand most of the time, and a search around each patch costs
+    /// twenty times as much.
+    fn look_at_rest(&mut self, middle: Vector2<f64>) -> Option<Found> {
+        if !self.known || self.rest.moving || self.n_held > 0 {
+            return None;
+        }
+        let (last, key) = (self.from_key, &self.key);
+        self.matches.clear();
+        for p in &key.patches {
+            let to = find_near(&key.image, &self.now, *p, last.apply(p.middle()), &last.similarity_at(p.middle()));
+            self.matches.extend(to.map(|to| Match { from: p.middle(), to, weight: p.weight }));
+        }
+        let n = self.matches.len();
+        if n < MIN_PATCHES || (n as f64) < AT_REST * key.patches.len() as f64 {
+            return None;
+        }
+        let agree_px = if key.even { AGREE_EVEN } else { AGREE };
+        let found = coarse(&mut self.matches, &last, &last, &mut self.weights, &|predicted, last| Expected {
+            predicted,
+            last,
+            middle,
+            least_turn_px: STILL,
+            agree_px,
+        })?;
+        let places = key.patches.iter().map(|p| p.middle());
+        let rests = !moves(&last, (&found.now_from_key, &found.cov), middle, places);
+        rests.then_some(Found { covers: true, n_coarse: n, ..found })
     }
 
     /// Looks for the patches of the key frame, or of the last frame, where that motion leads them.
@@ -331,38 +354,6 @@ impl CameraMotionEstimator {
         self.carried = grown;
         Some((step, grown, MotionBasis::Held))
     }
-}
-
-/// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
-fn coarse(
-    matches: &mut [Match],
-    predicted: &Homography,
-    last: &Homography,
-    weights: &mut Vec<f64>,
-    expected: &dyn Fn(Similarity, Similarity) -> Expected,
-) -> Option<Found> {
-    let m = predicted.matrix();
-    let is_similar = m[(0, 0)] == m[(1, 1)] && m[(0, 1)] == -m[(1, 0)] && m[(2, 0)] == 0.0 && m[(2, 1)] == 0.0;
-    let similarity = |h: &Homography| h.similarity_at(Vector2::zeros());
-    if is_similar {
-        let fit = fit(matches, &expected(similarity(predicted), similarity(last)), weights)?;
-        let now_from_key = Homography::of_similarity(&fit.now_from_key);
-        return Some(Found {
-            now_from_key,
-            cov: of_similarity(&fit.cov),
-            turned: fit.turned,
-            covers: true,
-            n_coarse: 0,
-        });
-    }
-    let none = Similarity::identity();
-    matches.iter_mut().for_each(|m| m.from = predicted.apply(m.from));
-    let fit = fit(matches, &expected(none, none), weights);
-    let back = predicted.inverse();
-    matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
-    let fit = fit?;
-    let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
-    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
 }
 
 #[cfg(test)]

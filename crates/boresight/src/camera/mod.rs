@@ -10,6 +10,7 @@ mod find_patch;
 mod fine;
 mod fit;
 mod follow_plane;
+mod found;
 mod key_frame;
 mod motion;
 mod other_view;

@@ -49,7 +49,7 @@ impl Rest {
 }
 
 /// Whether one of the places has moved by more than [`STILL`], and by more than chance. Corners without patches, as a sky's, are extrapolated: they say nothing of a camera at rest.
-fn moves(
+pub(super) fn moves(
     before: &Homography,
     (fitted, cov): (&Homography, &MotionCov),
     middle: Vector2<f64>,

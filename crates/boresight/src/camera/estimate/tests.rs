@@ -1,6 +1,7 @@
 //! Tests of the camera's motion on simulated grounds.
 
 use super::*;
+use crate::Similarity;
 use crate::sim::ground::{CameraPathConfig, Ground};
 use crate::sim::scene::Background;
 use crate::sim::{SceneConfig, SceneSource, Seed};

@@ -8,7 +8,7 @@
 //! 99 % point q of the residuals). Clear height h = mean inside - b - q; score = h / (noise + step + s). A bright spot in an
 //! even sky scores tens, a branch in a tree hardly above one, whatever their contrasts. Of nested clusters the best score
 //! counts; the cluster at half the height between b and the peak gives box, centroid and covariance.
-//! Dark targets: the same on I <= L.
+//! Dark targets: the same on I <= L. Where both are looked for, a thing and its rim of the other sign are one (`rims`).
 //! Symbols: I value (counts); L level (counts); noise standard deviation of a pixel (counts), where it grows with I that at the frame's mean; step smallest difference of two
 //! pixel values (counts, 0 for floats).
 //! Limits: a target that touches the frame's border, or another as bright as itself within its ring, is not isolated. Of blobs near the least score some are lost whose
@@ -24,6 +24,7 @@ use super::levels;
 use super::measure::detection;
 use super::nested::{Candidate, Nested};
 use super::peaks::{self, Peak};
+use super::rims::Rims;
 use super::ring::{Cluster, Ring};
 use super::steps::Steps;
 use crate::vision::config::DetectorConfig;
@@ -56,6 +57,7 @@ pub struct IsolatedDetector {
     candidates: Vec<Candidate>,
     nested: Nested,
     strongest: Strongest,
+    rims: Rims,
 }
 
 impl IsolatedDetector {
@@ -76,6 +78,7 @@ impl IsolatedDetector {
             candidates: Vec::new(),
             nested: Nested::default(),
             strongest: Strongest::default(),
+            rims: Rims::default(),
         }
     }
 
@@ -84,13 +87,18 @@ impl IsolatedDetector {
         let noise = self.noise.of(image, &config.noise);
         let typical = variance_at(noise, if noise.1 > 0.0 { mean(image) } else { 0.0 }).sqrt();
         self.cells.read(image);
+        let first = out.len();
         for side in [Side::Bright, Side::Dark] {
             if self.isolated.polarity.has(side) {
                 self.side(image, config, side, (typical, noise), out);
             }
+            if side == Side::Bright {
+                self.rims.n_bright = out.len() - first;
+            }
         }
         // One side's are in that order already.
         if self.isolated.polarity == Polarity::Both {
+            self.rims.leave_out(first, out);
             self.strongest.sort(out);
         }
     }

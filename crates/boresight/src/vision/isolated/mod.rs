@@ -11,6 +11,7 @@ mod measure;
 mod near;
 mod nested;
 mod peaks;
+mod rims;
 mod ring;
 mod steps;
 

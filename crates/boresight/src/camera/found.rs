@@ -1,0 +1,52 @@
+//! Where the background of a key frame was found, and the consensus of coarse matches about where it was expected.
+//!
+//! Source: [`super::fit`]. Units: reduced px.
+
+use super::fit::{Expected, Match, fit};
+use super::scales::of_similarity;
+use crate::{Homography, MotionCov, Similarity};
+use nalgebra::Vector2;
+
+/// Where the key frame's background lies now, reduced px.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub now_from_key: Homography,
+    pub cov: MotionCov,
+    pub turned: bool,
+    /// Whether it shows in enough of the image to be the background's beyond doubt.
+    pub covers: bool,
+    /// Patches of the reduced frame that were found.
+    pub n_coarse: usize,
+}
+
+/// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
+pub(super) fn coarse(
+    matches: &mut [Match],
+    predicted: &Homography,
+    last: &Homography,
+    weights: &mut Vec<f64>,
+    expected: &dyn Fn(Similarity, Similarity) -> Expected,
+) -> Option<Found> {
+    let m = predicted.matrix();
+    let is_similar = m[(0, 0)] == m[(1, 1)] && m[(0, 1)] == -m[(1, 0)] && m[(2, 0)] == 0.0 && m[(2, 1)] == 0.0;
+    let similarity = |h: &Homography| h.similarity_at(Vector2::zeros());
+    if is_similar {
+        let fit = fit(matches, &expected(similarity(predicted), similarity(last)), weights)?;
+        let now_from_key = Homography::of_similarity(&fit.now_from_key);
+        return Some(Found {
+            now_from_key,
+            cov: of_similarity(&fit.cov),
+            turned: fit.turned,
+            covers: true,
+            n_coarse: 0,
+        });
+    }
+    let none = Similarity::identity();
+    matches.iter_mut().for_each(|m| m.from = predicted.apply(m.from));
+    let fit = fit(matches, &expected(none, none), weights);
+    let back = predicted.inverse();
+    matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
+    let fit = fit?;
+    let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
+    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
+}
