@@ -47,6 +47,8 @@ const KEY_SHARE: f64 = 0.25;
 const KEY_TURN: f64 = 0.25;
 /// Frames that are bridged at most: half a second at 25 frames/s.
 const MOST_HELD: u32 = 12;
+/// Frames, one after the other, in which the key frame is not found, before the last frame takes its place: a fifth of a second at 25 frames/s. Noise hides it for a frame or two.
+const WAIT_FRAMES: u32 = 5;
 /// Share of the image's cells that the background shows in, at least: a target that covers a third of the image shows in more than half of them, for it touches cells that it does not
 /// fill. Where it shows in fewer, as below a sky, a first motion is believed once it was found in so many frames one after the other.
 const LEAST_COVER: f64 = 0.6;
@@ -147,11 +149,14 @@ impl CameraMotionEstimator {
         if let Some(found) = self.look(false, &key_next, pixels, scales) {
             return Some((found, false));
         }
+        // Behind frames that were bridged only the key frame tells where the ground is: it is waited for.
+        let waits = self.n_held > 0 && self.n_held < WAIT_FRAMES;
         self.last.choose();
-        if let Some(found) = self.look(true, &next, pixels, scales) {
+        if !waits && let Some(found) = self.look(true, &next, pixels, scales) {
             return Some((found, true));
         }
-        for at_last in [false, true] {
+        for at_last in if waits { &[false][..] } else { &[false, true] } {
+            let at_last = *at_last;
             let (key, start) = if at_last { (&self.last, &next) } else { (&self.key, &key_next) };
             if !key.patches.is_empty()
                 && let Some(predicted) = self.wide.look(&key.image, &self.now, &start.similarity_at(scales.middle))
@@ -160,7 +165,7 @@ impl CameraMotionEstimator {
                 return Some((found, at_last));
             }
         }
-        if self.rest.moving && !self.last.even {
+        if self.rest.moving && !self.last.even && !waits {
             // The few patches that stand out do not agree: the many weak ones may.
             self.last.choose_even();
             return self.look(true, &next, pixels, scales).map(|f| (f, true));
