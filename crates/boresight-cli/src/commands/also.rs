@@ -1,28 +1,12 @@
 //! The formats of other programs that `track --also` writes beside its own tables, made of the finished `tracks.csv`.
 
 use super::convert::of_trackpy;
+use super::export_files::FORMATS;
 use super::run_folder::RunFolder;
 use crate::console::say;
 use boresight::io::tracks::{Dialect, Format, ReadOptions, read, write_path};
 use boresight::{Error, Result};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-
-/// Each format with the name of its file, or its folder.
-pub const FORMATS: [(Format, &str); 13] = [
-    (Format::Geff, "tracks.geff/"),
-    (Format::TrackMateXml, "trackmate.xml"),
-    (Format::Cvat, "cvat.xml"),
-    (Format::MotZip, "mot.zip"),
-    (Format::Napari, "napari.npy"),
-    (Format::Mcap, "tracks.mcap"),
-    (Format::Vmti, "vmti.ts"),
-    (Format::Parquet, "tracks.parquet"),
-    (Format::Kitti, "kitti.txt"),
-    (Format::Named(Dialect::Trackpy), "trackpy.csv"),
-    (Format::Named(Dialect::TrackMate), "trackmate.csv"),
-    (Format::Named(Dialect::Btrack), "btrack.csv"),
-    (Format::Named(Dialect::Ultrack), "ultrack.csv"),
-];
 
 /// Takes the name of a format, for the name of its file.
 pub fn file_name() -> impl TypedValueParser<Value = &'static str> {

@@ -8,6 +8,7 @@ pub mod config;
 pub mod convert;
 pub mod detect;
 pub mod evaluate;
+mod export_files;
 pub mod fuse;
 #[cfg(feature = "live")]
 pub mod live;

@@ -3,7 +3,7 @@
 //! `config.toml` lists the files of its run. When a run has succeeded, files that an earlier run lists and this one did not make go
 //! (an old `annotated.mp4` beside new tables would show another run); all other files stay. A run that fails changes nothing.
 
-use super::also;
+use super::export_files::FORMATS;
 use super::run_options::Plan;
 use boresight::io::{AtomicFile, is_same_file};
 use boresight::{Error, ErrorKind};
@@ -11,7 +11,7 @@ use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a run can write beside [`also::FORMATS`]; a name with `/` is a folder.
+/// What a run can write beside [`FORMATS`]; a name with `/` is a folder.
 const NAMES: [&str; 11] = [
     "tracks.csv",
     "detections.csv",
@@ -28,7 +28,7 @@ const NAMES: [&str; 11] = [
 
 /// What a run may remove if an earlier run says that it wrote it.
 fn names() -> impl Iterator<Item = &'static str> {
-    NAMES.into_iter().chain(also::FORMATS.map(|(_, name)| name))
+    NAMES.into_iter().chain(FORMATS.map(|(_, name)| name))
 }
 
 /// Starts the line of `config.toml` that lists the files.

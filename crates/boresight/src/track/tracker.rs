@@ -1,4 +1,4 @@
-//! The tracker: predict, gate, associate, update, confirm, delete, report, initiate; one scan at a time.
+//! The tracker: predict, gate, associate, update, confirm, delete, report, initiate, reidentify; one scan at a time.
 //!
 //! Source: docs/theory/track-management.md. Confirmed tracks choose first, tentative ones among what is left, what is left then
 //! initiates tracks. The parts are in [`step`](super::step), the confirmation rules in [`confirm`](super::confirm).
