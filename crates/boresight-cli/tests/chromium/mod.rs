@@ -108,7 +108,8 @@ impl Browser {
     pub fn until(&mut self, expression: &str) {
         let end = Instant::now() + PATIENCE;
         while self.value(expression) != true {
-            let state = self.value("document.body.innerText");
+            // Between two pages there is no body.
+            let state = self.value("document.body?.innerText ?? null");
             assert!(Instant::now() < end, "never true: {expression}\nthe page says: {state}");
             std::thread::sleep(Duration::from_millis(30));
         }
