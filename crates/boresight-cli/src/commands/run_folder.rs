@@ -167,3 +167,20 @@ impl LeftOver {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_an_earlier_run_exported_goes_and_what_it_did_not_name_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let exports: Vec<&str> = FORMATS.iter().map(|(_, name)| *name).collect();
+        std::fs::write(dir.path().join("config.toml"), format!("{LIST} {} notes.txt\n", exports.join(" "))).unwrap();
+        let folder =
+            RunFolder::new(dir.path().to_owned(), vec!["vmti.ts", "config.toml"], OsStr::new("in.mp4")).unwrap();
+        let gone = folder.left_over(OsStr::new("in.mp4"));
+        let kept = exports.iter().filter(|name| **name != "vmti.ts").map(|name| folder.path(name));
+        assert_eq!(gone, kept.collect::<Vec<_>>());
+    }
+}

@@ -312,6 +312,17 @@ mod tests {
     }
 
     #[test]
+    fn a_target_whose_detections_reach_the_score_now_and_then_is_not_clear() {
+        // Track 1: three of four, track 2: two of four, track 3: the only one.
+        let held: Vec<Held> = [(1, 4), (2, 4), (3, 1)]
+            .into_iter()
+            .flat_map(|(track, n)| (0..n).map(move |scan| Held { scan, detection: 0, track }))
+            .collect();
+        let reaches = |h: &Held| h.scan < [3, 2, 1][h.track as usize - 1];
+        assert_eq!(clear(&held, reaches).collect::<Vec<_>>(), [1, 3]);
+    }
+
+    #[test]
     fn too_few_scans_change_nothing() {
         let mut config = Config::default();
         learn(&scans(0.1, 0.9, 3)[..5], 3.6e5, None, &mut config, &mut Vec::new()).unwrap();

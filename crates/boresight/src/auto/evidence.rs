@@ -38,7 +38,7 @@ pub struct Evidence {
     /// The largest gain of any of them, nats.
     pub most_by_chance: f64,
     /// Speeds of the steps of all surrogates' moving chains, px/s.
-    pub(super) speeds_by_chance: Vec<f64>,
+    speeds_by_chance: Vec<f64>,
 }
 
 impl Evidence {

@@ -171,7 +171,8 @@ mod tests {
 
     #[test]
     fn the_time_with_a_clear_target_is_that_of_its_spans_together() {
-        let evidence = Evidence { times_s: vec![0.0, 5.0, 10.0], ..Evidence::default() };
+        let mut evidence = Evidence::default();
+        evidence.times_s = vec![0.0, 5.0, 10.0];
         assert_eq!(times_s(&evidence, &[]), [0.0, 10.0]);
         // 2 to 5 and 4 to 6 are four seconds, 9 to 12 is one of them.
         assert_eq!(times_s(&evidence, &[[4.0, 6.0], [2.0, 5.0], [9.0, 12.0]]), [5.0, 5.0]);
@@ -189,10 +190,11 @@ mod tests {
                 .collect(),
             speeds_px_per_s: Vec::new(),
         };
-        let evidence = |waves: &[usize]| Evidence {
-            moving: waves.iter().map(|&k| wave(k)).collect(),
-            times_s: (0..250).map(|k| 0.04 * f64::from(k)).collect(),
-            ..Evidence::default()
+        let evidence = |waves: &[usize]| {
+            let mut evidence = Evidence::default();
+            evidence.moving = waves.iter().map(|&k| wave(k)).collect();
+            evidence.times_s = (0..250).map(|k| 0.04 * f64::from(k)).collect();
+            evidence
         };
         let lowered = |waves: &[usize], clear_s: &[[f64; 2]]| {
             let mut config = Config::default();

@@ -117,3 +117,31 @@ pub(super) fn tracker(side_px: f64, info: &SourceInfo, tracker: &mut TrackerConf
     tracker.coast_s = 0.7;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PixelKind;
+
+    #[test]
+    fn what_is_wider_than_half_of_the_frame_is_the_ground() {
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: 640,
+            height: 480,
+            kind: PixelKind::Gray8,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        let fits = |size_px: [f64; 2]| {
+            let mut scene = Scene::default();
+            (scene.camera, scene.n_frames, scene.n_moving, scene.regions) = (Camera::Fixed, 40, 40, 4.0);
+            (scene.size_px, scene.area_px, scene.share, scene.novelty) = (size_px, 2000.0, 0.1, 0.5);
+            super::fits(&scene, &info)
+        };
+        assert!(fits([100.0, 250.0]), "people who stand near");
+        assert!(!fits([424.0, 88.0]) && !fits([100.0, 400.0]));
+    }
+}

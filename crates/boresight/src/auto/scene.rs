@@ -322,4 +322,36 @@ mod tests {
         // 400 of 9 px² are more than two of 1600 px².
         assert_eq!((among(400), size(&[])), ([3.0, 6.0], [0.0; 2]));
     }
+
+    #[test]
+    fn the_edges_of_a_camera_that_moves_are_seen_to_move_though_their_pixels_vary_as_much() {
+        // A roof's edge of 120 counts in noise of two, slanted, that comes by so many pixels a frame.
+        use rand::{RngExt, SeedableRng};
+        let share = |px_a_frame: f64| {
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+            let grids: Vec<Image<f32>> = (0..48)
+                .map(|k| {
+                    let mut grid = Image::filled(120, 90, 0f32);
+                    for y in 0..90 {
+                        let edge = 0.2 * y as f64 + 30.0 + px_a_frame * f64::from(k);
+                        for (x, p) in grid.row_mut(y).iter_mut().enumerate() {
+                            let z: f64 = rng.sample(rand_distr::StandardNormal);
+                            *p = (80.0 + 120.0 * (x as f64 - edge).clamp(0.0, 1.0) + 2.0 * z) as f32;
+                        }
+                    }
+                    grid
+                })
+                .collect();
+            let config =
+                BackgroundConfig { start_s: 0.0, min_difference: Some(MIN_COUNTS), ..BackgroundConfig::default() };
+            let mut background = Background::<f32>::new(config).unwrap();
+            background.prime(&grids.iter().collect::<Vec<_>>()).unwrap();
+            let edges = edges(&background, 120, 90, true);
+            assert!(edges.len() > 50);
+            let moved = grids.iter().map(|g| edges.iter().filter(|e| e.has_moved(g)).count()).sum::<usize>();
+            moved as f64 / (edges.len() * grids.len()) as f64
+        };
+        assert!(share(0.0) < 0.03, "{}", share(0.0));
+        assert!(share(0.4) > 0.2, "{}", share(0.4));
+    }
 }

@@ -55,7 +55,7 @@ const LEAST_COVER: f64 = 0.6;
 /// Where this share agrees the others are not asked.
 const CLEAR_COVER: f64 = 0.75;
 const UNSURE_FRAMES: u32 = 3;
-/// Share of the key frame's patches that must lie where they lay, so that the others are not looked for: of patches of another view a third may seem to, by chance.
+/// Share of the key frame's patches that must lie where they lay, so that the others are not looked for. Chosen: a target may hide a fourth.
 const AT_REST: f64 = 0.75;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
 const FINE_FOUND: f64 = 0.5;
@@ -105,8 +105,7 @@ impl CameraMotionEstimator {
         let last = if self.key_is_last { &self.key.image } else { &self.last.image };
         if found.is_none() && self.view.is_other(last, &self.now) {
             self.start_anew(pixels, &scales);
-            let nothing = (Homography::identity(), MotionCov::zeros());
-            return Some(full_size(&nothing.0, &nothing.1, MotionBasis::Cut, &scales));
+            return Some(full_size(&Homography::identity(), &MotionCov::zeros(), MotionBasis::Cut, &scales));
         }
         let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
         self.n_unsure = if is_unsure { self.n_unsure + 1 } else { 0 };
@@ -129,6 +128,7 @@ impl CameraMotionEstimator {
     /// Forgets all that was; the frame is the key frame.
     fn start_anew(&mut self, pixels: &Pixels, scales: &Scales) {
         self.key.take(&mut self.now);
+        self.key_is_last = true;
         self.fine.choose(pixels, scales.factor, &self.key.places);
         self.last.forget();
         self.from_key = Homography::identity();
@@ -151,12 +151,13 @@ impl CameraMotionEstimator {
         }
         // Behind frames that were bridged only the key frame tells where the ground is: it is waited for.
         let waits = self.n_held > 0 && self.n_held < WAIT_FRAMES;
-        self.last.choose();
-        if !waits && let Some(found) = self.look(true, &next, pixels, scales) {
-            return Some((found, true));
+        if !waits {
+            self.last.choose();
+            if let Some(found) = self.look(true, &next, pixels, scales) {
+                return Some((found, true));
+            }
         }
-        for at_last in if waits { &[false][..] } else { &[false, true] } {
-            let at_last = *at_last;
+        for at_last in [false, true].into_iter().filter(|at_last| !(waits && *at_last)) {
             let (key, start) = if at_last { (&self.last, &next) } else { (&self.key, &key_next) };
             if !key.patches.is_empty()
                 && let Some(predicted) = self.wide.look(&key.image, &self.now, &start.similarity_at(scales.middle))
@@ -173,8 +174,8 @@ impl CameraMotionEstimator {
         None
     }
 
-    /// Where a camera that was at rest still is: most patches lie where they lay, and their consensus has not moved. Most cameras stand most of the time, and a search around each patch costs
-    /// twenty times as much.
+    /// Where a camera that was at rest still is: most patches lie where they lay, and their consensus has not moved. Most cameras stand most of the time, and the search around each patch was 46 %
+    /// of the instructions of a run over IR_BIRD_031 (callgrind).
     fn look_at_rest(&mut self, middle: Vector2<f64>) -> Option<Found> {
         if !self.known || self.rest.moving || self.n_held > 0 {
             return None;

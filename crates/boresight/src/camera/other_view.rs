@@ -29,8 +29,8 @@ const REACH: i32 = 6;
 /// Thumbnails of this frame and the one before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OtherView {
-    now: Vec<f32>,
-    before: Vec<f32>,
+    now: Image<f32>,
+    before: Image<f32>,
     mean: f64,
     n: u32,
     change: f64,
@@ -47,9 +47,9 @@ impl OtherView {
             self.mean += weight * (self.change - self.mean);
         }
         std::mem::swap(&mut self.now, &mut self.before);
-        thumbnail(frame, &mut self.now);
-        if self.before.len() == self.now.len() {
-            self.change = change(&self.before, &self.now);
+        blocks(frame, frame.width().max(frame.height()).div_ceil(CELLS).max(1), &mut self.now, &mut self.sums, |p| p);
+        if is_alike(&self.before, &self.now) {
+            self.change = change(&self.before, &self.now, (0, 0));
             self.n = self.n.saturating_add(1);
         } else {
             (self.change, self.mean, self.n) = (0.0, 0.0, 0);
@@ -58,15 +58,15 @@ impl OtherView {
 
     /// Whether the frame taken last, `now`, shows another view than the one before it, `last`.
     pub fn is_other(&mut self, last: &Image<f32>, now: &Image<f32>) -> bool {
-        if !self.may_be_other() || (last.width(), last.height()) != (now.width(), now.height()) {
+        if !self.may_be_other() || !is_alike(last, now) {
             return false;
         }
         for (image, small) in [last, now].into_iter().zip(&mut self.small) {
             blocks(image, BLOCK, small, &mut self.sums, |p| p);
         }
         let [a, b] = &self.small;
-        let shifts = (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)));
-        shifts.into_iter().all(|shift| change_at(a, b, shift) > LEAST_CHANGE)
+        let mut shifts = (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)));
+        shifts.all(|shift| change(a, b, shift) > LEAST_CHANGE)
     }
 
     fn may_be_other(&self) -> bool {
@@ -74,20 +74,8 @@ impl OtherView {
     }
 }
 
-/// Means over square cells.
-fn thumbnail(frame: &Image<f32>, out: &mut Vec<f32>) {
-    out.clear();
-    let (w, h) = (frame.width(), frame.height());
-    let side = w.max(h).div_ceil(CELLS).max(1);
-    let n = w / side;
-    for y in 0..h / side {
-        let first = out.len();
-        out.resize(first + n, 0.0);
-        for row in y * side..(y + 1) * side {
-            let cells = frame.row(row).chunks_exact(side);
-            out[first..].iter_mut().zip(cells).for_each(|(o, cell)| *o += cell.iter().sum::<f32>());
-        }
-    }
+fn is_alike(a: &Image<f32>, b: &Image<f32>) -> bool {
+    (a.width(), a.height()) == (b.width(), b.height())
 }
 
 /// 1 - r² of two pictures in pairs of their pixels; 0 where one has no contrast, and where there is none.
@@ -104,12 +92,8 @@ fn of_pairs(pairs: impl Iterator<Item = (f32, f32)> + Clone) -> f64 {
     if aa * bb > 0.0 { 1.0 - ab * ab / (aa * bb) } else { 0.0 }
 }
 
-fn change(a: &[f32], b: &[f32]) -> f64 {
-    of_pairs(a.iter().copied().zip(b.iter().copied()))
-}
-
-/// The same, where the second picture is moved by so much.
-fn change_at(a: &Image<f32>, b: &Image<f32>, (dx, dy): (i32, i32)) -> f64 {
+/// The same of two images of one size, the second one moved by so much.
+fn change(a: &Image<f32>, b: &Image<f32>, (dx, dy): (i32, i32)) -> f64 {
     let part = |of: &Image<f32>, x: i32, y: i32| {
         let (cut_x, cut_y) = (dx.unsigned_abs() as usize, dy.unsigned_abs() as usize);
         let (w, h) = (of.width().saturating_sub(cut_x), of.height().saturating_sub(cut_y));
@@ -183,13 +167,15 @@ mod tests {
     #[test]
     fn the_change_is_one_less_the_squared_correlation() {
         // Of (1, 2, 3, 4) and (1, 3, 2, 4): means 2.5, sums of squares 5 and 5, of products 4: r = 0.8.
-        assert!((change(&[1.0, 2.0, 3.0, 4.0], &[1.0, 3.0, 2.0, 4.0]) - 0.36).abs() < 1e-12);
-        assert!(change(&[1.0, 2.0, 3.0, 4.0], &[7.0, 9.0, 11.0, 13.0]).abs() < 1e-12);
+        let row = |v: [f32; 4]| Image::from_vec(4, 1, v.to_vec()).unwrap();
+        let of = |a, b| change(&row(a), &row(b), (0, 0));
+        assert!((of([1.0, 2.0, 3.0, 4.0], [1.0, 3.0, 2.0, 4.0]) - 0.36).abs() < 1e-12);
+        assert!(of([1.0, 2.0, 3.0, 4.0], [7.0, 9.0, 11.0, 13.0]).abs() < 1e-12);
         // Two pixels to the left and one down.
         let (mut a, mut b) = (hills(0.0, 1.0, 0.0, 0.0), Image::filled(160, 128, 0.0f32));
         (0..127).for_each(|y| b.row_mut(y + 1)[..158].copy_from_slice(&a.row(y)[2..]));
-        assert!(change_at(&a, &b, (-2, 1)).abs() < 1e-9 && change_at(&a, &b, (2, -1)) > 1e-3);
+        assert!(change(&a, &b, (-2, 1)).abs() < 1e-9 && change(&a, &b, (2, -1)) > 1e-3);
         a.reset(2, 2, 0.0);
-        assert_eq!(change_at(&a, &a.clone(), (6, -6)), 0.0, "nothing is left of it");
+        assert_eq!(change(&a, &a.clone(), (6, -6)), 0.0, "nothing is left of it");
     }
 }

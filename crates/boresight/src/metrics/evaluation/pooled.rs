@@ -154,5 +154,10 @@ mod tests {
             assert!(of(name).is_nan(), "{name}: {}", of(name));
         }
         assert_eq!((of("JSC"), of("SIAP_C")), (0.0, 0.0));
+        // Beside a sequence that has one they are that one's.
+        let judged = |shift: f64| Sequence::new(&points(0, &[0.0; 4]), &points(0, &[shift; 4])).evaluate(&o).unwrap();
+        let both = ResultEvaluation::new("both", vec![judged(2.0), judged(300.0)]).values();
+        let of = |name: &str| both.iter().find(|v| v.name == name).unwrap().value;
+        assert_eq!(["RMSE", "bias_x", "scatter_y", "SIAP_PA"].map(of), [2.0, 2.0, 0.0, 2.0]);
     }
 }

@@ -85,7 +85,8 @@ impl Evaluation {
     pub(super) fn parts(&self) -> Vec<Part> {
         let Some(f) = &self.optional else { return Vec::new() };
         let d = &f.detection;
-        let by_frames = |v: Value| Part::mean(v, f.gospa.len() as f64);
+        // What is not defined in a sequence weighs nothing among several.
+        let by_frames = |v: Value| Part::mean(v, if v.value.is_nan() { 0.0 } else { f.gospa.len() as f64 });
         let by_rows = |v: Value| Part::mean(v, d.tp as f64);
         let mut values = vec![
             Value::lower("GOSPA", mean_of(f.gospa.iter().map(|g| g.distance)), "px"),

@@ -12,18 +12,16 @@ const TOUCH_PX: f64 = 1.0;
 /// Leaves rims out; keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Rims {
-    /// How many of the detections are bright, the first ones.
-    pub n_bright: usize,
     by_left: Vec<u32>,
     pairs: Vec<(u32, u32)>,
     goes: Vec<bool>,
 }
 
 impl Rims {
-    /// Takes those out of the detections from `first` on that touch a clearer one of the other sign.
-    pub fn leave_out(&mut self, first: usize, out: &mut Vec<Detection>) {
-        let all = &out[first..];
-        let (n_bright, right) = (self.n_bright, |d: &Detection| d.extent.left_px + d.extent.width_px + TOUCH_PX);
+    /// Takes those out of the detections from `first` on, of which those before `first_dark` are bright, that touch a clearer one of the other sign.
+    pub fn leave_out(&mut self, (first, first_dark): (usize, usize), out: &mut Vec<Detection>) {
+        let (all, n_bright) = (&out[first..], first_dark - first);
+        let right = |d: &Detection| d.extent.left_px + d.extent.width_px + TOUCH_PX;
         self.by_left.clear();
         self.by_left.extend(0..all.len() as u32);
         self.by_left.sort_unstable_by(|a, b| {
@@ -81,13 +79,12 @@ mod tests {
         let mut out = vec![boxed(0.0, 0.0, 2.0, 99.0)];
         out.extend([boxed(10.0, 10.0, 6.0, 20.0), boxed(60.0, 10.0, 6.0, 3.0), boxed(23.0, 10.0, 3.0, 2.5)]);
         out.extend([boxed(16.5, 11.0, 6.0, 5.0), boxed(10.0, 40.0, 6.0, 4.0)]);
-        let mut rims = Rims { n_bright: 3, ..Rims::default() };
-        rims.leave_out(1, &mut out);
+        Rims::default().leave_out((1, 4), &mut out);
         let scores: Vec<f32> = out.iter().map(|d| d.score).collect();
         assert_eq!(scores, [99.0, 20.0, 3.0, 2.5, 4.0], "what the rim would have hidden stays: the rim is none");
         // Two bright ones that touch are two.
         let mut two = vec![boxed(10.0, 10.0, 6.0, 20.0), boxed(16.0, 10.0, 6.0, 19.0)];
-        Rims { n_bright: 2, ..Rims::default() }.leave_out(0, &mut two);
+        Rims::default().leave_out((0, 2), &mut two);
         assert_eq!(two.len(), 2);
     }
 }
