@@ -26,12 +26,14 @@ pub struct Choice {
     pub reasons: Vec<String>,
     /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
     pub(super) runner_up: Option<Box<Choice>>,
+    /// Whether anything spoke for it: something stands clear, or moves ([`super::later_looks`]).
+    pub(super) is_evident: bool,
 }
 
 impl Choice {
     /// A choice that nothing stands against.
     pub(super) fn alone(config: Config, reasons: Vec<String>) -> Self {
-        Self { config, reasons, runner_up: None }
+        Self { config, reasons, runner_up: None, is_evident: true }
     }
 
     /// As [`super::report_whole`], whichever detector the first pass bears out.
@@ -89,7 +91,7 @@ pub(super) fn choose_looked(
     let n_threads = request.n_threads();
     let mut reasons = Vec::new();
     let mut config = base.clone();
-    let mut runner_up = None;
+    let (mut runner_up, mut is_evident) = (None, true);
     let interval_s = interval_s(frames, info);
     let n_looked = frames.len().max(second.len());
     let looked = if second.is_empty() { frames } else { second };
@@ -98,13 +100,17 @@ pub(super) fn choose_looked(
         _ => 0.0,
     };
     reasons.push(format!(
-        "{} x {} {:?}, {} frames/s ({}), from {n_looked} {} of the first {over_s:.1} s.",
+        "{} x {} {:?}, {} frames/s ({}), from {n_looked} {} of {} {over_s:.1} s.",
         info.width,
         info.height,
         info.kind,
         shown_rate(1.0 / interval_s),
         if info.true_times { "the file's times" } else { "no times in the input: the given rate" },
         if n_looked == 1 { "frame" } else { "frames" },
+        match looked.first().map_or(0, |f| f.index.0) {
+            0 => "the first".to_string(),
+            k => format!("frame {k} and the next"),
+        },
     ));
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
@@ -138,10 +144,12 @@ pub(super) fn choose_looked(
             let steadied = steadied::look_beside(&evidence, frames, scene, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
+            is_evident = !evidence.is_poor() || evidence.moves() || steadied.is_some();
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);
+                is_evident = true;
             }
             if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
                 steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
@@ -150,7 +158,7 @@ pub(super) fn choose_looked(
             }
         }
     }
-    let mut choice = Choice { config, reasons, runner_up };
+    let mut choice = Choice { config, reasons, runner_up, is_evident };
     choice.change(|c| {
         c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
         c.reasons.push(format!(

@@ -1,21 +1,43 @@
-//! Targets of the other polarity that come later: the choice looks at the first frames, and a file may show its bright aircraft first and a dark one after a cut.
+//! Targets that come later: the choice looks at the first frames, and a file may show nothing in them, or its bright aircraft first and a dark one after a cut.
 //!
+//! Where nothing stands clear or moves in the first frames the whole choice is made again of frames further on, until something does ([`choice`]). Where something does, targets of the
+//! other polarity are asked for ([`polarity`]):
 //! Source: our own; the evidence is that of [`super::evidence`]. Over what was read ahead for the first pass, three times as many frames as the choice looked at are asked what moves
 //! of the other polarity, with the same gaps as there. It counts where it surely gains more than what was chosen does in the same frames; by chance that is so once in three hundred
 //! files. It is looked for from the first frame on, beside what was looked for before, or in its place where nothing of that moves: a thing that is bright and dark in turns comes in
 //! pieces where both are looked for, so that both must be needed.
-//! Limits: isolated targets only; what comes after the frames read ahead is not seen.
+//! Limits: a target of another kind that comes beside one that was seen; what comes after the frames read ahead, and between the places looked at.
 
+use super::choose::{Choice, choose_seen};
 use super::evidence::Evidence;
 use super::first_scans::PROBE_FRAMES;
-use super::looks;
+use super::request::Request;
 use super::spots::{self, Seen, Side};
 use super::spread::growing;
+use super::{looks, scene};
+use crate::io::Replay;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, Scan, SourceInfo};
+use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
 
 /// Places of the frames at which it is looked, each as long as the choice's own.
 const LOOKS: usize = 3;
+
+/// The choice by the first later frames in which something stands clear or moves, if there are any; all frames that may be held are read for it.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> Result<Option<Choice>> {
+    let info = frames.info().clone();
+    let ahead = frames.read_on(usize::MAX);
+    for start in starts(ahead.len()) {
+        let window = &ahead[start..start + PROBE_FRAMES];
+        let mut later = choose_seen(window, scene::look(window, &info)?, &[], &info, base, request)?;
+        if later.is_evident {
+            later.reasons.insert(0, "In the first frames nothing stands clear or moves: later ones were looked at.".into());
+            return Ok(Some(later));
+        }
+    }
+    Ok(None)
+}
 
 /// The polarity to look for in the place of the configured one, with the reason, if targets of the other one move later; `scans` are what the detector made of `frames`.
 /// # Errors

@@ -11,14 +11,17 @@ use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
 use super::{contest, initiation_score, later_looks, noise, speed};
+use crate::camera::CameraPath;
 use crate::io::{LengthUnit, Replay};
-use crate::track::Report;
+use crate::track::{MotionTestConfig, Report};
 use crate::vision::threshold::ThresholdConfig;
 use crate::vision::{AtOnce, Detector};
 use crate::{Config, Error, FrameSource, Result, Scan};
 
 /// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
 const FEW_STILL: f64 = 3.0;
+/// Parallax that a thing before the ground would be told from it by, px.
+const LEAST_PARALLAX_PX: f64 = 1.0;
 
 /// Runs the detector chosen over the frames read ahead, learns noise and motion of the targets from its detections, and returns it: it goes on
 /// where they end, so no frame is detected twice. What `set` changes in a configuration holds for this first pass as well, and is not overruled by what it learns.
@@ -101,8 +104,10 @@ fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
             return Ok(pass);
         }
     }
-    if choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0) {
-        // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them.
+    let nothing_moves = choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0);
+    if nothing_moves && parallax_px(pass.scans()) <= LEAST_PARALLAX_PX {
+        // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them. What keeps its place in the ground while the camera goes
+        // far belongs to it.
         let mut still = assumed.clone();
         still.config.tracker.report = Report::All;
         let things = statistics(pass.scans(), area_px2, false_tracks_per_hour, &mut still)?;
@@ -163,6 +168,16 @@ fn raise(
     }
     choice.reasons.push(reason);
     Ok((found, true))
+}
+
+/// The parallax of a thing before the ground at the farthest that the camera came from where it was at first, px.
+fn parallax_px(scans: &[Scan]) -> f64 {
+    let mut path = CameraPath::default();
+    let far = |s: &Scan| {
+        path.step(s.camera_motion.as_ref());
+        path.place_px.norm()
+    };
+    MotionTestConfig::default().parallax_share * scans.iter().map(far).fold(0.0, f64::max)
 }
 
 /// Learns noise and motion, and of points what the detections are made of; of regions this is not known, and their rule stays.

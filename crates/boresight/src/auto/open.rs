@@ -2,12 +2,13 @@
 //!
 //! 1. open the input and read its first frames ahead ([`Replay`] hands them out again: a stream is read once, and no frame is lost);
 //! 2. look at them as a whole; a file whose camera stands still is read a second time, further on and in colour ([`super::second_look`]);
-//! 3. choose detector and tracker;
+//! 3. choose detector and tracker; where nothing is seen yet, by frames further on ([`super::later_looks`]);
 //! 4. run the detector over the frames read ahead and learn noise and motion from its detections ([`learn()`]);
 //! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
 use super::choose::{Choice, choose_seen};
 use super::first_scans::{self, PROBE_FRAMES};
+use super::later_looks;
 use super::learn::learn;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
@@ -92,7 +93,12 @@ fn choose_from(
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
     let second = if look_again { again() } else { Vec::new() };
-    choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)
+    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)?;
+    if choice.is_evident || request.detector.is_some() {
+        return Ok(choice);
+    }
+    drop(second);
+    Ok(later_looks::choice(frames, base, request)?.unwrap_or(choice))
 }
 
 /// The frames that are looked at for the choice.

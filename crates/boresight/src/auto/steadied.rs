@@ -1,7 +1,7 @@
-//! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate where isolated targets leave most of what stands clear
-//! unexplained, weighed by the evidence of its chains.
+//! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate beside isolated targets, weighed by the evidence of its chains.
 //!
-//! Source: our own. It costs more than a look at isolated targets, so it is tried only where these do not explain the frames, with one lag, and on every second frame or so.
+//! Source: our own. It costs more than a look at isolated targets, so it is tried with one lag and on every second frame or so. That isolated targets explain what stands clear does not speak
+//! against it: of four that cross a town one may stand clear.
 //! Limits: a camera whose motion is not seen has no such candidate; what moves by less than a third of its size in the lag is not seen.
 
 use super::chains::Chain;
@@ -15,7 +15,7 @@ use crate::camera::CameraConfig;
 use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, Report, TwoPointConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::steadied::SteadiedConfig;
-use crate::vision::threshold::{Polarity, ThresholdConfig};
+use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// Fewer frames than this show no steady ground.
@@ -30,8 +30,6 @@ const LEAST_PX: f64 = 4.0;
 const RIMS: f64 = 0.0137;
 /// Share of the regions that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
 pub(super) const LEAST_EXPLAINED: f64 = 0.2;
-/// Share of the sure isolated blobs that chains explain, from which on isolated targets tell what the frames show.
-const TOLD: f64 = 0.5;
 
 /// What was seen.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,15 +63,7 @@ fn detector(lag_s: f64, info: &SourceInfo) -> DetectorConfig {
     config
 }
 
-/// Whether the chains of isolated targets hold most of the blobs that stand clear in so many looks.
-fn tells(isolated: &spots::Seen, n_looks: usize) -> bool {
-    let (polarity, chains) = isolated.most();
-    let clear = if polarity == Polarity::Dark { &isolated.dark } else { &isolated.bright };
-    chains.is_sure() && chains.n_hits() as f64 >= TOLD * clear.per_frame * n_looks as f64
-}
-
-/// What moves by itself where the camera moves and the chains of isolated targets tell little, or where it stands and nothing stands clear, if its own surely
-/// gain more than these and, where nothing stands clear, than those of faint ones.
+/// What moves by itself where the camera moves, or where it stands and nothing stands clear, if its own chains surely gain more beside those of isolated targets than these do and, where nothing stands clear, than those of faint ones.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look_beside(
@@ -90,7 +80,7 @@ pub fn look_beside(
         Camera::Fixed => isolated.is_poor(),
         Camera::Unknown => false,
     };
-    if !asked || frames.len() < LEAST_FRAMES || tells(isolated, places.len()) {
+    if !asked || frames.len() < LEAST_FRAMES {
         return Ok(None);
     }
     let seen = look(frames, scene, info)?;

@@ -1,14 +1,15 @@
-//! What a camera did over a sequence of scans: how far it came, and how often its view was lost.
+//! What a camera did over a sequence of scans: where it came to, and how often its view was lost.
 //!
-//! Limits: a scan whose shift is unknown adds nothing to the length of the path; if the background was followed before, it counts as a cut.
+//! Limits: a scan whose shift is unknown leaves the place as it is; if the background was followed before, it counts as a cut.
 
 use crate::{CameraMotion, MotionBasis};
+use nalgebra::Vector2;
 
 /// What the camera did so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraPath {
-    /// Length of the background's path in the image, px.
-    pub length_px: f64,
+    /// Where the background's middle has come to in the image from where it was at first, px.
+    pub place_px: Vector2<f64>,
     /// Variance of the newest step, px² per axis, mean over the image.
     pub step_variance_px2: f64,
     /// Sum of the variances that steps which were not measured but held have left for good, px² per axis, mean over the image.
@@ -35,6 +36,7 @@ impl CameraPath {
     /// Takes the next scan's motion in.
     pub fn step(&mut self, motion: Option<&CameraMotion>) {
         if let Some(m) = motion.filter(|m| m.is_finite()) {
+            self.place_px += m.shift_px();
             // Mean of |p - centre|² over the image, whose half sides are the centre's coordinates, for one axis.
             let spread = m.centre_px.norm_squared() / 6.0;
             self.step_variance_px2 = 0.5 * (m.cov[(0, 0)] + m.cov[(1, 1)]) + spread * (m.cov[(2, 2)] + m.cov[(3, 3)]);
@@ -51,9 +53,8 @@ impl CameraPath {
             // Nobody knows what came of it.
             self.held_variance_px2 += std::mem::take(&mut self.bridge_px2);
         }
-        match motion.and_then(CameraMotion::measured_shift_px).map(|s| s.norm()) {
-            Some(length) => {
-                self.length_px += length;
+        match motion.and_then(CameraMotion::measured_shift_px) {
+            Some(_) => {
                 self.followed = self.followed.saturating_add(1);
             }
             None => {
@@ -67,7 +68,6 @@ impl CameraPath {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector2;
 
     fn step(path: &mut CameraPath, shift: Option<Vector2<f64>>) {
         path.step(shift.map(CameraMotion::exact_shift).as_ref());
@@ -105,10 +105,10 @@ mod tests {
         let mut path = CameraPath::default();
         (0..9).for_each(|_| step(&mut path, Some(Vector2::new(3.0, -4.0))));
         step(&mut path, None);
-        assert_eq!((path.length_px, path.cuts), (45.0, 0));
+        assert_eq!((path.place_px, path.cuts), (Vector2::new(27.0, -36.0), 0));
         (0..10).for_each(|_| step(&mut path, Some(Vector2::zeros())));
         step(&mut path, Some(Vector2::new(f64::NAN, 0.0)));
         step(&mut path, None);
-        assert_eq!((path.length_px, path.cuts), (45.0, 1), "what is not finite is unknown; a view is lost once");
+        assert_eq!((path.place_px.norm(), path.cuts), (45.0, 1), "what is not finite is unknown; a view is lost once");
     }
 }

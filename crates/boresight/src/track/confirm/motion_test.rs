@@ -8,7 +8,7 @@
 //! Var(D) is the sum of
 //! - the first detection's covariance and the estimate's now;
 //! - what the camera's own motion is uncertain by since then;
-//! - the parallax of near and far things: a share of the camera's path;
+//! - the parallax of near and far things: a share of how far the camera has come since then;
 //! - the wander of an outline. Its edges move by themselves, so that a width of variance s² belongs to a middle of variance s²/4; twice, for the two
 //!   ends of D. s² is measured on the track itself, with [`PRIOR_SIZES`] sizes of the deviation [`OUTLINE_SHARE`] before.
 //!
@@ -27,8 +27,8 @@ const OUTLINE_SHARE: f64 = 0.1;
 /// What that is worth: the sizes of so many detections.
 const PRIOR_SIZES: f64 = 4.0;
 
-/// Parallax assumed, as a share of the camera's path. Measured: roofs below clouds that were followed over 500 px came 20 px behind them (V_AIRPLANE_003, mirrored), two deviations; the
-/// exam is the same with 0.01, 0.02 and 0.03. A target is then told from the ground once it has moved by a tenth of the camera's path or so.
+/// Parallax assumed, as a share of how far the camera has come. Measured: roofs below clouds that were followed over 500 px came 20 px behind them (V_AIRPLANE_003, mirrored), two deviations; the
+/// exam is the same with 0.01, 0.02 and 0.03. A target is then told from the ground once it has moved by a tenth of that or so.
 const PARALLAX_SHARE: f64 = 0.02;
 
 /// Which tracks are reported.
@@ -49,7 +49,7 @@ pub struct MotionTestConfig {
     /// Probability that a thing at rest is ever taken for moving, in (0, 1).
     pub false_motion_probability: f64,
     /// How much farther or less far than the background near things travel in the image while the camera moves, standard deviation as a share
-    /// of the camera's path, 0 or more.
+    /// of how far the camera has come since the track began, 0 or more.
     pub parallax_share: f64,
 }
 
@@ -145,7 +145,7 @@ impl MotionProgress {
             (self.start, self.start_var, self.camera) = (position, variance, camera);
         }
         self.n_tests = self.n_tests.saturating_add(1);
-        let parallax = config.parallax_share * (camera.length_px - self.camera.length_px);
+        let parallax = config.parallax_share * (camera.place_px - self.camera.place_px).norm();
         let of_camera = camera.variance_since(&self.camera) + parallax * parallax;
         let statistic: f64 = (0..2)
             .map(|axis| {
@@ -174,9 +174,9 @@ mod tests {
 
     const SMALL: [f64; 2] = [3.0, 2.0];
 
-    fn path(length_px: f64, variance_px2: f64) -> CameraPath {
+    fn path(far_px: f64, variance_px2: f64) -> CameraPath {
         let mut path = CameraPath::default();
-        (path.length_px, path.held_variance_px2) = (length_px, variance_px2);
+        (path.place_px.y, path.held_variance_px2) = (far_px, variance_px2);
         path
     }
 
@@ -211,7 +211,7 @@ mod tests {
         assert_eq!(
             scans(&config, 0.7, |_| SMALL, path(300.0, 0.0)),
             Some(25),
-            "a path of 300 px, 3 px of parallax: 17.5² / 9.21 = 33.3 over 31.4"
+            "300 px away, 3 px of parallax: 17.5² / 9.21 = 33.3 over 31.4"
         );
         let sure = MotionTestConfig { false_motion_probability: 1e-12, ..config };
         assert_eq!(scans(&sure, 0.7, |_| SMALL, still), Some(6));

@@ -4,12 +4,16 @@
 //! interpolation and of small parallax, G the squared gradient, the largest of the 3 x 3 pixels around in both frames. a and b are fitted to medians of |D| in
 //! [`BINS`] bins of G, so that targets hardly count. Where the ground does not lie in the plane (a near house, trees) or moves (leaves), that is too little: of every tile
 //! the [`TAIL`] quantile of |D| / √(a + b G), over that of a normal deviate, is its own factor, and of the nine tiles around the [`RANK`]-th largest counts, so
-//! that a target in one or two of them does not hide itself. It never falls below 1.
+//! that a target in one or two of them does not hide itself. It never falls below 1. Pixels that an encoder copied have no say in a and b ([`super::copied`]); those that it draws anew have
+//! a heavier tail than a normal deviate's (1.2 to 1.5 times at the [`FAR_TAIL`] quantile): the median of the tiles' is the least factor then.
 //! Symbols: D difference (counts); z = D / (factor √(a + b G)).
 //! Limits: a target that covers a fifth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side, and 20 px at least.
 
+use super::copied::Changes;
 use crate::Image;
 
+/// A pixel is a copy if it differs by less than this share of the rounding's deviation, or of the noise's.
+const COPIED: f32 = 0.1;
 /// Bins of the gradient.
 const BINS: usize = 12;
 /// Pixels sampled for a and b, about.
@@ -19,6 +23,10 @@ const MAD: f32 = 1.4826;
 /// The quantile of a tile, and that of the magnitude of a normal deviate.
 const TAIL: f64 = 0.8;
 const TAIL_SD: f32 = 1.2816;
+/// The same far out, for pixels that an encoder drew anew, and how many of a tile tell it.
+const FAR_TAIL: f64 = 0.95;
+const FAR_TAIL_SD: f32 = 1.96;
+const LEAST_CHANGED: usize = 20;
 /// Of nine tiles, counted from the largest.
 const RANK: usize = 2;
 /// Tiles along the longer side of the frame.
@@ -33,6 +41,12 @@ const TILE_SAMPLES: usize = 200;
 pub(super) struct GroundNoise {
     samples: Vec<(f32, f32)>,
     values: Vec<f32>,
+    changes: Changes,
+    /// The pixels' variance when it was last seen of those that are no copies; the encoder goes on with it where nothing changes.
+    of_changed: f32,
+    /// The same of their tail beside that of a normal deviate; 0 where none was seen.
+    tail_of_changed: f32,
+    tails: Vec<f32>,
     raw: Vec<f32>,
     /// The factors of the tiles, row by row.
     factors: Vec<f32>,
@@ -108,19 +122,33 @@ impl GroundNoise {
         let offset = self.offset(now.as_slice(), z.as_slice(), step);
         self.samples.clear();
         self.samples.reserve(n / step + 1);
-        let pixels = now.as_slice().iter().zip(z.as_slice()).zip(own.iter().zip(other)).step_by(step);
-        self.samples.extend(
-            pixels
-                .map(|((a, b), (g, h))| (g.max(*h), (a - b - offset).abs()))
-                .filter(|s| s.1.is_finite() && s.0.is_finite()),
-        );
+        self.changes.begin(now.width(), now.height());
+        let copied = COPIED * rounding.sqrt();
+        let pixels = now.as_slice().iter().zip(z.as_slice()).zip(own.iter().zip(other)).enumerate().step_by(step);
+        for (i, ((a, b), (g, h))) in pixels {
+            let (g, d) = (g.max(*h), (a - b - offset).abs());
+            if g.is_finite() && d.is_finite() {
+                self.samples.push((g, d));
+                self.changes.add(i, d > copied);
+            }
+        }
+        let drawn_anew = self.changes.are_everywhere();
+        if drawn_anew {
+            self.samples.retain(|s| s.1 > copied);
+            self.of_changed = fit(&mut self.samples, &mut self.values, rounding).0;
+        }
         let (a, b) = fit(&mut self.samples, &mut self.values, rounding);
+        let a = a.max(self.of_changed);
         for y in 0..now.height() {
             let w = now.width();
             let row = y * w..(y + 1) * w;
-            deviations(now.row(y), &own[row.clone()], &other[row], [offset, a, b, least], z.row_mut(y));
+            deviations(now.row(y), &own[row.clone()], &other[row], [offset, a, b], z.row_mut(y));
         }
-        self.measure_tiles(z);
+        self.measure_tiles(z, drawn_anew);
+        if least > 0.0 {
+            let pixels = z.as_mut_slice().iter_mut().zip(own.iter().zip(other));
+            pixels.filter(|(z, (g, h))| z.abs() * (a + b * g.max(**h)).sqrt() < least).for_each(|(z, _)| *z = 0.0);
+        }
     }
 
     /// The median difference: the light's change.
@@ -131,13 +159,15 @@ impl GroundNoise {
         median(&mut self.values)
     }
 
-    fn measure_tiles(&mut self, z: &Image<f32>) {
+    /// Measures the tiles' factors; if an encoder has drawn pixels anew all over, also the tail of those.
+    fn measure_tiles(&mut self, z: &Image<f32>, drawn_anew: bool) {
         let (w, h) = (z.width(), z.height());
         self.tile_px = w.max(h).div_ceil(TILES).max(LEAST_TILE_PX);
         let t = self.tile_px;
         self.tiles_x = w.div_ceil(t);
         let tiles_y = h.div_ceil(t);
         self.raw.clear();
+        self.tails.clear();
         for ty in 0..tiles_y {
             for tx in 0..self.tiles_x {
                 let (columns, rows) = (tx * t..((tx + 1) * t).min(w), ty * t..((ty + 1) * t).min(h));
@@ -157,7 +187,17 @@ impl GroundNoise {
                     _ => *self.values.select_nth_unstable_by(place, f32::total_cmp).1,
                 };
                 self.raw.push((tail / TAIL_SD).max(1.0));
+                if drawn_anew {
+                    self.values.retain(|v| *v > COPIED);
+                    if self.values.len() >= LEAST_CHANGED {
+                        let place = (self.values.len() as f64 * FAR_TAIL) as usize;
+                        self.tails.push(*self.values.select_nth_unstable_by(place, f32::total_cmp).1 / FAR_TAIL_SD);
+                    }
+                }
             }
+        }
+        if !self.tails.is_empty() {
+            self.tail_of_changed = median(&mut self.tails).max(1.0);
         }
         self.factors.clear();
         for ty in 0..tiles_y {
@@ -170,7 +210,7 @@ impl GroundNoise {
                     *v = self.raw[y * self.tiles_x + x];
                 }
                 around.sort_unstable_by(|a, b| b.total_cmp(a));
-                self.factors.push(around[RANK]);
+                self.factors.push(around[RANK].max(self.tail_of_changed));
             }
         }
     }
@@ -183,14 +223,12 @@ impl GroundNoise {
 }
 
 widest! {
-    fn deviations(now: &[f32], own: &[f32], other: &[f32], numbers: [f32; 4], z: &mut [f32]) {
+    fn deviations(now: &[f32], own: &[f32], other: &[f32], numbers: [f32; 3], z: &mut [f32]) {
         let n = z.len();
         let (now, own, other) = (&now[..n], &own[..n], &other[..n]);
-        let [offset, a, b, least] = numbers;
+        let [offset, a, b] = numbers;
         for x in 0..n {
-            let d = now[x] - z[x] - offset;
-            let d = if d.abs() < least { 0.0 } else { d };
-            z[x] = d / (a + b * own[x].max(other[x])).sqrt();
+            z[x] = (now[x] - z[x] - offset) / (a + b * own[x].max(other[x])).sqrt();
         }
     }
 }
@@ -277,7 +315,7 @@ mod tests {
             }
         }
         let mut noise = GroundNoise::default();
-        noise.measure_tiles(&z);
+        noise.measure_tiles(&z, false);
         let at = |x: usize, y: usize| {
             let (row, tile_px) = noise.factors(y);
             row[x / tile_px]
