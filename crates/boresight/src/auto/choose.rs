@@ -26,7 +26,7 @@ pub struct Choice {
     pub reasons: Vec<String>,
     /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
     pub(super) runner_up: Option<Box<Choice>>,
-    /// Whether anything spoke for it: something stands clear, or moves ([`super::later_looks`]).
+    /// Whether anything was seen to move ([`super::later_looks`]).
     pub(super) is_evident: bool,
 }
 
@@ -144,7 +144,7 @@ pub(super) fn choose_looked(
             let steadied = steadied::look_beside(&evidence, frames, scene, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
-            is_evident = !evidence.is_poor() || evidence.moves() || steadied.is_some();
+            is_evident = evidence.moves() || steadied.is_some();
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {

@@ -1,6 +1,6 @@
 //! Targets that come later: the choice looks at the first frames, and a file may show nothing in them, or its bright aircraft first and a dark one after a cut.
 //!
-//! Where nothing stands clear or moves in the first frames the whole choice is made again of frames further on, until something does ([`choice`]). Where something does, targets of the
+//! Where nothing is seen to move in the first frames the whole choice is made again of frames further on, until something does ([`choice`]). Where something does, targets of the
 //! other polarity are asked for ([`polarity`]):
 //! Source: our own; the evidence is that of [`super::evidence`]. Over what was read ahead for the first pass, three times as many frames as the choice looked at are asked what moves
 //! of the other polarity, with the same gaps as there. It counts where it surely gains more than what was chosen does in the same frames; by chance that is so once in three hundred
@@ -22,7 +22,7 @@ use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
 /// Places of the frames at which it is looked, each as long as the choice's own.
 const LOOKS: usize = 3;
 
-/// The choice by the first later frames in which something stands clear or moves, if there are any; all frames that may be held are read for it.
+/// The choice by the first later frames in which something moves, if there are any; all frames that may be held are read for it.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> Result<Option<Choice>> {
@@ -32,7 +32,7 @@ pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> R
         let window = &ahead[start..start + PROBE_FRAMES];
         let mut later = choose_seen(window, scene::look(window, &info)?, &[], &info, base, request)?;
         if later.is_evident {
-            later.reasons.insert(0, "In the first frames nothing stands clear or moves: later ones were looked at.".into());
+            later.reasons.insert(0, "In the first frames nothing is seen to move: later ones were looked at.".into());
             return Ok(Some(later));
         }
     }
@@ -119,10 +119,15 @@ mod tests {
 
     /// Noise of two counts with a spot that moves by 2 px a frame: bright at first, dark from that frame on.
     fn frames(dark_from: usize, n: usize) -> (Vec<Frame>, SourceInfo) {
+        with_spot(|k| if k < dark_from { 60.0 } else { -60.0 }, n)
+    }
+
+    /// The same with a spot of so many counts in each frame.
+    fn with_spot(height: impl Fn(usize) -> f64, n: usize) -> (Vec<Frame>, SourceInfo) {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let frame = |k: usize| {
             let mut image = Image::filled(160, 120, 0u8);
-            let height = if k < dark_from { 60.0 } else { -60.0 };
+            let height = height(k);
             for y in 0..120 {
                 for (x, p) in image.row_mut(y).iter_mut().enumerate() {
                     let d2 = (x as f64 - 10.0 - 2.0 * (k % 70) as f64).powi(2) + (y as f64 - 50.0).powi(2);
@@ -160,6 +165,37 @@ mod tests {
         assert_eq!(later(Polarity::Bright, 0, 200), Some(Polarity::Dark), "nothing bright moves");
         assert_eq!(later(Polarity::Bright, 200, 200), None);
         assert_eq!(later(Polarity::Bright, 80, 90), None, "too short for a second look");
+    }
+
+    struct Memory(std::vec::IntoIter<Frame>, SourceInfo);
+
+    impl FrameSource for Memory {
+        fn info(&self) -> &SourceInfo {
+            &self.1
+        }
+
+        fn next_frame(&mut self) -> Result<Option<Frame>> {
+            Ok(self.0.next())
+        }
+    }
+
+    #[test]
+    fn where_the_first_frames_show_nothing_later_ones_choose() {
+        let chosen = |from: usize| {
+            let (frames, info) = with_spot(|k| if k < from { 0.0 } else { -60.0 }, 144);
+            let mut replay = Replay::new(Box::new(Memory(frames.into_iter(), info)), PROBE_FRAMES).up_to(144);
+            choice(&mut replay, &Config::default(), &Request::default()).unwrap()
+        };
+        let later = chosen(60).unwrap();
+        assert!(later.is_evident && later.reasons[1].contains("of frame 48 and the next 1.9 s"), "{:?}", later.reasons);
+        // It finds the spot, at (70, 50) in frame 100.
+        let (frames, info) = with_spot(|_| -60.0, 144);
+        let mut detector = crate::vision::build(&later.config.detector, &info).unwrap();
+        let mut scan = Scan::default();
+        frames[60..=100].iter().for_each(|f| detector.detect(f, &mut scan).unwrap());
+        let near = |d: &crate::Detection| (d.position - nalgebra::Vector2::new(70.0, 50.0)).norm() < 3.0;
+        assert!(scan.detections.iter().any(near), "{:?}: {:?}", later.reasons, scan.detections);
+        assert!(chosen(200).is_none(), "there is nothing in any of them");
     }
 
     #[test]

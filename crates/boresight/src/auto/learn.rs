@@ -335,6 +335,21 @@ mod tests {
     }
 
     #[test]
+    fn what_keeps_its_place_in_the_ground_while_the_camera_goes_far_belongs_to_it() {
+        let shift = |x: f64| Some(crate::CameraMotion::exact_shift(nalgebra::Vector2::new(x, 0.0)));
+        let after = |steps: &[f64]| {
+            let scan = |(k, x): (usize, &f64)| {
+                Scan::at(FrameIndex(k as u64), Timestamp::default()).with_camera_motion(shift(*x))
+            };
+            parallax_px(&steps.iter().enumerate().map(scan).collect::<Vec<_>>())
+        };
+        // A fiftieth of the way, at its farthest: there and back is as far as there.
+        assert!((after(&[[2.0; 60], [-2.0; 60]].concat()) - 2.4).abs() < 1e-9);
+        assert!(after(&[1.0, -1.0].repeat(100)) < LEAST_PARALLAX_PX, "a shake goes nowhere");
+        assert_eq!(after(&[]), 0.0);
+    }
+
+    #[test]
     fn what_stands_is_reported_where_nothing_moves_and_only_there() {
         let still = ([40.0, 40.0], 0.0);
         let (report, reasons) = reported(&[still]);

@@ -1,7 +1,8 @@
 //! Things that move before a moving camera, or over the texture that a fixed one sees: a candidate beside isolated targets, weighed by the evidence of its chains.
 //!
-//! Source: our own. It costs more than a look at isolated targets, so it is tried with one lag and on every second frame or so. That isolated targets explain what stands clear does not speak
-//! against it: of four that cross a town one may stand clear.
+//! Source: our own. It costs more than a look at isolated targets, so it is tried with one lag and on every second frame or so. Where the camera moves, that isolated targets explain what
+//! stands clear does not speak against it: of four that cross a town one may stand clear. It must gain more beside them than they do in all, since leaves and near things move as well:
+//! asking only for more than what they gain beside it costs five infrared clips of the exam a third of their precision or more.
 //! Limits: a camera whose motion is not seen has no such candidate; what moves by less than a third of its size in the lag is not seen.
 
 use super::chains::Chain;
@@ -15,7 +16,7 @@ use crate::camera::CameraConfig;
 use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, Report, TwoPointConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::steadied::SteadiedConfig;
-use crate::vision::threshold::ThresholdConfig;
+use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// Fewer frames than this show no steady ground.
@@ -30,6 +31,8 @@ const LEAST_PX: f64 = 4.0;
 const RIMS: f64 = 0.0137;
 /// Share of the regions that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
 pub(super) const LEAST_EXPLAINED: f64 = 0.2;
+/// Share of the sure isolated blobs that chains explain, from which on isolated targets tell what a fixed camera shows.
+const TOLD: f64 = 0.5;
 
 /// What was seen.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,7 +66,15 @@ fn detector(lag_s: f64, info: &SourceInfo) -> DetectorConfig {
     config
 }
 
-/// What moves by itself where the camera moves, or where it stands and nothing stands clear, if its own chains surely gain more beside those of isolated targets than these do and, where nothing stands clear, than those of faint ones.
+/// Whether the chains of isolated targets hold most of the blobs that stand clear in so many looks; where none does they hold most of nothing.
+fn tells(isolated: &spots::Seen, n_looks: usize) -> bool {
+    let (polarity, chains) = isolated.most();
+    let clear = if polarity == Polarity::Dark { &isolated.dark } else { &isolated.bright };
+    !isolated.is_poor() && chains.is_sure() && chains.n_hits() as f64 >= TOLD * clear.per_frame * n_looks as f64
+}
+
+/// What moves by itself where the camera moves, or where it stands and isolated targets do not tell what is seen, if its own chains surely gain more beside those of
+/// isolated targets than these do and, where nothing stands clear, than those of faint ones.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look_beside(
@@ -77,7 +88,7 @@ pub fn look_beside(
     // Before a fixed camera what moves is mostly found otherwise: where something stands clear, that is taken.
     let asked = match scene.camera {
         Camera::Moving => true,
-        Camera::Fixed => isolated.is_poor(),
+        Camera::Fixed => !tells(isolated, places.len()),
         Camera::Unknown => false,
     };
     if !asked || frames.len() < LEAST_FRAMES {
@@ -103,21 +114,23 @@ pub fn look_beside(
     Ok(Some(seen))
 }
 
+/// Whether a chain and another go the same way; the others were looked for in the frames at `places`.
+fn goes_with(own: &Chain, other: &Chain, step: usize, places: &[usize]) -> bool {
+    let (mut both, mut near) = (0usize, 0usize);
+    for (k, b) in &other.hits {
+        // The nearest of the frames that both were looked for in; in half a step nothing goes far.
+        let at = places.get(*k).map(|place| (place + step / 2) / step);
+        if let Some((_, a)) = own.hits.iter().find(|h| Some(h.0) == at) {
+            both += 1;
+            near += usize::from((a.at - b.at).norm() <= a.side_px + b.side_px + 2.0);
+        }
+    }
+    2 * near > both
+}
+
 /// Gain of the chains that go with none of the others, nats, beyond that of the surrogates; the others were looked for in the frames at `places`.
 fn gain_beside(seen: &Seen, others: &Evidence, places: &[usize]) -> f64 {
-    let goes_with = |own: &Chain, other: &Chain| {
-        let (mut both, mut near) = (0usize, 0usize);
-        for (k, b) in &other.hits {
-            // The nearest of the frames that both were looked for in; in half a step nothing goes far.
-            let at = places.get(*k).map(|place| (place + seen.step / 2) / seen.step);
-            if let Some((_, a)) = own.hits.iter().find(|h| Some(h.0) == at) {
-                both += 1;
-                near += usize::from((a.at - b.at).norm() <= a.side_px + b.side_px + 2.0);
-            }
-        }
-        2 * near > both
-    };
-    let own = seen.chains.moving.iter().filter(|c| !others.moving.iter().any(|o| goes_with(c, o)));
+    let own = seen.chains.moving.iter().filter(|c| !others.moving.iter().any(|o| goes_with(c, o, seen.step, places)));
     own.map(|c| c.gain).sum::<f64>() - seen.chains.by_chance[1]
 }
 

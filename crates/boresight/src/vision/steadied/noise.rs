@@ -324,6 +324,55 @@ mod tests {
         assert!(at(242, 242) < 1.3 && at(300, 100) < 1.3);
     }
 
+    /// A frame and the one before it, of which an encoder has drawn every `every`-th block of 8 x 8 anew with a noise of one count, and how many pixels lie beyond four deviations.
+    fn beyond(every: usize) -> usize {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut normal = || -> f32 { StandardNormal.sample(&mut rng) };
+        let now = Image::filled(320, 320, 100.0f32);
+        let mut z = now.clone();
+        for y in 0..320 {
+            for (x, v) in z.row_mut(y).iter_mut().enumerate() {
+                let noise = normal();
+                *v += if (x / 8 + 3 * (y / 8)).is_multiple_of(every) { noise } else { 0.0 };
+            }
+        }
+        let flat = Image::filled(320, 320, 0.0f32);
+        let mut noise = GroundNoise::default();
+        noise.judge(&now, [&flat, &flat], &mut z, 0.0234, 0.0);
+        let row = |y: usize| {
+            let (factors, tile_px) = noise.factors(y);
+            let far = |(x, z): (usize, &f32)| z.abs() > 4.0 * factors[x / tile_px];
+            z.row(y).iter().enumerate().filter(|p| far(*p)).count()
+        };
+        (0..320).map(row).sum()
+    }
+
+    #[test]
+    fn the_noise_of_a_frame_that_an_encoder_mostly_copied_is_that_of_the_pixels_it_drew_anew() {
+        // Beyond four deviations lie 6.3e-5 of a normal deviate's values: 6 of all pixels, fewer of those drawn anew.
+        for every in [1, 2, 5, 7] {
+            assert!(beyond(every) <= 12, "{every}: {}", beyond(every));
+        }
+    }
+
+    #[test]
+    fn the_smallest_difference_that_counts_lowers_no_threshold() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut normal = || -> f32 { StandardNormal.sample(&mut rng) };
+        let now = Image::filled(160, 160, 0.0f32);
+        let mut other = now.clone();
+        other.as_mut_slice().iter_mut().for_each(|v| *v = 2.0 * normal());
+        let flat = Image::filled(160, 160, 0.0f32);
+        let factors = |least: f32| {
+            let (mut noise, mut z) = (GroundNoise::default(), other.clone());
+            noise.judge(&now, [&flat, &flat], &mut z, 0.0234, least);
+            let small = z.as_slice().iter().filter(|z| **z == 0.0).count();
+            (noise.factors(80).0.to_vec(), small)
+        };
+        assert_eq!(factors(3.0).0, factors(0.0).0);
+        assert!(factors(3.0).1 > 160 * 160 / 2 && factors(0.0).1 <= 1, "the median itself is the offset");
+    }
+
     #[test]
     fn gradients_are_the_largest_around() {
         let mut image = Image::filled(12, 9, 1.0f32);
