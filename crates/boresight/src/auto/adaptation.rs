@@ -11,8 +11,8 @@
 
 use super::digits::round;
 use super::first_scans::Shares;
-use super::noise::assumed;
 use super::noise::fit::{Noise, Step, fit_factors};
+use super::noise::{assumed, is_copy};
 use crate::camera::SteadyGround;
 use crate::track::{TrackerConfig, TrackerParameters};
 use crate::{Scan, Timestamp, TrackState, TrackStatus};
@@ -222,7 +222,7 @@ impl Adaptation {
             let position = [d.position.x, d.position.y];
             let before = of.steps.back();
             // A picture that is shown again measures nothing anew.
-            if before.is_some_and(|(_, step)| step.position == position) {
+            if before.is_some_and(|(_, step)| is_copy(position, step)) {
                 continue;
             }
             let time = Timestamp::from_ns(scan.time.ns.saturating_sub_unsigned(d.age_ns));
