@@ -111,6 +111,7 @@ fn on_their_way(scans: &[Scan], places: &[usize], found: &[Scan]) -> Vec<Scan> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::in_memory::InMemory;
     use super::*;
     use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
@@ -167,23 +168,11 @@ mod tests {
         assert_eq!(later(Polarity::Bright, 80, 90), None, "too short for a second look");
     }
 
-    struct Memory(std::vec::IntoIter<Frame>, SourceInfo);
-
-    impl FrameSource for Memory {
-        fn info(&self) -> &SourceInfo {
-            &self.1
-        }
-
-        fn next_frame(&mut self) -> Result<Option<Frame>> {
-            Ok(self.0.next())
-        }
-    }
-
     #[test]
     fn where_the_first_frames_show_nothing_later_ones_choose() {
         let chosen = |from: usize| {
             let (frames, info) = with_spot(|k| if k < from { 0.0 } else { -60.0 }, 144);
-            let mut replay = Replay::new(Box::new(Memory(frames.into_iter(), info)), PROBE_FRAMES).up_to(144);
+            let mut replay = Replay::new(Box::new(InMemory(frames.into_iter(), info)), PROBE_FRAMES).up_to(144);
             choice(&mut replay, &Config::default(), &Request::default()).unwrap()
         };
         let later = chosen(60).unwrap();

@@ -13,7 +13,7 @@ use super::request::Request;
 use super::{contest, initiation_score, later_looks, noise, speed};
 use crate::camera::CameraPath;
 use crate::io::{LengthUnit, Replay};
-use crate::track::{MotionTestConfig, Report};
+use crate::track::Report;
 use crate::vision::threshold::ThresholdConfig;
 use crate::vision::{AtOnce, Detector};
 use crate::{Config, Error, FrameSource, Result, Scan};
@@ -105,7 +105,8 @@ fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Res
         }
     }
     let nothing_moves = choice.config.tracker.report == Report::Moving && found.is_some_and(|f| f.n_targets == 0);
-    if nothing_moves && parallax_px(pass.scans()) <= LEAST_PARALLAX_PX {
+    let parallax_share = assumed.config.tracker.motion_test.parallax_share;
+    if nothing_moves && parallax_share * farthest_px(pass.scans()) <= LEAST_PARALLAX_PX {
         // Who films a thing that hovers or stands wants to see it, if there is nothing else and not a landscape of them. What keeps its place in the ground while the camera goes
         // far belongs to it.
         let mut still = assumed.clone();
@@ -170,14 +171,14 @@ fn raise(
     Ok((found, true))
 }
 
-/// The parallax of a thing before the ground at the farthest that the camera came from where it was at first, px.
-fn parallax_px(scans: &[Scan]) -> f64 {
+/// The farthest that the camera came from where it was at first, px.
+fn farthest_px(scans: &[Scan]) -> f64 {
     let mut path = CameraPath::default();
     let far = |s: &Scan| {
         path.step(s.camera_motion.as_ref());
         path.place_px.norm()
     };
-    MotionTestConfig::default().parallax_share * scans.iter().map(far).fold(0.0, f64::max)
+    scans.iter().map(far).fold(0.0, f64::max)
 }
 
 /// Learns noise and motion, and of points what the detections are made of; of regions this is not known, and their rule stays.
@@ -220,6 +221,7 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::in_memory::InMemory;
     use super::*;
     use crate::vision::DetectorConfig;
     use crate::vision::isolated::IsolatedConfig;
@@ -228,18 +230,6 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     const SIZE: [usize; 2] = [160, 120];
-
-    struct Memory(std::vec::IntoIter<Frame>, SourceInfo);
-
-    impl FrameSource for Memory {
-        fn info(&self) -> &SourceInfo {
-            &self.1
-        }
-
-        fn next_frame(&mut self) -> Result<Option<Frame>> {
-            Ok(self.0.next())
-        }
-    }
 
     /// 100 frames on which `draw` has drawn, and what describes them.
     fn filmed(draw: impl Fn(u64, &mut Image<u8>)) -> (Vec<Frame>, SourceInfo) {
@@ -291,7 +281,7 @@ mod tests {
             squares.iter().for_each(|([x, y], speed)| square(image, [x + speed * k as f64, *y], 200));
         });
         let mut choice = assumed(IsolatedConfig::default().min_score, Report::Moving);
-        let mut frames = Replay::new(Box::new(Memory(frames.into_iter(), info)), 100);
+        let mut frames = Replay::new(Box::new(InMemory(frames.into_iter(), info)), 100);
         learn(&mut frames, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
         (choice.config.tracker.report, choice.reasons)
     }
@@ -321,7 +311,7 @@ mod tests {
         let mut choice = assumed(2.5, Report::All);
         choice.config.detector.camera = crate::camera::CameraConfig::Moving;
         choice.config.tracker.min_initiation_score = 4.0;
-        let mut replay = Replay::new(Box::new(Memory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
+        let mut replay = Replay::new(Box::new(InMemory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
         let mut learnt = learn(&mut replay, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
         let ThresholdConfig::Isolated(isolated) = &choice.config.detector.threshold else { panic!("another detector") };
         assert!(isolated.min_score > 2.5, "{:?}", choice.reasons);
@@ -335,17 +325,16 @@ mod tests {
     }
 
     #[test]
-    fn what_keeps_its_place_in_the_ground_while_the_camera_goes_far_belongs_to_it() {
+    fn the_camera_has_come_as_far_as_its_farthest_place() {
         let shift = |x: f64| Some(crate::CameraMotion::exact_shift(nalgebra::Vector2::new(x, 0.0)));
         let after = |steps: &[f64]| {
             let scan = |(k, x): (usize, &f64)| {
                 Scan::at(FrameIndex(k as u64), Timestamp::default()).with_camera_motion(shift(*x))
             };
-            parallax_px(&steps.iter().enumerate().map(scan).collect::<Vec<_>>())
+            farthest_px(&steps.iter().enumerate().map(scan).collect::<Vec<_>>())
         };
-        // A fiftieth of the way, at its farthest: there and back is as far as there.
-        assert!((after(&[[2.0; 60], [-2.0; 60]].concat()) - 2.4).abs() < 1e-9);
-        assert!(after(&[1.0, -1.0].repeat(100)) < LEAST_PARALLAX_PX, "a shake goes nowhere");
+        assert_eq!(after(&[[2.0; 60], [-2.0; 60]].concat()), 120.0, "there and back is as far as there");
+        assert_eq!(after(&[1.0, -1.0].repeat(100)), 1.0, "a shake goes nowhere");
         assert_eq!(after(&[]), 0.0);
     }
 

@@ -20,6 +20,8 @@ mod first_pass;
 mod first_scans;
 mod fixed_blocks;
 mod ground;
+#[cfg(test)]
+mod in_memory;
 mod initiation_score;
 mod interval;
 mod later_looks;

@@ -2,7 +2,7 @@
 //!
 //! Source: our own. It costs more than a look at isolated targets, so it is tried with one lag and on every second frame or so. Where the camera moves, that isolated targets explain what
 //! stands clear does not speak against it: of four that cross a town one may stand clear. It must gain more beside them than they do in all, since leaves and near things move as well:
-//! asking only for more than what they gain beside it costs five infrared clips of the exam a third of their precision or more.
+//! asking only for more than what they gain beside it costs five infrared clips of the exam a sixth to seven tenths of their precision.
 //! Limits: a camera whose motion is not seen has no such candidate; what moves by less than a third of its size in the lag is not seen.
 
 use super::chains::Chain;
@@ -85,7 +85,7 @@ pub fn look_beside(
     n_threads: usize,
 ) -> Result<Option<Seen>> {
     let places = growing(frames.len());
-    // Before a fixed camera what moves is mostly found otherwise: where something stands clear, that is taken.
+    // Before a fixed camera what moves is mostly found otherwise: where isolated targets tell what stands clear, they are taken.
     let asked = match scene.camera {
         Camera::Moving => true,
         Camera::Fixed => !tells(isolated, places.len()),

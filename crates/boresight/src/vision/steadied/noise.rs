@@ -5,7 +5,7 @@
 //! [`BINS`] bins of G, so that targets hardly count. Where the ground does not lie in the plane (a near house, trees) or moves (leaves), that is too little: of every tile
 //! the [`TAIL`] quantile of |D| / √(a + b G), over that of a normal deviate, is its own factor, and of the nine tiles around the [`RANK`]-th largest counts, so
 //! that a target in one or two of them does not hide itself. It never falls below 1. Pixels that an encoder copied have no say in a and b ([`super::copied`]); those that it draws anew have
-//! a heavier tail than a normal deviate's (1.2 to 1.5 times at the [`FAR_TAIL`] quantile): the median of the tiles' is the least factor then.
+//! a heavier tail than a normal deviate's (1.2 to 1.6 times at the [`FAR_TAIL`] quantile): the median of the tiles' is the least factor then.
 //! Symbols: D difference (counts); z = D / (factor √(a + b G)).
 //! Limits: a target that covers a fifth of three neighbouring tiles raises its own threshold; tiles are a sixteenth of the frame's longer side, and 20 px at least.
 
@@ -132,12 +132,18 @@ impl GroundNoise {
                 self.changes.add(i, d > copied);
             }
         }
-        let drawn_anew = self.changes.are_everywhere();
+        let has_copies = self.changes.leave_copies();
+        let drawn_anew = has_copies && self.changes.are_everywhere();
         if drawn_anew {
             self.samples.retain(|s| s.1 > copied);
-            self.of_changed = fit(&mut self.samples, &mut self.values, rounding).0;
         }
         let (a, b) = fit(&mut self.samples, &mut self.values, rounding);
+        match (drawn_anew, has_copies) {
+            (true, _) => self.of_changed = a,
+            // Where nothing is a copy the pixels tell their noise themselves.
+            (_, false) => (self.of_changed, self.tail_of_changed) = (0.0, 0.0),
+            _ => {}
+        }
         let a = a.max(self.of_changed);
         for y in 0..now.height() {
             let w = now.width();
