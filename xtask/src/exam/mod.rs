@@ -7,12 +7,13 @@
 //! and tracking, one run of this machine.
 
 pub mod clips;
+mod composed;
 mod scenes;
 pub mod score;
 mod tables;
 mod variants;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clips::Clip;
 use score::{Score, score};
 use std::fmt::Write as _;
@@ -46,6 +47,15 @@ pub struct Args {
     /// The grey clips of 8 bits seen in another way; nothing is written then.
     #[arg(long)]
     variant: Option<variants::Variant>,
+    /// Only so many composed clips of one seed: real stills under a moving camera with targets drawn on them; nothing is written to the page then.
+    #[arg(long, conflicts_with_all = ["own", "variant"])]
+    composed: Option<u64>,
+    /// The seed of these.
+    #[arg(long, requires = "composed", default_value_t = composed::SEEDS[0])]
+    composed_seed: u64,
+    /// Folder where these clips stay, with their points beside them: for `--own`, and to be looked at.
+    #[arg(long, requires = "composed")]
+    keep: Option<PathBuf>,
     /// Folder with SORT's tracks (`MOT17-02.txt` ...), made by `scripts/sort_peer.py`.
     #[arg(long)]
     sort: Option<PathBuf>,
@@ -117,7 +127,8 @@ pub fn run(args: &Args) -> Result<()> {
     let asked = !args.only.is_empty()
         || !args.sets.is_empty()
         || request != boresight::auto::Request::default()
-        || args.variant.is_some();
+        || args.variant.is_some()
+        || args.composed.is_some();
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     let mut done: Vec<(Clip, char, Score)> = Vec::new();
     let (mut kind, mut n_of_kind) = ("", 0);
@@ -125,11 +136,26 @@ pub fn run(args: &Args) -> Result<()> {
     print!("{HEAD}");
     let folder = std::env::temp_dir().join(format!("boresight_exam_{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
-    let all = match &args.own {
-        Some(dir) => clips::own(dir, args.own_near_px)?,
-        None => [clips::clips(&data)?, scenes::clips(&folder, &args.only)?].into_iter().flatten().collect(),
-    };
-    for clip in all {
+    let mut all = Vec::new();
+    let mut whole = |clips: Vec<Clip>| all.extend(clips.into_iter().map(|clip| (clip, None)));
+    match (&args.own, args.composed) {
+        (Some(dir), _) => whole(clips::own(dir, args.own_near_px)?),
+        (None, Some(_)) => {}
+        (None, None) => {
+            whole(clips::clips(&data)?);
+            whole(scenes::clips(&folder, &args.only)?);
+        }
+    }
+    if args.own.is_none() {
+        let to = args.keep.as_ref().unwrap_or(&folder);
+        std::fs::create_dir_all(to)?;
+        let (seeds, n) = args
+            .composed
+            .map_or((&composed::SEEDS[..], composed::N_CLIPS), |n| (std::slice::from_ref(&args.composed_seed), n));
+        all.extend(composed::clips(&data, to, seeds, n).into_iter().map(|(clip, plan)| (clip, Some(plan))));
+    }
+    ensure!(args.composed.is_none_or(|n| n == 0) || !all.is_empty(), "{}: no stills to compose clips of", data.display());
+    for (clip, plan) in all {
         n_of_kind = if clip.kind == kind { n_of_kind + 1 } else { 0 };
         kind = clip.kind;
         let half = if n_of_kind % 2 == 0 { 'A' } else { 'B' };
@@ -137,14 +163,24 @@ pub fn run(args: &Args) -> Result<()> {
             continue;
         }
         let clip = match args.variant {
-            Some(_) if clip.kind.starts_with("simulated") || !variants::is_possible(&clip) => continue,
+            Some(_) if plan.is_some() || clip.kind.starts_with("simulated") || !variants::is_possible(&clip) => {
+                continue;
+            }
             Some(variant) => variants::clip(&clip, variant, &folder)?,
             None => clip,
         };
+        let is_composed = plan.is_some();
+        let clip = match plan {
+            Some(plan) => plan.write(clip)?,
+            None => clip,
+        };
         let s = score(&clip, &args.sets, &request)?;
+        if is_composed && args.keep.is_none() {
+            std::fs::remove_file(&clip.input)?;
+        }
         let row = row(&clip, half, &s);
         print!("{row}");
-        if !args.only.is_empty() || args.own.is_some() || args.variant.is_some() {
+        if !args.only.is_empty() || args.own.is_some() || args.variant.is_some() || args.composed.is_some() {
             println!("    {}", s.chosen);
         }
         if args.list_false {
@@ -172,7 +208,7 @@ pub fn run(args: &Args) -> Result<()> {
     let mut closing = String::new();
     writeln!(closing, "\nMean NIS within 1.6 to 2.4 on {n_honest} of {} clips.", done.len())?;
     print!("\n{head}{closing}");
-    if args.own.is_some() || args.variant.is_some() {
+    if args.own.is_some() || args.variant.is_some() || args.composed.is_some() {
         return Ok(());
     }
     let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
@@ -191,4 +227,6 @@ const INTRODUCTION: &str = "# The exam\n\n\
     the car, 3 for particles). *Targets*: those held in at least half of their rows. *False*: reported tracks that are near a target in fewer than half of their rows. *Contrast*: height of the target over the deviation of \
     its surroundings, median over the clip. *Error*: median distance of the nearest reported track from a held target, box centre or point. *NIS*: mean normalised innovation squared of reported tracks; 2 if the filter's covariances are true. \
     The car's truth holds one car of many, so nothing can be called false there. The particles' truth is trackpy's, of which many pieces last a few frames: what is held of targets in more than 20 frames stands beside. The truth of the infrared clips holds what they were filmed for: looked at as pictures, the false tracks of the two clips of a minute are those of eleven small things that fly by themselves (birds or insects, not told apart), and so are those of DRONE_131 and DRONE_143; that of HELICOPTER_051 is glitter on water. *Simulated*: three spots (sigma 1.5 px, 100 counts) that move over a textured ground under a camera that stands, pans, \
-    shakes, turns or zooms (numbers per frame; shake: standard deviation), twenty spots of five deviations of white noise, and fifty bright ones in a video; 120 frames, the truth is exact, near is 3 px, A and B are two seeds.\n\n";
+    shakes, turns or zooms (numbers per frame; shake: standard deviation), twenty spots of five deviations of white noise, and fifty bright ones in a video; 120 frames, the truth is exact, near is 3 px, A and B are two seeds. \
+    *Composed*: a window of 320 x 256 px that stands, drifts, pans, shakes or follows a target goes over a real infrared still, in half of the clips of a moving camera with a nearer part \
+    before it that moves by 2 to 30 % more (parallax); one to five spots and ellipses of 2 to 28 px, bright or dark, of 3 to 15 deviations of the ground around them, that enter, cross and leave, and white noise of 1 to 4 counts are drawn; 200 to 300 frames, the truth is exact, near is 5 px, A and B are two seeds.\n\n";

@@ -133,7 +133,8 @@ fn add_noise(frames: &mut [Image<u8>]) -> Result<()> {
     Ok(())
 }
 
-fn write(frames: &[Image<u8>], rate_hz: f64, path: &Path) -> Result<()> {
+/// Writes grey frames as YUV4MPEG2.
+pub fn write(frames: &[Image<u8>], rate_hz: f64, path: &Path) -> Result<()> {
     let mut out = std::io::BufWriter::new(std::fs::File::create(path)?);
     let first = frames.first().context("no frame")?;
     let rate = (1000.0 * rate_hz).round();
