@@ -17,6 +17,10 @@ const CONTRASTS: [f64; 2] = [3.0, 15.0];
 /// Larger spots are not drawn, and smaller ellipses.
 const LARGEST_SPOT_PX: f64 = 8.0;
 const SMALLEST_ELLIPSE_PX: f64 = 5.0;
+/// Means of targets lie between these counts.
+const LEVELS: [f64; 2] = [15.0, 240.0];
+/// An ellipse's height at its edge is so much less than in its middle, as a share.
+const SHADE: f64 = 0.3;
 /// Width of an ellipse's edge, px.
 const EDGE_PX: f64 = 1.5;
 /// Points a pixel and axis.
@@ -168,11 +172,10 @@ impl Target {
         };
         let (mean, deviation) = (middle(&mut means, 128.0), middle(&mut deviations, noise));
         let height = self.contrast * deviation;
-        let fits = |h: f64| (0.0..=255.0).contains(&(mean + h));
-        let side = if rng.random_bool(0.5) { height } else { -height };
-        self.height = if fits(side) || !fits(-side) { side } else { -side };
-        // What the eight bits cut off is no contrast.
-        self.height = self.height.clamp(-mean, 255.0 - mean);
+        // What the eight bits cut off is no contrast: where one side has no room, the other.
+        let [dark, bright] = [mean - LEVELS[0], LEVELS[1] - mean].map(|room| room.max(1.0));
+        let is_bright = if dark.min(bright) < height { bright > dark } else { rng.random_bool(0.5) };
+        self.height = if is_bright { height.min(bright) } else { -height.min(dark) };
         self.contrast = self.height.abs() / deviation;
     }
 
@@ -189,14 +192,14 @@ impl Target {
             return;
         }
         let heading = self.heading(t);
-        let own_level = self.around(ground, at)[0] + self.height;
+        let mean = self.around(ground, at)[0];
         for y in range(1) {
             for x in range(0) {
-                let covered = self.covered([x as f64 - at[0], y as f64 - at[1]], heading);
+                let [covered, height] = self.covered([x as f64 - at[0], y as f64 - at[1]], heading);
                 let v = &mut frame.row_mut(y)[x];
                 *v += match self.shape {
-                    Shape::Spot { .. } => (covered * self.height) as f32,
-                    Shape::Ellipse { .. } => (covered * (own_level - f64::from(*v))) as f32,
+                    Shape::Spot { .. } => (height * self.height) as f32,
+                    Shape::Ellipse { .. } => (height * self.height + covered * (mean - f64::from(*v))) as f32,
                 };
             }
         }
@@ -210,24 +213,26 @@ impl Target {
         if step > 0.0 { [dx / step, dy / step] } else { [1.0, 0.0] }
     }
 
-    /// Share of a pixel that the target covers, from 0 to 1.
-    fn covered(&self, from_centre: [f64; 2], [c, s]: [f64; 2]) -> f64 {
+    /// Share of a pixel that the target covers, and its height there, both from 0 to 1.
+    fn covered(&self, from_centre: [f64; 2], [c, s]: [f64; 2]) -> [f64; 2] {
         let offset = |i: usize| (i as f64 + 0.5) / POINTS as f64 - 0.5;
-        let mut sum = 0.0;
+        let (mut covered, mut height) = (0.0, 0.0);
         for i in 0..POINTS * POINTS {
             let (x, y) = (from_centre[0] + offset(i % POINTS), from_centre[1] + offset(i / POINTS));
-            sum += match self.shape {
-                Shape::Spot { sigma_px } => (-0.5 * (x * x + y * y) / (sigma_px * sigma_px)).exp(),
+            match self.shape {
+                Shape::Spot { sigma_px } => height += (-0.5 * (x * x + y * y) / (sigma_px * sigma_px)).exp(),
                 Shape::Ellipse { along_px: a, across_px: b } => {
                     let (u, v) = (c * x + s * y, c * y - s * x);
                     // Distance from the edge to the first order: F / |grad F| of F = (u/a)² + (v/b)² - 1.
                     let f = (u / a).powi(2) + (v / b).powi(2) - 1.0;
                     let slope = 2.0 * (u / (a * a)).hypot(v / (b * b));
-                    (0.5 - f / (slope * EDGE_PX).max(1e-9)).clamp(0.0, 1.0)
+                    let here = (0.5 - f / (slope * EDGE_PX).max(1e-9)).clamp(0.0, 1.0);
+                    covered += here;
+                    height += here * (1.0 - SHADE * (f + 1.0).min(1.0));
                 }
-            };
+            }
         }
-        sum / (POINTS * POINTS) as f64
+        [covered, height].map(|sum| sum / (POINTS * POINTS) as f64)
     }
 }
 
