@@ -144,9 +144,8 @@ struct Outline {
 }
 
 impl Outline {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let (waves, leaves) = (Waves::draw(LEAST_WAVE_PX, 12, rng), Waves::draw(LEAST_LEAF_PX, 12, rng));
-        Self { kind: rng.random_range(0..5), waves, leaves }
+    fn draw(kind: u32, rng: &mut ChaCha8Rng) -> Self {
+        Self { kind, waves: Waves::draw(LEAST_WAVE_PX, 12, rng), leaves: Waves::draw(LEAST_LEAF_PX, 12, rng) }
     }
 
     fn at(&self, x: f64, y: f64) -> f64 {
@@ -154,6 +153,7 @@ impl Outline {
         match self.kind {
             0 | 1 => y + edge(x),
             2 => x + edge(y),
+            3 => -x + edge(y),
             _ => 10.0 * self.waves.at(x, y) + 0.5 * self.leaves.at(x, y),
         }
     }
@@ -180,9 +180,10 @@ impl Near {
     pub fn draw(still: Image<f32>, parallax: f64, path: &[[f64; 2]], share: f64, rng: &mut ChaCha8Rng) -> Self {
         let corners: Vec<[f64; 2]> =
             path.iter().step_by(10).map(|c| c.map(|c| (1.0 + parallax) * c + MARGIN_PX)).collect();
-        // Of some outlines the one whose share differs least from view to view.
+        let kind = rng.random_range(0..5);
+        // Of some outlines of a kind the one whose share differs least from view to view.
         let drawn = (0..N_OUTLINES).map(|_| {
-            let outline = Outline::draw(rng);
+            let outline = Outline::draw(kind, rng);
             let (level, spread) = outline.level(&corners, share);
             (spread, level, outline)
         });
