@@ -109,8 +109,13 @@ pub fn score_asked(clip: &Clip, sets: &[String], request: &auto::Request, until:
         minutes: summary.duration_s / 60.0,
         nis: seen.nis_sum / seen.n_nis as f64,
         ms_a_frame,
-        chosen: choice.reasons.get(1).cloned().unwrap_or_default(),
+        chosen: choice.reasons.iter().skip(1).find(|r| !is_of_frames(r)).cloned().unwrap_or_default(),
     })
+}
+
+/// Which frames were looked at: the first reason, or the second where they are later ones.
+fn is_of_frames(reason: &str) -> bool {
+    reason.contains("frames/s (")
 }
 
 fn median(mut v: Vec<f64>) -> f64 {
