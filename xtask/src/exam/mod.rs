@@ -154,7 +154,11 @@ pub fn run(args: &Args) -> Result<()> {
             .map_or((&composed::SEEDS[..], composed::N_CLIPS), |n| (std::slice::from_ref(&args.composed_seed), n));
         all.extend(composed::clips(&data, to, seeds, n).into_iter().map(|(clip, plan)| (clip, Some(plan))));
     }
-    ensure!(args.composed.is_none_or(|n| n == 0) || !all.is_empty(), "{}: no stills to compose clips of", data.display());
+    ensure!(
+        args.composed.is_none_or(|n| n == 0) || !all.is_empty(),
+        "{}: no stills to compose clips of",
+        data.display()
+    );
     for (clip, plan) in all {
         n_of_kind = if clip.kind == kind { n_of_kind + 1 } else { 0 };
         kind = clip.kind;
@@ -166,7 +170,10 @@ pub fn run(args: &Args) -> Result<()> {
             Some(_) if plan.is_some() || clip.kind.starts_with("simulated") || !variants::is_possible(&clip) => {
                 continue;
             }
-            Some(variant) => variants::clip(&clip, variant, &folder)?,
+            Some(variant) => match variants::clip(&clip, variant, &folder)? {
+                Some(clip) => clip,
+                None => continue,
+            },
             None => clip,
         };
         let is_composed = plan.is_some();

@@ -35,7 +35,7 @@ pub enum Variant {
 
 /// Deviation of the noise added, counts.
 const NOISE_COUNTS: f64 = 3.0;
-/// More frames than this are not held: clips of public data have fewer.
+/// More frames than this are not held in memory.
 const MOST_FRAMES: usize = 4000;
 
 /// Kinds whose frames are more than eight bits deep, or whose pixels are the targets' size.
@@ -46,15 +46,16 @@ pub fn is_possible(clip: &Clip) -> bool {
     !NOT_OF.contains(&clip.kind)
 }
 
-/// Writes a clip's variant to `folder` and returns it as a clip.
-pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Clip> {
+/// Writes a clip's variant to `folder` and returns it as a clip; none of a clip of more than `MOST_FRAMES` frames, and a line that says so.
+pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Option<Clip>> {
     let mut source = boresight::io::open(&of.input, &OpenOptions::default())?;
     let mut rate_hz = source.info().rate_hz.unwrap_or(25.0);
     let mut frames = Vec::new();
     while let Some(frame) = source.next_frame()? {
         frames.push(grey(frame.pixels)?);
         if frames.len() > MOST_FRAMES {
-            bail!("{}: more than {MOST_FRAMES} frames", of.name);
+            println!("{}: left out, more than {MOST_FRAMES} frames", of.name);
+            return Ok(None);
         }
     }
     let mut rows = clips::truth(&of.truth, &of.columns)?;
@@ -97,7 +98,7 @@ pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Clip> {
     write(&frames, rate_hz, &input)?;
     std::fs::write(&truth, table(&rows))?;
     let name = format!("{} {variant:?}", of.name).to_lowercase();
-    Ok(Clip { name, input, truth, columns: Columns::CORNERS, ..*of })
+    Ok(Some(Clip { name, input, truth, columns: Columns::CORNERS, ..*of }))
 }
 
 fn grey(pixels: Pixels) -> Result<Image<u8>> {
