@@ -59,7 +59,7 @@ pub fn plane(still: &Image<u8>, halve: bool) -> Image<f32> {
         let small = out;
         let at = |x: usize, y: usize| small.row(y.min(small.height() - 1))[x.min(small.width() - 1)];
         // A new pixel lies a quarter of an old one beside the old one it is in.
-        let beside = |i: usize| if i % 2 == 0 { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
+        let beside = |i: usize| if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
         let line = |x: usize, y: usize| 0.75 * at(x / 2, y) + 0.25 * at(beside(x), y);
         out = filled(2 * small.width(), 2 * small.height(), |x, y| 0.75 * line(x, y / 2) + 0.25 * line(x, beside(y)));
     }
