@@ -1,7 +1,8 @@
 //! From an input's name to what runs it, in the order of the steps:
 //!
 //! 1. open the input and read its first frames ahead ([`Replay`] hands them out again: a stream is read once, and no frame is lost);
-//! 2. look at them as a whole; a file whose camera stands still is read a second time, further on and in colour ([`super::second_look`]);
+//! 2. look at them as a whole; where a file's camera stands still its frames further on are looked at in colour: those that were kept while it was read, or the file is read a second
+//!    time ([`super::second_look`]);
 //! 3. choose detector and tracker; where nothing is seen yet, by frames further on ([`super::later_looks`]);
 //! 4. run the detector over the frames read ahead and learn noise and motion from its detections ([`learn()`]);
 //! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
@@ -13,7 +14,7 @@ use super::learn::learn;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look;
-use crate::io::{MOST_BYTES, Replay, frames_ahead};
+use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Config, Error, Frame, FrameSource, Result};
@@ -40,26 +41,33 @@ opaque_debug!(Opened);
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
 pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
     let input = input.as_ref();
-    let read = |config: &Config| -> Result<Replay> {
-        let source = config.input.mend(crate::io::open(input, &config.input.open_options())?)?;
+    let on_disk = second_look::can_be_opened_twice(input);
+    let beside = (on_disk && base.input.colour != Colour::Rgb).then(|| second_look::beside(PROBE_FRAMES));
+    let read = |config: &Config, colours_beside: Option<ColoursBeside>| -> Result<Replay> {
+        let options = OpenOptions { colours_beside, ..config.input.open_options() };
+        let source = config.input.mend(crate::io::open(input, &options)?)?;
         // A stream waits for nothing longer than the choice needs.
-        let most = if second_look::can_be_opened_twice(input) { first_scans::MOST_SCANS } else { PROBE_FRAMES };
+        let most = if on_disk { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, MOST_BYTES);
         // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
         Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
-    let mut frames = read(base)?;
-    let again = || match second_look::can_be_opened_twice(input) {
-        true => second_look::frames(input, base, PROBE_FRAMES),
-        false => Vec::new(),
+    let mut frames = read(base, beside.clone())?;
+    let again = |frames: &mut Replay| match beside.as_ref().and_then(|b| second_look::from_beside(b, frames)) {
+        Some(kept) => kept,
+        None if on_disk => second_look::frames(input, base, PROBE_FRAMES),
+        None => Vec::new(),
     };
-    let mut choice = choose_from(&mut frames, again, base, request)?;
-    if second_look::can_be_opened_twice(input) {
+    let choice = choose_from(&mut frames, again, base, request);
+    // Whatever was chosen by: no more are wanted.
+    beside.iter().for_each(|b| drop(b.take(0)));
+    let mut choice = choice?;
+    if on_disk {
         let rate_hz = frames.info().rate_hz.unwrap_or(base.input.rate_hz);
         choice.report_whole(rate_hz);
     }
     if choice.config.input.colour != base.input.colour {
-        frames = read(&choice.config)?;
+        frames = read(&choice.config, None)?;
     }
     Ok((frames, choice))
 }
@@ -77,7 +85,7 @@ pub fn read_and_choose(
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, MOST_BYTES);
     let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
-    let again = || again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
+    let again = |_: &mut Replay| again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
     let choice = choose_from(&mut frames, again, base, request)?;
     Ok((frames, choice))
 }
@@ -85,16 +93,16 @@ pub fn read_and_choose(
 /// The choice from frames read ahead; `again` gives those of the second look, which only a fixed camera or a colour asks for.
 fn choose_from(
     frames: &mut Replay,
-    again: impl FnOnce() -> Vec<Frame>,
+    again: impl FnOnce(&mut Replay) -> Vec<Frame>,
     base: &Config,
     request: &Request,
 ) -> Result<Choice> {
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
-    let second = if look_again { again() } else { Vec::new() };
+    let second = if look_again { again(frames) } else { Vec::new() };
     let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)?;
-    if choice.is_evident || request.detector.is_some() {
+    if choice.is_evident() || request.detector.is_some() {
         return Ok(choice);
     }
     drop(second);

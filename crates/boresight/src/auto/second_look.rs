@@ -1,8 +1,9 @@
 //! The second look at a file whose camera stands still: over its first [`SECOND_LOOK_FRAMES`] frames and in colour.
 //!
-//! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither.
+//! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither. Small frames are kept in colour while the file
+//! is read ahead ([`ColoursBeside`]); else it is read a second time.
 
-use crate::io::{Colour, OpenOptions};
+use crate::io::{Colour, ColoursBeside, OpenOptions, Replay};
 use crate::{Config, Frame, FrameSource, PixelKind};
 use std::ffi::OsStr;
 use std::path::Path;
@@ -43,6 +44,19 @@ impl Spread {
         self.n_kept += usize::from(keeps);
         (thins, keeps)
     }
+}
+
+/// Asks the source that is read ahead for the frames of the second look, where these and all frames before them may be held together.
+pub(super) fn beside(n_kept: usize) -> ColoursBeside {
+    ColoursBeside::new(SECOND_LOOK_FRAMES, n_kept, MAX_BYTES / (SECOND_LOOK_FRAMES + 3 * n_kept))
+}
+
+/// The frames of the second look that a source has kept in colour while it was read ahead; `None` if it did not keep them all.
+pub(super) fn from_beside(colours: &ColoursBeside, frames: &mut Replay) -> Option<Vec<Frame>> {
+    frames.read_on(SECOND_LOOK_FRAMES);
+    let (until, ended) = frames.end();
+    let kept = colours.take(until);
+    kept.filter(|_| ended || until >= SECOND_LOOK_FRAMES as u64)
 }
 
 /// At most `n_kept` frames spread evenly over the beginning, in colour if the file has it; what cannot be read ends them.
@@ -128,6 +142,21 @@ mod tests {
         let [spared, all] = [true, false].map(|sparing| kept(OsStr::new(clip), &Config::default(), 8, sparing));
         assert_eq!(all.as_ref().map(Vec::len), Some(5));
         assert!(spared == all);
+    }
+
+    #[cfg(feature = "video")]
+    #[test]
+    fn frames_kept_in_colour_are_those_of_a_second_reading() {
+        let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
+        for n_kept in [48, 5] {
+            let colours = beside(n_kept);
+            let options = OpenOptions { colours_beside: Some(colours.clone()), ..OpenOptions::default() };
+            let mut frames = Replay::new(crate::io::open(clip, &options).unwrap(), 3).up_to(1000);
+            let kept = from_beside(&colours, &mut frames).unwrap();
+            assert!(kept.iter().all(|f| f.pixels.kind() == PixelKind::Rgb8) && kept.len() <= n_kept);
+            assert!(kept == self::frames(OsStr::new(clip), &Config::default(), n_kept));
+            assert!(from_beside(&colours, &mut frames).is_none(), "they are taken once");
+        }
     }
 
     #[test]

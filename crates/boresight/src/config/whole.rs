@@ -86,6 +86,7 @@ impl InputConfig {
             page_step: self.page_step,
             first_page: self.first_page,
             stop: None,
+            colours_beside: None,
         }
     }
 

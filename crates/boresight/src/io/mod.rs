@@ -2,6 +2,7 @@
 
 mod atomic;
 mod atomic_folder;
+mod colours_beside;
 #[cfg(feature = "images")]
 mod folder;
 #[cfg(feature = "images")]
@@ -36,6 +37,7 @@ pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 pub use crate::memory_budget::set_memory_budget;
 pub use atomic::{AtomicFile, Output, write_whole};
 pub use atomic_folder::{AtomicFolder, remove_folder};
+pub use colours_beside::ColoursBeside;
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
 pub use natural::natural_order;

@@ -1,5 +1,6 @@
 //! How a source of frames is opened: wanted pixels, layout of raw frames, rate, limits.
 
+use super::colours_beside::ColoursBeside;
 use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -87,6 +88,8 @@ pub struct OpenOptions {
     pub first_page: u64,
     /// Ends a stream that another program reads while it is waited for; other sources never wait for long. `None`: it ends by itself.
     pub stop: Option<StopFlag>,
+    /// Some of the first frames in colour beside the grey ones handed out, of a source that reads colour. `None`: none.
+    pub colours_beside: Option<ColoursBeside>,
 }
 
 impl Default for OpenOptions {
@@ -99,6 +102,7 @@ impl Default for OpenOptions {
             page_step: None,
             first_page: 0,
             stop: None,
+            colours_beside: None,
         }
     }
 }

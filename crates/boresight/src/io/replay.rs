@@ -67,6 +67,11 @@ impl Replay {
         false
     }
 
+    /// The number behind that of the last frame read, and whether it is the last that can be read.
+    pub(crate) fn end(&self) -> (u64, bool) {
+        (self.ahead.back().map_or(0, |f| f.index.0 + 1), self.ended || self.failed.is_some())
+    }
+
     /// The frames read ahead.
     pub fn ahead(&mut self) -> &[Frame] {
         self.ahead.make_contiguous()

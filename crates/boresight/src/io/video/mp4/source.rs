@@ -80,6 +80,7 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
         units,
         may_be_fast,
         colour: options.colour,
+        colours_beside: options.colours_beside.clone(),
         out: frame_in,
         spare: spare_out,
         wanted: Arc::clone(&wanted),

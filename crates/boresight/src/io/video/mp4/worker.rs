@@ -6,6 +6,7 @@ use super::picture::{Picture, Refusal};
 use super::reorder::{Order, Reorder};
 use super::sample::Sample;
 use super::timeline::Step;
+use crate::io::ColoursBeside;
 use crate::io::options::Colour;
 use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{Frame, FrameIndex, Image, Pixels, Timestamp, Wanted};
@@ -35,6 +36,7 @@ pub(super) struct Worker {
     pub units: Decoders,
     pub may_be_fast: bool,
     pub colour: Colour,
+    pub colours_beside: Option<ColoursBeside>,
     pub out: SyncSender<Message>,
     pub spare: Receiver<Pixels>,
     pub wanted: Arc<OnceLock<Wanted>>,
@@ -95,7 +97,7 @@ impl Worker {
                     Err(wanted) => look_at = wanted + 1,
                     Ok(next) => {
                         self.units.finish(&mut pictures);
-                        self.place(&mut pictures, reorder, &mut due);
+                        self.place(&mut pictures, reorder, &mut due, tally);
                         for rank in (step..next).filter_map(|s| self.ranks.get(s).copied().flatten()) {
                             reorder.push(0, 0, rank, nothing(), &mut due);
                         }
@@ -147,11 +149,11 @@ impl Worker {
                     reorder.lose(rank, &mut due);
                 }
             }
-            self.place(&mut pictures, reorder, &mut due);
+            self.place(&mut pictures, reorder, &mut due, tally);
             self.send(&mut due, tally)?;
         }
         self.units.finish(&mut pictures);
-        self.place(&mut pictures, reorder, &mut due);
+        self.place(&mut pictures, reorder, &mut due, tally);
         reorder.finish(&mut due);
         self.send(&mut due, tally)?;
         Ok(None)
@@ -175,7 +177,13 @@ impl Worker {
         entry.ok_or(wanted)
     }
 
-    fn place(&mut self, pictures: &mut Vec<Picture>, reorder: &mut Reorder<Pixels>, due: &mut Vec<(u64, Pixels)>) {
+    fn place(
+        &mut self,
+        pictures: &mut Vec<Picture>,
+        reorder: &mut Reorder<Pixels>,
+        due: &mut Vec<(u64, Pixels)>,
+        tally: &mut Tally,
+    ) {
         for picture in pictures.drain(..) {
             let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
             let (period, count) = (picture.period, picture.order_count);
@@ -183,6 +191,7 @@ impl Worker {
                 reorder.push(period, count, rank, nothing(), due);
                 continue;
             }
+            self.keep_colours(&picture, rank, tally);
             match self.pixels(picture) {
                 Some(pixels) => reorder.push(period, count, rank, pixels, due),
                 None => reorder.lose(rank, due),
@@ -196,11 +205,7 @@ impl Worker {
             if rank < tally.next_rank {
                 continue;
             }
-            if tally.pts.is_empty() {
-                tally.pts = shown_times(&self.movie.steps);
-            }
-            let ticks = tally.pts.get(rank as usize).copied().unwrap_or_default();
-            let time = Timestamp::from_ticks(ticks, 1, i64::from(self.movie.timescale));
+            let time = self.time(rank, tally);
             tally.next_rank = rank + 1;
             tally.sent += 1;
             let frame = Frame { index: FrameIndex(rank), time, pixels };
@@ -209,23 +214,52 @@ impl Worker {
         Ok(())
     }
 
+    /// When a picture is shown.
+    fn time(&self, rank: u64, tally: &mut Tally) -> Timestamp {
+        if tally.pts.is_empty() {
+            tally.pts = shown_times(&self.movie.steps);
+        }
+        let ticks = tally.pts.get(rank as usize).copied().unwrap_or_default();
+        Timestamp::from_ticks(ticks, 1, i64::from(self.movie.timescale))
+    }
+
+    /// Keeps a picture in colour, if that is asked for.
+    fn keep_colours(&mut self, picture: &Picture, rank: u64, tally: &mut Tally) {
+        let Some(beside) = &self.colours_beside else { return };
+        if !tally.kept_began {
+            tally.kept_began = true;
+            beside.begin(self.n_frames, picture.width * picture.height);
+        }
+        if beside.wants(rank)
+            && let Some(image) = self.rgb(picture, Vec::new())
+        {
+            let time = self.time(rank, tally);
+            beside.keep(Frame { index: FrameIndex(rank), time, pixels: Pixels::Rgb8(image) });
+        }
+    }
+
+    /// A picture in colour, in memory that is given; `None` where it has none.
+    fn rgb(&self, f: &Picture, mut rgb: Vec<[u8; 3]>) -> Option<Image<[u8; 3]>> {
+        let info = self.units.info()?;
+        if info.chroma_format == 0 {
+            return None;
+        }
+        let matrix = Matrix::new(info.matrix, info.full_range, f.height);
+        let (width, height, shift) = (f.width, f.height, (1, f.chroma_row_shift));
+        let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
+        to_rgb(&planes, &matrix, &mut rgb).then(|| Image::from_vec(width, height, rgb))?
+    }
+
     fn pixels(&mut self, picture: Picture) -> Option<Pixels> {
         let f = picture;
         let (width, height) = (f.width, f.height);
         let spare = self.spare.try_recv().ok();
         if self.colour == Colour::Rgb && self.units.info().is_some_and(|i| i.chroma_format != 0) {
-            let mut rgb = match spare {
+            let rgb = match spare {
                 Some(Pixels::Rgb8(image)) => image.into_vec(),
                 _ => Vec::new(),
             };
-            let info = self.units.info();
-            let matrix = Matrix::new(info.map_or(2, |i| i.matrix), info.is_some_and(|i| i.full_range), height);
-            let shift = (1, f.chroma_row_shift);
-            let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
-            if !to_rgb(&planes, &matrix, &mut rgb) {
-                return None;
-            }
-            return Image::from_vec(width, height, rgb).map(Pixels::Rgb8);
+            return self.rgb(&f, rgb).map(Pixels::Rgb8);
         }
         if f.bits > 8 {
             let mut gray = match spare {
@@ -255,6 +289,8 @@ struct Tally {
     /// Rank after the last one sent.
     next_rank: u64,
     reason: Option<String>,
+    /// Whether it was said what is kept in colour.
+    kept_began: bool,
     /// Presentation times by rank, media ticks.
     pts: Vec<i64>,
 }
