@@ -26,14 +26,19 @@ pub struct Choice {
     pub reasons: Vec<String>,
     /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
     pub(super) runner_up: Option<Box<Choice>>,
-    /// Whether anything was seen to move ([`super::later_looks`]).
-    pub(super) is_evident: bool,
+    /// Gain of what was seen to move, nats: 0 where nothing surely does, infinite where what is seen is told by something else ([`super::later_looks`]).
+    pub(super) gain: f64,
 }
 
 impl Choice {
     /// A choice that nothing stands against.
     pub(super) fn alone(config: Config, reasons: Vec<String>) -> Self {
-        Self { config, reasons, runner_up: None, is_evident: true }
+        Self { config, reasons, runner_up: None, gain: f64::INFINITY }
+    }
+
+    /// Whether anything was seen.
+    pub(super) fn is_evident(&self) -> bool {
+        self.gain > 0.0
     }
 
     /// As [`super::report_whole`], whichever detector the first pass bears out.
@@ -91,7 +96,7 @@ pub(super) fn choose_looked(
     let n_threads = request.n_threads();
     let mut reasons = Vec::new();
     let mut config = base.clone();
-    let (mut runner_up, mut is_evident) = (None, true);
+    let (mut runner_up, mut gain) = (None, f64::INFINITY);
     let interval_s = interval_s(frames, info);
     let n_looked = frames.len().max(second.len());
     let looked = if second.is_empty() { frames } else { second };
@@ -144,12 +149,13 @@ pub(super) fn choose_looked(
             let steadied = steadied::look_beside(&evidence, frames, scene, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
-            is_evident = evidence.moves() || steadied.is_some();
+            gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
+            gain = steadied.as_ref().map_or(gain, |s| s.chains.gain());
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);
-                is_evident = true;
+                gain = seen.chains.gain().max(f64::MIN_POSITIVE);
             }
             if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
                 steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
@@ -158,7 +164,7 @@ pub(super) fn choose_looked(
             }
         }
     }
-    let mut choice = Choice { config, reasons, runner_up, is_evident };
+    let mut choice = Choice { config, reasons, runner_up, gain };
     choice.change(|c| {
         c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
         c.reasons.push(format!(

@@ -1,7 +1,7 @@
 //! Targets that come later: the choice looks at the first frames, and a file may show nothing in them, or its bright aircraft first and a dark one after a cut.
 //!
-//! Where nothing is seen to move in the first frames the whole choice is made again of frames further on, until something does ([`choice`]). Where something does, targets of the
-//! other polarity are asked for ([`polarity`]):
+//! Where nothing is seen to move in the first frames the whole choice is made again of three places further on, and that in which most moves is taken ([`choice`]): a chain that is
+//! there by chance gains little beside a target's. Where something does, targets of the other polarity are asked for ([`polarity`]):
 //! Source: our own; the evidence is that of [`super::evidence`]. Over what was read ahead for the first pass, three times as many frames as the choice looked at are asked what moves
 //! of the other polarity, with the same gaps as there. It counts where it surely gains more than what was chosen does in the same frames; by chance that is so once in three hundred
 //! files. It is looked for from the first frame on, beside what was looked for before, or in its place where nothing of that moves: a thing that is bright and dark in turns comes in
@@ -22,21 +22,24 @@ use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
 /// Places of the frames at which it is looked, each as long as the choice's own.
 const LOOKS: usize = 3;
 
-/// The choice by the first later frames in which something moves, if there are any; all frames that may be held are read for it.
+/// The choice by those later frames in which what moves gains most, if anything does; all frames that may be held are read for it.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> Result<Option<Choice>> {
     let info = frames.info().clone();
     let ahead = frames.read_on(usize::MAX);
+    let mut most: Option<Choice> = None;
     for start in starts(ahead.len()) {
         let window = &ahead[start..start + PROBE_FRAMES];
-        let mut later = choose_seen(window, scene::look(window, &info)?, &[], &info, base, request)?;
-        if later.is_evident {
-            later.reasons.insert(0, "In the first frames nothing is seen to move: later ones were looked at.".into());
-            return Ok(Some(later));
+        let later = choose_seen(window, scene::look(window, &info)?, &[], &info, base, request)?;
+        if later.gain > most.as_ref().map_or(0.0, |m| m.gain) {
+            most = Some(later);
         }
     }
-    Ok(None)
+    if let Some(most) = &mut most {
+        most.reasons.insert(0, "In the first frames nothing is seen to move: later ones were looked at.".into());
+    }
+    Ok(most)
 }
 
 /// The polarity to look for in the place of the configured one, with the reason, if targets of the other one move later; `scans` are what the detector made of `frames`.
@@ -176,7 +179,11 @@ mod tests {
             choice(&mut replay, &Config::default(), &Request::default()).unwrap()
         };
         let later = chosen(60).unwrap();
-        assert!(later.is_evident && later.reasons[1].contains("of frame 48 and the next 1.9 s"), "{:?}", later.reasons);
+        assert!(
+            later.is_evident() && later.reasons[1].contains("of frame 48 and the next 1.9 s"),
+            "{:?}",
+            later.reasons
+        );
         // It finds the spot, at (70, 50) in frame 100.
         let (frames, info) = with_spot(|_| -60.0, 144);
         let mut detector = crate::vision::build(&later.config.detector, &info).unwrap();
