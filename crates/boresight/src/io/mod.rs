@@ -2,6 +2,8 @@
 
 mod atomic;
 mod atomic_folder;
+// Only video is kept so.
+#[cfg_attr(not(feature = "video"), allow(dead_code))]
 mod colours_beside;
 #[cfg(feature = "images")]
 mod folder;
