@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(long)]
     variant: Option<variants::Variant>,
     /// Only so many composed clips of one seed: real stills under a moving camera with targets drawn on them; nothing is written to the page then.
-    #[arg(long, conflicts_with_all = ["own", "variant"])]
+    #[arg(long, conflicts_with_all = ["own", "variant"], value_parser = clap::value_parser!(u64).range(1..))]
     composed: Option<u64>,
     /// The seed of these.
     #[arg(long, requires = "composed", default_value_t = composed::SEEDS[0])]
@@ -154,11 +154,7 @@ pub fn run(args: &Args) -> Result<()> {
             .map_or((&composed::SEEDS[..], composed::N_CLIPS), |n| (std::slice::from_ref(&args.composed_seed), n));
         all.extend(composed::clips(&data, to, seeds, n).into_iter().map(|(clip, plan)| (clip, Some(plan))));
     }
-    ensure!(
-        args.composed.is_none_or(|n| n == 0) || !all.is_empty(),
-        "{}: no stills to compose clips of",
-        data.display()
-    );
+    ensure!(args.composed.is_none() || !all.is_empty(), "{}: no stills to compose clips of", data.display());
     for (clip, plan) in all {
         n_of_kind = if clip.kind == kind { n_of_kind + 1 } else { 0 };
         kind = clip.kind;

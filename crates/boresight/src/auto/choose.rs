@@ -150,15 +150,16 @@ pub(super) fn choose_looked(
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
             gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
-            gain = steadied.as_ref().map_or(gain, |s| s.chains.gain());
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);
+                // There are more than false alarms, whether they move or not.
                 gain = seen.chains.gain().max(f64::MIN_POSITIVE);
             }
             if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
                 steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
+                gain = seen.chains.gain();
                 runner_up = Some(Box::new(Choice::alone(config, reasons)));
                 Choice { config, reasons, .. } = first;
             }

@@ -195,6 +195,27 @@ mod tests {
     }
 
     #[test]
+    fn of_later_frames_those_in_which_most_moves_choose() {
+        // A bright spot for half a second, and later a dark one that stays.
+        let height = |k: usize| match k {
+            48..=60 => 60.0,
+            150.. => -60.0,
+            _ => 0.0,
+        };
+        let (frames, info) = with_spot(height, 300);
+        let at = |start: usize| {
+            let window = &frames[start..start + PROBE_FRAMES];
+            let (scene, request) = (scene::look(window, &info).unwrap(), Request::default());
+            choose_seen(window, scene, &[], &info, &Config::default(), &request).unwrap().gain
+        };
+        let [short, long] = [at(48), at(150)];
+        assert!(0.0 < short && short < long, "{short} {long}");
+        let mut replay = Replay::new(Box::new(InMemory(frames.into_iter(), info)), PROBE_FRAMES).up_to(300);
+        let later = choice(&mut replay, &Config::default(), &Request::default()).unwrap().unwrap();
+        assert!(later.gain >= long && !later.reasons[1].contains("of frame 48"), "{:?}", later.reasons);
+    }
+
+    #[test]
     fn the_looks_lie_behind_the_first_one_and_within_the_frames() {
         assert_eq!(starts(95), Vec::<usize>::new());
         assert_eq!(starts(96), [48]);

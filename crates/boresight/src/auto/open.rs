@@ -53,15 +53,18 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
     let mut frames = read(base, beside.clone())?;
-    let again = |frames: &mut Replay| match beside.as_ref().and_then(|b| second_look::from_beside(b, frames)) {
-        Some(kept) => kept,
-        None if on_disk => second_look::frames(input, base, PROBE_FRAMES),
+    let second = |frames: &mut Replay, is_wanted: bool| match &beside {
+        Some(beside) if !is_wanted => {
+            beside.end();
+            Vec::new()
+        }
+        Some(beside) => {
+            second_look::from_beside(beside, frames).unwrap_or_else(|| second_look::frames(input, base, PROBE_FRAMES))
+        }
+        None if on_disk && is_wanted => second_look::frames(input, base, PROBE_FRAMES),
         None => Vec::new(),
     };
-    let choice = choose_from(&mut frames, again, base, request);
-    // Whatever was chosen by: no more are wanted.
-    beside.iter().for_each(|b| drop(b.take(0)));
-    let mut choice = choice?;
+    let mut choice = choose_from(&mut frames, second, base, request)?;
     if on_disk {
         let rate_hz = frames.info().rate_hz.unwrap_or(base.input.rate_hz);
         choice.report_whole(rate_hz);
@@ -85,22 +88,24 @@ pub fn read_and_choose(
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, MOST_BYTES);
     let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
-    let again = |_: &mut Replay| again.map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default();
-    let choice = choose_from(&mut frames, again, base, request)?;
+    let second = |_: &mut Replay, is_wanted: bool| {
+        again.filter(|_| is_wanted).map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default()
+    };
+    let choice = choose_from(&mut frames, second, base, request)?;
     Ok((frames, choice))
 }
 
-/// The choice from frames read ahead; `again` gives those of the second look, which only a fixed camera or a colour asks for.
+/// The choice from frames read ahead; `second` gives those of the second look, which only a fixed camera or a colour asks for: it is told whether they are wanted.
 fn choose_from(
     frames: &mut Replay,
-    again: impl FnOnce(&mut Replay) -> Vec<Frame>,
+    second: impl FnOnce(&mut Replay, bool) -> Vec<Frame>,
     base: &Config,
     request: &Request,
 ) -> Result<Choice> {
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
     let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
-    let second = if look_again { again(frames) } else { Vec::new() };
+    let second = second(frames, look_again);
     let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)?;
     if choice.is_evident() || request.detector.is_some() {
         return Ok(choice);

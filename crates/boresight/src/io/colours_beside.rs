@@ -35,11 +35,7 @@ impl ColoursBeside {
         let mut kept = self.kept();
         let n = n_frames.min(kept.over);
         if n_px <= kept.most_px && kept.most > 0 {
-            let mut step = 1u64;
-            while n.div_ceil(step) > kept.most as u64 {
-                step *= 2;
-            }
-            kept.step = Some(step);
+            kept.step = Some(n.div_ceil(kept.most as u64).next_power_of_two());
         }
     }
 
@@ -63,6 +59,11 @@ impl ColoursBeside {
         frames.sort_by_key(|f| f.index);
         let wanted = (0..until.min(kept.over)).step_by(step? as usize);
         wanted.eq(frames.iter().map(|f| f.index.0)).then_some(frames)
+    }
+
+    /// No more are wanted, and none of those kept.
+    pub(crate) fn end(&self) {
+        self.take(0);
     }
 }
 
