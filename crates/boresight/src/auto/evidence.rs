@@ -188,7 +188,7 @@ mod tests {
                 };
                 let mut all: Vec<Vector2<f64>> = all.into_iter().map(|at| noisy(at, &mut rng)).collect();
                 all.extend((0..n_false).map(|_| place(&mut rng)));
-                let sighting = |at| Sighting { at, variance: 0.09, side_px: 2.0, score: 0.0 };
+                let sighting = |at| Sighting { at, variance: 0.09, side_px: 2.0, thickness_px: 2.0, score: 0.0 };
                 Sightings { time_s: 0.04 * f64::from(k), all: all.into_iter().map(sighting).collect() }
             })
             .collect()
@@ -226,8 +226,9 @@ mod tests {
             let scans: Vec<Sightings> = (0..40)
                 .map(|k| {
                     let mut glint = || Vector2::from_fn(|_, _| 60.0 * rng.random::<f64>());
-                    let all =
-                        (0..40).map(|_| Sighting { at: glint(), variance: 0.09, side_px: 2.0, score: 0.0 }).collect();
+                    let all = (0..40)
+                        .map(|_| Sighting { at: glint(), variance: 0.09, side_px: 2.0, thickness_px: 2.0, score: 0.0 })
+                        .collect();
                     Sightings { time_s: 0.04 * f64::from(k), all }
                 })
                 .collect();

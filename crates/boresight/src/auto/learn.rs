@@ -10,7 +10,7 @@ use super::evidence::Evidence;
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
-use super::{contest, initiation_score, later_looks, noise, speed};
+use super::{contest, initiation_score, lag, later_looks, noise, speed};
 use crate::camera::CameraPath;
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -35,9 +35,30 @@ pub fn learn<E: From<Error>>(
 ) -> Result<Box<dyn Detector>, E> {
     let set = |c: &mut Choice| set(std::mem::take(&mut c.config)).map(|config| c.config = config);
     choice.change(set)?;
-    let assumed = choice.clone();
+    let mut assumed = choice.clone();
     let mut pass = learn_set(frames, choice, request)?;
     let info = frames.info().clone();
+    let size_px = [info.width as f64, info.height as f64];
+    while let Some((lag_s, reason)) = lag::longer(pass.scans(), &choice.config.detector.threshold, size_px) {
+        let mut longer = assumed.clone();
+        if let ThresholdConfig::Steadied(steadied) = &mut longer.config.detector.threshold {
+            steadied.lag_s = lag_s;
+        }
+        longer.reasons.push(reason);
+        let asked = longer.config.detector.clone();
+        longer.change(set)?;
+        // Who says which lag gets that one.
+        if longer.config.detector != asked {
+            break;
+        }
+        assumed = longer.clone();
+        let mut again = learn_set(frames, &mut longer, request)?;
+        // What is lost to a longer lag was not too large for the shorter one.
+        if !Evidence::of_scans(again.scans(), size_px[0] * size_px[1]).is_sure() {
+            break;
+        }
+        (*choice, pass) = (longer, again);
+    }
     let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
     if let Some((polarity, reason)) = later {
         let mut wider = assumed;

@@ -24,6 +24,7 @@ mod ground;
 mod in_memory;
 mod initiation_score;
 mod interval;
+mod lag;
 mod later_looks;
 mod learn;
 mod looks;

@@ -58,7 +58,7 @@ mod tests {
                 let patch =
                     (0..90).map(|i| Vector2::new(30.0 + f64::from(i % 10) * 3.0, 30.0 + f64::from(i / 10) * 3.3));
                 let all = patch.chain([Vector2::new(200.0, 200.0)]);
-                let sighting = |at| Sighting { at, variance: 0.1, side_px: 2.0, score: 0.0 };
+                let sighting = |at| Sighting { at, variance: 0.1, side_px: 2.0, thickness_px: 2.0, score: 0.0 };
                 Sightings { time_s: f64::from(k), all: all.map(sighting).collect() }
             })
             .collect();

@@ -20,6 +20,8 @@ pub struct Sighting {
     pub variance: f64,
     /// Longer side of its box, px.
     pub side_px: f64,
+    /// Its area over that side, px; that side where no area is known.
+    pub thickness_px: f64,
     /// How clearly it stands out, in the detector's measure; 0 where that is not known.
     pub score: f64,
 }
@@ -27,7 +29,8 @@ pub struct Sighting {
 impl Sighting {
     /// The middle of a box of that longer side, px, known to that variance, px².
     pub fn of_box(at: Vector2<f64>, variance: f64, side_px: f64) -> Self {
-        Self { at, variance: variance + LEAST_STD_PX.powi(2) + (SHARE_OF_SIDE * side_px).powi(2), side_px, score: 0.0 }
+        let variance = variance + LEAST_STD_PX.powi(2) + (SHARE_OF_SIDE * side_px).powi(2);
+        Self { at, variance, side_px, thickness_px: side_px, score: 0.0 }
     }
 }
 
@@ -50,7 +53,12 @@ impl Sightings {
             let at = ground.map_or(d.position, |g| g.of(d.position));
             let of_ground = ground.map_or(0.0, |g| g.variance(at));
             let side_px = d.extent.width_px.max(d.extent.height_px);
-            Sighting { score: f64::from(d.score), ..Sighting::of_box(at, 0.5 * d.cov.trace() + of_ground, side_px) }
+            let thickness_px = f64::from(d.area_px) / side_px.max(1.0);
+            Sighting {
+                score: f64::from(d.score),
+                thickness_px,
+                ..Sighting::of_box(at, 0.5 * d.cov.trace() + of_ground, side_px)
+            }
         };
         Self { time_s: scan.time.ns as f64 * 1e-9, all: order.into_iter().take(MOST_A_SCAN).map(sighting).collect() }
     }

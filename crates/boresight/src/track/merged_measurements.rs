@@ -3,11 +3,13 @@
 //! Method (ours; docs/theory/track-management.md): a confirmed track without a detection whose predicted centre lies inside a
 //! detection's box shares that detection with the track that took it. Along each axis the outer members are placed by the box's edges
 //! and their own size from before (the leftmost at left + w/2, the rightmost at right − w/2); members between keep their predicted place
-//! relative to the centre. Which members are the outer ones is not known while they pass each other: every pair is weighed by how well its two places fit the
-//! predictions, and a member's place is the mean over the pairs, with their spread added to its noise. So what passes keeps its velocity, and is not turned back at an edge that
+//! relative to the centre. Or one member alone makes both edges, as a large target does that a small one crosses: then it stands in the box's middle, and of the others only
+//! is known that they lie within. Which of all these it is is not known: every pair, and every member as both, is weighed by how likely it makes the two edges, and a member's
+//! place is the mean over them, with their spread added to its noise. So what passes keeps its velocity, and is not turned back at an edge that
 //! is the other's by then. Sizes do not follow while merged. The member that fits best is primary; the others are secondary and live on
 //! the time that they were seen alone before (`step/delete.rs`), so a target that ended inside another does not live for ever.
-//! Symbols: s variance of a member's predicted place and of an edge (px²); a pair (l, r) weighs exp(−(left + w_l/2 − x_l)²/2s_l − (right − w_r/2 − x_r)²/2s_r)/√(s_l s_r).
+//! Symbols: p variance of a member's predicted place and n of an edge (px²), s = p + n; a pair (l, r) weighs exp(−(left + w_l/2 − x_l)²/2s_l − (right − w_r/2 − x_r)²/2s_r)/√(s_l s_r);
+//! one member as both, its errors of the box's middle m and width w: exp(−(m − x)²/2(p + n/2) − (right − left − w)²/4n)/√(2n(p + n/2)). All are densities of the same two edges.
 //! Limits: needs boxes; the axes are taken one by one.
 
 use super::appearance::Appearance;
@@ -59,6 +61,9 @@ pub(super) struct Part {
     pub noise: Cov2,
     /// Whether this member fits best.
     pub primary: bool,
+    /// Whether what is not known of who makes which edge adds no more to the noise than the innovation covariance is without it, along both axes: else the innovation says
+    /// nothing of the filter.
+    pub measures: bool,
 }
 
 /// Finds which tracks a detection is merged of; keeps its memory.
@@ -149,7 +154,14 @@ impl MergedMeasurements {
         let edge = config.edge_std_px * config.edge_std_px;
         for i in group {
             let noise = Cov2 { xx: noise.xx + edge, xy: noise.xy, yy: noise.yy + edge };
-            self.parts.push(Part { track: *i, detection: j, position: [0.0; 2], noise, primary: Some(*i) == primary });
+            self.parts.push(Part {
+                track: *i,
+                detection: j,
+                position: [0.0; 2],
+                noise,
+                primary: Some(*i) == primary,
+                measures: true,
+            });
         }
         for axis in 0..2 {
             let (low, high) = if axis == 0 {
@@ -163,19 +175,20 @@ impl MergedMeasurements {
             self.outer.clear();
             self.outer.extend(group.iter().zip(&*parts).map(|(i, part)| {
                 let cov = &predicted[*i as usize].cov;
-                let half = (0.5 * appearance(*i).size[axis]).min(0.5 * (high - low));
                 Outer {
-                    at: [low + half, high - half],
+                    edges: [low, high],
+                    size: appearance(*i).size[axis],
                     between: 0.5 * (low + high) + place(*i) - mean,
                     predicted: place(*i),
-                    variance: if axis == 0 { cov.xx + part.noise.xx } else { cov.yy + part.noise.yy },
-                    share: [0.0; 2],
+                    variance: if axis == 0 { [cov.xx, part.noise.xx] } else { [cov.yy, part.noise.yy] },
+                    share: [0.0; 4],
                 }
             }));
             weigh(&mut self.outer);
             for (part, outer) in parts.iter_mut().zip(&self.outer) {
                 let (position, variance) = outer.place();
                 part.position[axis] = position;
+                part.measures &= variance <= outer.variance.iter().sum();
                 *(if axis == 0 { &mut part.noise.xx } else { &mut part.noise.yy }) += variance;
             }
         }
@@ -185,45 +198,86 @@ impl MergedMeasurements {
 /// What one member would be along one axis.
 #[derive(Clone, Copy, Debug)]
 struct Outer {
-    /// Its place as the first and as the last one, and between others.
-    at: [f64; 2],
+    /// Of the box.
+    edges: [f64; 2],
+    size: f64,
+    /// Its place between others.
     between: f64,
     predicted: f64,
-    /// Of the prediction and of an edge.
-    variance: f64,
-    /// Probability to be the first and to be the last one.
-    share: [f64; 2],
+    /// Of the prediction, and of an edge.
+    variance: [f64; 2],
+    /// Probability to make the first edge, the last one, both, and that another member makes both.
+    share: [f64; 4],
 }
 
 impl Outer {
-    /// Mean and variance over what it may be.
-    fn place(&self) -> (f64, f64) {
-        let inner = (1.0 - self.share[0] - self.share[1]).max(0.0);
-        let mean = self.share[0] * self.at[0] + self.share[1] * self.at[1] + inner * self.between;
-        let off = |v: f64| (v - mean).powi(2);
-        (mean, self.share[0] * off(self.at[0]) + self.share[1] * off(self.at[1]) + inner * off(self.between))
+    /// Half of its size, no more than half of the box.
+    fn half(&self) -> f64 {
+        0.5 * self.size.min(self.edges[1] - self.edges[0])
     }
 
-    /// Log-likelihood of being at an end.
-    fn fit(&self, end: usize) -> f64 {
-        -0.5 * ((self.at[end] - self.predicted).powi(2) / self.variance + self.variance.ln())
+    /// Mean and variance over what it may be.
+    fn place(&self) -> (f64, f64) {
+        let [low, high] = self.edges;
+        let [first, last] = [low + self.half(), high - self.half()];
+        let inner = (1.0 - self.share.iter().sum::<f64>()).max(0.0);
+        let within = self.predicted.max(first).min(last);
+        let places = [
+            (self.share[0], first),
+            (self.share[1], last),
+            (self.share[2], 0.5 * (low + high)),
+            (self.share[3], within),
+            (inner, self.between),
+        ];
+        let mean = places.iter().map(|(share, at)| share * at).sum::<f64>();
+        let spread = places.iter().map(|(share, at)| share * (at - mean).powi(2)).sum::<f64>();
+        (mean, spread + self.share[3] * (last - first).powi(2) / 12.0)
+    }
+
+    /// Log-density of the edge at one end, made by this member.
+    fn one_edge(&self, end: usize) -> f64 {
+        let at = if end == 0 { self.edges[0] + self.half() } else { self.edges[1] - self.half() };
+        log_density(at - self.predicted, self.variance[0] + self.variance[1])
+    }
+
+    /// Log-density of both edges, made by this member.
+    fn both_edges(&self) -> f64 {
+        let [low, high] = self.edges;
+        let [place, edge] = self.variance;
+        log_density(0.5 * (low + high) - self.predicted, place + 0.5 * edge)
+            + log_density(high - low - self.size, 2.0 * edge)
     }
 }
 
-/// Weighs every pair of a first and a last member.
+/// Of a normal error, without the constant that all share.
+fn log_density(error: f64, variance: f64) -> f64 {
+    -0.5 * (error.powi(2) / variance + variance.ln())
+}
+
+/// Weighs every pair of a first and a last member, and every member as both.
 fn weigh(members: &mut [Outer]) {
-    let pairs = |n: usize| (0..n).flat_map(move |l| (0..n).filter(move |r| *r != l).map(move |r| (l, r)));
+    let pairs = |n: usize| (0..n).flat_map(move |l| (0..n).map(move |r| (l, r)));
     let n = members.len();
-    let fit = |members: &[Outer], l: usize, r: usize| members[l].fit(0) + members[r].fit(1);
+    let fit = |members: &[Outer], l: usize, r: usize| {
+        if l == r { members[l].both_edges() } else { members[l].one_edge(0) + members[r].one_edge(1) }
+    };
     let most = pairs(n).map(|(l, r)| fit(members, l, r)).fold(f64::NEG_INFINITY, f64::max);
-    let mut all = 0.0;
+    let (mut all, mut alone) = (0.0, 0.0);
     for (l, r) in pairs(n) {
         let weight = (fit(members, l, r) - most).exp();
-        members[l].share[0] += weight;
-        members[r].share[1] += weight;
+        if l == r {
+            members[l].share[2] += weight;
+            alone += weight;
+        } else {
+            members[l].share[0] += weight;
+            members[r].share[1] += weight;
+        }
         all += weight;
     }
-    members.iter_mut().for_each(|m| m.share = m.share.map(|s| s / all));
+    for m in members {
+        m.share[3] = (alone - m.share[2]).max(0.0);
+        m.share = m.share.map(|s| s / all);
+    }
 }
 
 #[cfg(test)]
@@ -262,6 +316,7 @@ mod tests {
         assert!((x[1] - (39.0 - 59.0 / 3.0)).abs() < 1e-3, "{}", x[1]);
         assert!(parts.iter().all(|p| (p.position[1] - 2.0).abs() < 1e-12 && p.detection == 0));
         assert_eq!(parts.iter().map(|p| p.track).collect::<Vec<_>>(), [0, 1, 2]);
+        assert!(parts.iter().all(|p| p.measures));
         // The detection's own variance and that of an edge, 0.7 px.
         assert!(parts.iter().all(|p| (p.noise.xx - 1.49).abs() < 0.01 && (p.noise.yy - 1.49).abs() < 1e-12));
     }
@@ -282,8 +337,26 @@ mod tests {
         let parts = parts(&[20.0, 20.0], &[6.0; 2], Some(1), &[0]);
         for part in &parts {
             assert!((part.position[0] - 20.0).abs() < 1e-12, "{}", part.position[0]);
-            assert!((part.noise.xx - 1.49 - 49.0).abs() < 1e-9, "{}", part.noise.xx);
+            // Either one as both edges weighs e^(−14²/(4 · 1.49) + 2 · 7²/(2 · 2.49)) = 2·10⁻⁶ beside that, and then nothing is added.
+            assert!((part.noise.xx - 1.49 - 49.0).abs() < 1e-3, "{}", part.noise.xx);
+            assert!(!part.measures);
         }
+    }
+
+    #[test]
+    fn a_small_member_that_crosses_a_large_one_is_placed_by_neither_edge() {
+        // The box is as wide as the large one was: it alone makes both edges. By its own edges the small one would stand at 11 or 29 px.
+        let parts = parts(&[20.0, 21.0], &[20.0, 2.0], Some(0), &[1]);
+        let [large, small] = &parts[..] else { panic!("{parts:?}") };
+        assert!(
+            (large.position[0] - 20.0).abs() < 1e-3 && (large.noise.xx - 1.49).abs() < 0.01 && large.measures,
+            "{large:?}"
+        );
+        // Anywhere in the 18 px that it has: 18²/12.
+        assert!(
+            (small.position[0] - 21.0).abs() < 0.02 && (small.noise.xx - 1.49 - 27.0).abs() < 0.1 && !small.measures,
+            "{small:?}"
+        );
     }
 
     #[test]

@@ -190,7 +190,7 @@ fn merged(track: &mut Track, predicted: &Predicted, part: &Part) -> Outcome {
         secondary: !part.primary,
         detection: Some(part.detection),
         likelihood_ratio: 1.0,
-        innovation: Some(innovation_of(&position, predicted, &innovation_cov(predicted, &part.noise))),
+        innovation: part.measures.then(|| innovation_of(&position, predicted, &innovation_cov(predicted, &part.noise))),
     }
 }
 
