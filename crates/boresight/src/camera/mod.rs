@@ -15,6 +15,7 @@ mod key_frame;
 mod motion;
 mod other_view;
 mod plane;
+mod plane_cov;
 mod reduce;
 mod register;
 mod rest;
