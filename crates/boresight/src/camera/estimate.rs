@@ -4,7 +4,7 @@
 //! How: the frame is made small ([`super::reduce`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
-//! is chosen by what they say ([`super::plane`], [`super::plane_cov`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]).
+//! is chosen by what they say ([`super::plane`], [`super::plane_cov`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]) and be one ([`super::mixed`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
 //! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
@@ -13,12 +13,13 @@
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
-use super::cover::{Cover, LEAST_SHARE};
+use super::cover::{CLEAR_SHARE, Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, Vote, find, find_near, vote};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
+use super::mixed::is_mixed;
 use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
 use super::plane_cov::plane_cov;
@@ -53,7 +54,7 @@ const MOST_HELD: u32 = 12;
 const WAIT_FRAMES: u32 = 5;
 /// Share of the image's cells from which on the others are not asked.
 const CLEAR_COVER: f64 = 0.75;
-/// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other.
+/// A first motion that does not explain most of the image's area, as below a sky, or may lie between motions, is believed once it was found in so many frames one after the other.
 const UNSURE_FRAMES: u32 = 3;
 /// Share of the key frame's patches that must lie where they lay, so that the others are not looked for. Chosen: a target may hide a fourth.
 const AT_REST: f64 = 0.75;
@@ -259,7 +260,7 @@ impl CameraMotionEstimator {
         // Nothing but the frames themselves speaks for a first motion.
         if !self.known && found.covers {
             let share = self.cover.share(&key.image, &self.now, &found.now_from_key);
-            found.covers = share >= LEAST_SHARE;
+            found.covers = share >= if found.is_mixed { CLEAR_SHARE } else { LEAST_SHARE };
         }
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
@@ -295,6 +296,8 @@ impl CameraMotionEstimator {
             cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle)?, 1.0 / scale),
             turned: plane.n_numbers > 2,
             covers: true,
+            // A course that is known is not doubted for parallax.
+            is_mixed: !self.known && is_mixed(&self.matches, &plane.to_from, plane.spread_px),
             n_coarse: 0,
         })
     }
