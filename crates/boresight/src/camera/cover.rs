@@ -29,8 +29,6 @@ const PEAK: usize = 2;
 /// Share of the tiles that must be explained: more than half of the area, by the deviation of a share of 600 tiles of which each is explained or not, 0.5 / √600. The reduced image has up to so
 /// many.
 pub(super) const LEAST_SHARE: f64 = 0.52;
-/// From this share on no other motion has room that could have drawn a fit to itself: a thing of a tenth of the area has at most a tenth of the matches, and a robust fit goes by the others.
-pub(super) const CLEAR_SHARE: f64 = 0.9;
 
 type Sums = [[f32; LANES]; SIDE];
 

@@ -13,7 +13,7 @@
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
-use super::cover::{CLEAR_SHARE, Cover, LEAST_SHARE};
+use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, Vote, find, find_near, vote};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
@@ -258,10 +258,8 @@ impl CameraMotionEstimator {
             return None;
         }
         // Nothing but the frames themselves speaks for a first motion.
-        if !self.known && found.covers {
-            let share = self.cover.share(&key.image, &self.now, &found.now_from_key);
-            found.covers = share >= if found.is_mixed { CLEAR_SHARE } else { LEAST_SHARE };
-        }
+        found.covers =
+            found.covers && (self.known || self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE);
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
             std::mem::swap(&mut self.key, &mut self.last);
@@ -295,9 +293,8 @@ impl CameraMotionEstimator {
             now_from_key: scaled(&plane.to_from, scales.fine, scales.factor),
             cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle)?, 1.0 / scale),
             turned: plane.n_numbers > 2,
-            covers: true,
             // A course that is known is not doubted for parallax.
-            is_mixed: !self.known && is_mixed(&self.matches, &plane.to_from, plane.spread_px),
+            covers: self.known || !is_mixed(&self.matches, &plane.to_from, plane.spread_px),
             n_coarse: 0,
         })
     }

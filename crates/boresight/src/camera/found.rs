@@ -13,10 +13,8 @@ pub(super) struct Found {
     pub now_from_key: Homography,
     pub cov: MotionCov,
     pub turned: bool,
-    /// Whether it is the background's beyond doubt: where nothing was known before, it must explain most of the image.
+    /// Whether it is the background's beyond doubt: where nothing was known before, it must explain most of the image, as one motion.
     pub covers: bool,
-    /// Whether what is left of its matches is that of a fit between several motions.
-    pub is_mixed: bool,
     /// Patches of the reduced frame that were found.
     pub n_coarse: usize,
 }
@@ -40,7 +38,6 @@ pub(super) fn coarse(
             cov: of_similarity(&fit.cov),
             turned: fit.turned,
             covers: true,
-            is_mixed: false,
             n_coarse: 0,
         });
     }
@@ -51,5 +48,5 @@ pub(super) fn coarse(
     matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
     let fit = fit?;
     let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
-    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, is_mixed: false, n_coarse: 0 })
+    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
 }
