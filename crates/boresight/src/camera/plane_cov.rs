@@ -78,9 +78,8 @@ where
     for (weight, r, q, b) in inside() {
         let w = weight * (1.0 - q).powi(2);
         let leverage = w * b.transpose() * plain.solve(&b);
-        // A match that the others say nothing of leaves as much as they allow.
-        let Some(left_out) = (Matrix2::identity() - leverage).cholesky() else { return None };
-        let r = left_out.solve(&r);
+        // Nothing is known of a fit that hangs on a single match.
+        let r = (Matrix2::identity() - leverage).cholesky()?.solve(&r);
         let of_one = r * r.transpose() + Matrix2::identity() * (0.25 * SHARP * SHARP);
         meat += w * w * b * of_one * b.transpose();
     }
