@@ -36,6 +36,9 @@ pub struct Args {
     /// Pairs of views for the camera's motion.
     #[arg(long, default_value_t = 2_000)]
     pairs: usize,
+    /// Print the pairs of views whose motion is answered wrongly and not flagged as uncertain: those of the half that may be looked at.
+    #[arg(long)]
+    wrong: bool,
     /// Keys set for the real clips.
     #[arg(long = "set")]
     sets: Vec<String>,
@@ -81,7 +84,7 @@ pub fn run(args: &Args) -> Result<()> {
         positions::table(args.fits, &data, args.python.as_deref(), p)
     })?;
     part("camera", include_str!("camera.txt").trim(), &mut |p| {
-        camera::table(args.pairs, &data, args.python.as_deref(), p)
+        camera::table(args.pairs, &data, args.python.as_deref(), args.wrong, p)
     })?;
     if args.only.is_empty() {
         let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");

@@ -42,8 +42,8 @@ pub struct Judged {
     /// Distances at the places, px; none where nothing was said.
     errors_px: Option<Vec<f64>>,
     wrong: bool,
-    /// Wrong, and by more than what was stated allows.
-    unflagged: bool,
+    /// Wrong, and by more than what was stated allows: the error, and the deviation stated along it, at the place of the largest such error, px.
+    pub unflagged: Option<[f64; 2]>,
     /// Mean of eᵀ C⁻¹ e over the places, where a covariance was stated.
     nees: Option<f64>,
     time_s: f64,
@@ -53,7 +53,7 @@ impl Judged {
     pub const HEAD: &str = "| method | pairs | answered % | error px, median | 95 % | off by > 0.5 px somewhere | of these beyond what is stated | eᵀ C⁻¹ e (2), mean | median | ms a pair, median |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |";
 
     pub fn of(_: &Pair, (answer, time_s): (Option<Answer>, f64)) -> Self {
-        let none = Self { errors_px: None, wrong: false, unflagged: false, nees: None, time_s };
+        let none = Self { errors_px: None, wrong: false, unflagged: None, nees: None, time_s };
         let Some(a) = answer else { return none };
         let errors_px: Vec<f64> = a
             .errors
@@ -67,7 +67,9 @@ impl Judged {
         let distances: Vec<Option<f64>> = a.errors.iter().zip(&a.covs).map(|(e, c)| distance2(e, c)).collect();
         let wrong = errors_px.iter().any(|e| *e > WRONG_PX);
         // Who states nothing is taken to be sure.
-        let unflagged = errors_px.iter().zip(&distances).any(|(e, d)| *e > WRONG_PX && d.is_none_or(|d| d > BEYOND));
+        let is_beyond = |i: &usize| errors_px[*i] > WRONG_PX && distances[*i].is_none_or(|d| d > BEYOND);
+        let worst = (0..errors_px.len()).filter(is_beyond).max_by(|i, j| errors_px[*i].total_cmp(&errors_px[*j]));
+        let unflagged = worst.map(|i| [errors_px[i], errors_px[i] / distances[i].unwrap_or(f64::INFINITY).sqrt()]);
         let stated: Vec<f64> = distances.into_iter().flatten().collect();
         let nees = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
         Self { errors_px: Some(errors_px), wrong, unflagged, nees, time_s }
@@ -99,7 +101,7 @@ pub fn row<'j>(name: &str, judged: impl Iterator<Item = &'j Judged>) -> String {
         at(&mut errors, 0.5),
         at(&mut errors, 0.95),
         count(&|j| j.wrong),
-        count(&|j| j.unflagged),
+        count(&|j| j.unflagged.is_some()),
         at(&mut times, 0.5)
     )
 }

@@ -59,7 +59,7 @@ fn working(image: &Image<u8>) -> Image<f32> {
     out
 }
 
-pub fn table(n: usize, data: &Path, python: Option<&Path>, page: &mut String) -> Result<()> {
+pub fn table(n: usize, data: &Path, python: Option<&Path>, wrong: bool, page: &mut String) -> Result<()> {
     let sources = pairs::sources(data)?;
     if sources.len() < 2 {
         writeln!(page, "No data.")?;
@@ -83,6 +83,9 @@ pub fn table(n: usize, data: &Path, python: Option<&Path>, page: &mut String) ->
     times(&film, &peers.film, page)?;
     for (name, judged) in &ours {
         details(name, &pairs, judged, &sources, page)?;
+        if wrong {
+            list_wrong(name, &pairs, judged, &sources, page)?;
+        }
     }
     if python.is_none() {
         writeln!(page, "\nOpenCV was not measured: `cargo xtask limit camera --python PATH` does.")?;
@@ -93,6 +96,10 @@ pub fn table(n: usize, data: &Path, python: Option<&Path>, page: &mut String) ->
 /// By kind of motion, with and without things that move by themselves, and by image.
 fn details(name: &str, pairs: &[Pair], judged: &[Judged], sources: &[Source], page: &mut String) -> Result<()> {
     writeln!(page, "\n{name}:\n\n{}", Judged::HEAD.replacen("method", "pairs", 1))?;
+    for (title, looked_at) in [("half that is looked at", true), ("half that is only reported", false)] {
+        let of = judged.iter().enumerate().filter(|(k, _)| pairs::is_looked_at(sources, *k) == looked_at);
+        writeln!(page, "{}", judge::row(title, of.map(|(_, j)| j)))?;
+    }
     let mut row = |title: &str, fits: &dyn Fn(&Pair) -> bool| {
         let of = pairs.iter().zip(judged).filter(|(p, _)| fits(p)).map(|(_, j)| j);
         writeln!(page, "{}", judge::row(title, of))
@@ -107,6 +114,36 @@ fn details(name: &str, pairs: &[Pair], judged: &[Judged], sources: &[Source], pa
     shown.dedup();
     for shows in shown {
         row(shows, &|p| sources[p.source].shows == shows)?;
+    }
+    Ok(())
+}
+
+/// The pairs whose answer is wrong and not flagged, of the half that is looked at.
+fn list_wrong(name: &str, pairs: &[Pair], judged: &[Judged], sources: &[Source], page: &mut String) -> Result<()> {
+    writeln!(page, "\n{name}, wrong and not flagged:\n")?;
+    writeln!(
+        page,
+        "| pair | image | kind | shift px | turn deg | zoom % | affine % | perspective % | noise | moves by itself % | error px | stated px |"
+    )?;
+    writeln!(page, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    for (k, (pair, j)) in pairs.iter().zip(judged).enumerate().filter(|(k, _)| pairs::is_looked_at(sources, *k)) {
+        let Some([error, stated]) = j.unflagged else { continue };
+        let [dx, dy, turn, zoom, a, b, g, h] = pair.numbers;
+        let percent = |v: f64| 100.0 * v;
+        writeln!(
+            page,
+            "| {k} | {} | {} | {dx:.1}, {dy:.1} | {:.2} | {:.2} | {:.2}, {:.2} | {:.2}, {:.2} | {} | {:.0} | {error:.2} | {stated:.3} |",
+            sources[pair.source].shows,
+            KINDS[pair.kind],
+            turn.to_degrees(),
+            percent(zoom),
+            percent(a),
+            percent(b),
+            percent(g),
+            percent(h),
+            pair.noise,
+            percent(pair.patched)
+        )?;
     }
     Ok(())
 }

@@ -49,6 +49,10 @@ pub struct Pair {
     pub kind: usize,
     /// Share of the first view that moves by itself.
     pub patched: f64,
+    /// Shift (px), turn (rad), zoom, two numbers of an affine part and two of a perspective; the last in shares a half width.
+    pub numbers: [f64; 8],
+    /// Deviation of the noise, counts.
+    pub noise: f64,
     pub views: [Image<u8>; 2],
     /// Takes a point of the first view to its place in the second.
     pub truth: Matrix3<f64>,
@@ -132,6 +136,12 @@ fn motion(middle: Vector2<f64>, v: [f64; 8]) -> Matrix3<f64> {
     m / m[(2, 2)]
 }
 
+/// Whether pair `k` belongs to the half that is looked at; the other one is only reported. Blocks of pairs with every image, every kind, with and without things that move by
+/// themselves take turns: an even number alone would take half of the images.
+pub fn is_looked_at(sources: &[Source], k: usize) -> bool {
+    k / (2 * KINDS.len() * sources.len()) % 2 == 0
+}
+
 /// Pair `k`: its own seed, so that it is the same however many are made.
 pub fn pair(sources: &[Source], k: usize) -> Result<Pair> {
     let mut rng = random(7_000_000 + k as u64);
@@ -167,7 +177,7 @@ pub fn pair(sources: &[Source], k: usize) -> Result<Pair> {
     };
     let size = size.map(|n| n as usize);
     let views = [draw(size, &first, noise, &mut rng)?, draw(size, &second, noise, &mut rng)?];
-    Ok(Pair { source, kind, patched, views, truth })
+    Ok(Pair { source, kind, patched, numbers: v, noise, views, truth })
 }
 
 /// One to five rectangles of up to a third of the view together; in half of the pairs all go one way.
