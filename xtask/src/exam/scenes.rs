@@ -3,7 +3,7 @@
 //! Each scene is written as YUV4MPEG2, or as H.264, with its truth as a table and then goes the way of every clip. The seeds are fixed; half A and half B are
 //! two seeds of the same scene.
 
-use super::clips::{Clip, Columns, Near};
+use super::clips::{Clip, Columns, Near, is_wanted};
 use anyhow::{Context, Result};
 use boresight::io::video::{Mp4Options, Mp4Writer};
 use boresight::sim::ground::{CameraPathConfig, Ground};
@@ -42,11 +42,11 @@ const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 11] = [
 ];
 
 /// Writes the scenes to a folder and returns them as clips.
-pub fn clips(folder: &Path, only: &str) -> Result<Vec<Clip>> {
+pub fn clips(folder: &Path, only: &[String]) -> Result<Vec<Clip>> {
     let mut out = Vec::new();
     let mut add = |kind: &'static str, seed: u64, scene: SceneConfig| -> Result<()> {
         let name = format!("{kind}, seed {seed}");
-        if !name.contains(only) {
+        if !is_wanted(only, &name) {
             return Ok(());
         }
         let stem = format!("scene{}", out.len());
