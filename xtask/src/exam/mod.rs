@@ -218,10 +218,13 @@ pub fn run(args: &Args) -> Result<()> {
     print!("\n{tables}");
     if !asked {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
-        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}"))?;
+        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}\n{SENSITIVITY}"))?;
     }
     Ok(())
 }
+
+/// The last section, written by `scripts/sensitivity`: one build of another kind and hundreds of runs.
+const SENSITIVITY: &str = include_str!("sensitivity.md");
 
 const INTRODUCTION: &str = "# The exam\n\n\
     `boresight track` on all public data without any option, as `cargo xtask exam` runs it; the command writes this page, the bad rows too. \
