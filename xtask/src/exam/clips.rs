@@ -62,6 +62,11 @@ const SINGLE: [(&str, &str, &str, Columns, f64, bool); 6] = [
     ("car from the air", "uav_uavdt_S1001/frames", "uav_uavdt_S1001/gt.csv", CAR, 10.0, false),
 ];
 
+/// Whether one of these is part of the name, or none is asked for.
+pub fn is_wanted(only: &[String], name: &str) -> bool {
+    only.is_empty() || only.iter().any(|part| name.contains(part.as_str()))
+}
+
 /// All clips that are here, by kind and name.
 pub fn clips(data: &Path) -> Result<Vec<Clip>> {
     let mut out = Vec::new();

@@ -14,7 +14,7 @@ mod tables;
 mod variants;
 
 use anyhow::{Result, ensure};
-use clips::Clip;
+use clips::{Clip, is_wanted};
 use score::{Score, score};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -25,9 +25,9 @@ pub struct Args {
     /// Folder of the public data.
     #[arg(long)]
     data: Option<PathBuf>,
-    /// Only clips whose kind or name contains this; nothing is written then.
-    #[arg(long, default_value = "")]
-    only: String,
+    /// Only clips whose kind or name contains this, or one of these if given more than once; nothing is written then.
+    #[arg(long)]
+    only: Vec<String>,
     /// Changes of the configuration chosen, as with `boresight track --set`; nothing is written then.
     #[arg(long = "set")]
     sets: Vec<String>,
@@ -159,7 +159,7 @@ pub fn run(args: &Args) -> Result<()> {
         n_of_kind = if clip.kind == kind { n_of_kind + 1 } else { 0 };
         kind = clip.kind;
         let half = if n_of_kind % 2 == 0 { 'A' } else { 'B' };
-        if !(clip.name.contains(&args.only) || clip.kind.contains(&args.only)) {
+        if !(is_wanted(&args.only, &clip.name) || is_wanted(&args.only, clip.kind)) {
             continue;
         }
         let clip = match args.variant {
@@ -218,10 +218,13 @@ pub fn run(args: &Args) -> Result<()> {
     print!("\n{tables}");
     if !asked {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
-        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}"))?;
+        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}\n{SENSITIVITY}"))?;
     }
     Ok(())
 }
+
+/// The last section, written by `scripts/sensitivity`: one build of another kind and hundreds of runs.
+const SENSITIVITY: &str = include_str!("sensitivity.md");
 
 const INTRODUCTION: &str = "# The exam\n\n\
     `boresight track` on all public data without any option, as `cargo xtask exam` runs it; the command writes this page, the bad rows too. \

@@ -1,5 +1,6 @@
 //! Tables of detections, tracked without options, beside SORT's tracks of the same detections.
 
+use super::clips::is_wanted;
 use crate::mot::{SETS, judged, name_of, sequences, sort_of, table, tracked};
 use anyhow::Result;
 use boresight::io::{TableOptions, read_detections};
@@ -13,7 +14,7 @@ fn figures(s: &MotScores) -> [f64; 3] {
 }
 
 /// The table as Markdown; `sort` is a folder with SORT's tracks where none are published.
-pub fn run(data: &Path, only: &str, sort: Option<&Path>) -> Result<String> {
+pub fn run(data: &Path, only: &[String], sort: Option<&Path>) -> Result<String> {
     let mut out = String::from(
         "## Tables of detections\n\n`boresight track det.txt` without options; SORT's tracks of the same detections beside it (MOT15: those \
          published, MOT17: made by `scripts/sort_peer.py`).\n\n\
@@ -22,7 +23,7 @@ pub fn run(data: &Path, only: &str, sort: Option<&Path>) -> Result<String> {
     let (mut above, mut n_all, mut n_compared) = ([0; 3], 0, 0);
     for (set, detections, rules) in SETS {
         for folder in sequences(&data.join(set), detections) {
-            if !folder.display().to_string().contains(only) {
+            if !is_wanted(only, &folder.display().to_string()) {
                 continue;
             }
             let read = read_detections(folder.join(detections), &TableOptions::default())?;
