@@ -107,6 +107,12 @@ impl Evidence {
         self.moving.iter().map(|c| c.gain).sum::<f64>() - self.by_chance[1]
     }
 
+    /// Gain of the chains that go with none that gains more, nats, beyond that of the surrogates: of the rims of one target, and of its parts, one counts.
+    pub fn gain_alone(&self) -> f64 {
+        let alone = |a: &&Chain| !self.moving.iter().any(|b| b.gain > a.gain && a.goes_with(b));
+        self.moving.iter().filter(alone).map(|c| c.gain).sum::<f64>() - self.by_chance[1]
+    }
+
     /// Gain of those chains that go with none of `other`, nats, beyond that of the surrogates.
     pub fn gain_beside(&self, other: &Self) -> f64 {
         let own = self.moving.iter().filter(|c| !other.moving.iter().any(|o| c.goes_with(o)));

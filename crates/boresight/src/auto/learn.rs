@@ -53,8 +53,10 @@ pub fn learn<E: From<Error>>(
         }
         assumed = longer.clone();
         let mut again = learn_set(frames, &mut longer, request)?;
-        // What is lost to a longer lag was not too large for the shorter one.
-        if !Evidence::of_scans(again.scans(), size_px[0] * size_px[1]).is_sure() {
+        // Rims count once for their target: what a longer lag shows must gain as much.
+        let area_px2 = size_px[0] * size_px[1];
+        let [short, long] = [&mut pass, &mut again].map(|pass| Evidence::of_scans(pass.scans(), area_px2));
+        if long.gain_alone() < short.gain_alone() {
             break;
         }
         (*choice, pass) = (longer, again);
