@@ -286,9 +286,6 @@ impl CameraMotionEstimator {
         if plane.spread_px > FINE_LOST_PX || plane.share < FINE_FOUND {
             return None;
         }
-        // The votes have said which matches are the background's; how surely each is known says what they are worth.
-        self.fine.weigh(&mut self.matches);
-        let plane = plane::fit(&self.matches, &plane.to_from, fine_middle, limits)?;
         Some(Found {
             now_from_key: scaled(&plane.to_from, scales.fine, scales.factor),
             cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle)?, 1.0 / scale),

@@ -4,13 +4,12 @@
 //! How: the reduced frame says where texture is ([`super::key_frame`]) and, coarsely, where it has gone; here only windows of the frame around those places are read, in means of
 //! blocks where the frame is wider than [`FINE_PX`], smoothed by [1 2 1]/4 both ways: between the pixels of a smoothed image straight lines run nearly where the image does.
 //! Each window is looked through for the best whole place within [`REACH`], for the coarse place is only as good as the reduced pixels.
-//! A place's variance is that of least squares, from the differences that are left and the patch's gradients.
 //! Units: fine px. Limits: patches within a window's margin of the border are left out.
 
 use super::find_patch::{Block, bilinear, refine};
 use super::fit::Match;
 use super::key_frame::{PATCH, Patch};
-use super::plane::{MOST_MATCHES, SHARP};
+use super::plane::MOST_MATCHES;
 use super::reduce::blocks_of;
 use crate::{Homography, Image, Pixels};
 use nalgebra::{Matrix2, Vector2};
@@ -24,9 +23,6 @@ const KEPT: usize = PATCH + 2 * MARGIN;
 const REACH: i64 = 2;
 /// A window around a place: the patch at its farthest place, a step of a pixel and the next pixel beyond.
 const WINDOW: usize = PATCH + 2 * REACH as usize + 4;
-
-/// Variance of white noise near a texture's frequencies, over that of its pixels: [1 2 1]/4 both ways leaves (3/8)² of the pixels' and, at low frequencies, all of the noise.
-const SMOOTHED: f64 = 64.0 / 9.0;
 
 /// Side of a block for frames of this width, px.
 pub(super) fn fine_factor(width: usize) -> usize {
@@ -45,8 +41,6 @@ struct FinePatch {
 #[derive(Clone, Debug, Default)]
 pub(super) struct FinePatches {
     patches: Vec<FinePatch>,
-    /// Of the places found last, px².
-    variances: Vec<f64>,
     window: Image<f32>,
 }
 
@@ -112,13 +106,6 @@ impl FinePatches {
         }
     }
 
-    /// Gives the matches found last the weight of their places in the place of their votes: the inverse variance, at most 1.
-    pub fn weigh(&self, matches: &mut [Match]) {
-        for (m, variance) in matches.iter_mut().zip(&self.variances) {
-            m.weight = SHARP * SHARP / (SHARP * SHARP + variance);
-        }
-    }
-
     fn find_in<T: Copy>(
         &mut self,
         image: &Image<T>,
@@ -127,7 +114,6 @@ impl FinePatches {
         out: &mut Vec<Match>,
     ) -> usize {
         out.clear();
-        self.variances.clear();
         let fine = fine_factor(image.width());
         let half = Vector2::repeat(0.5 * (PATCH - 1) as f64);
         let (w, h) = ((image.width() / fine) as f64, (image.height() / fine) as f64);
@@ -144,12 +130,10 @@ impl FinePatches {
             n += 1;
             let Some(template) = turned(p, predicted) else { continue };
             let best = best_place(&template, &self.window);
-            let Some(part) = refine(&template, &self.window, best) else { continue };
-            let place = Vector2::new(best.0 as f64, best.1 as f64) + part;
-            let Some(variance) = variance(&template, &self.window, place) else { continue };
-            let corner = Vector2::new(first.0 as f64, first.1 as f64) + place;
-            out.push(Match { from: p.middle, to: corner + half, weight: p.weight });
-            self.variances.push(variance);
+            if let Some(part) = refine(&template, &self.window, best) {
+                let at = Vector2::new((first.0 + best.0) as f64, (first.1 + best.1) as f64);
+                out.push(Match { from: p.middle, to: at + half + part, weight: p.weight });
+            }
         }
         n
     }
@@ -228,35 +212,6 @@ fn turned(p: &FinePatch, predicted: &Homography) -> Option<Block> {
     Some(out)
 }
 
-/// Variance of a refined place, px², mean of both axes: [`SMOOTHED`] s² tr(H⁻¹) / 2, s² the variance of the differences that are left, H the square of the template's gradients. `None` where
-/// the next pixel lies outside or there are no gradients.
-fn variance(template: &Block, window: &Image<f32>, at: Vector2<f64>) -> Option<f64> {
-    let (x, y) = (at.x as usize, at.y as usize);
-    let (u, v) = ((at.x - x as f64) as f32, (at.y - y as f64) as f32);
-    let (mut sum, mut square, mut g) = (0.0f32, 0.0f32, [0.0f32; 5]);
-    for (r, line) in template.iter().enumerate() {
-        let (above, below) = (window.row(y + r).get(x..x + PATCH + 1)?, window.row(y + r + 1).get(x..x + PATCH + 1)?);
-        let (up, down) = (&template[r.saturating_sub(1)], &template[(r + 1).min(PATCH - 1)]);
-        for c in 0..PATCH {
-            let upper = above[c] * (1.0 - u) + above[c + 1] * u;
-            let lower = below[c] * (1.0 - u) + below[c + 1] * u;
-            let e = upper * (1.0 - v) + lower * v - line[c];
-            (sum, square) = (sum + e, square + e * e);
-            let (left, right) = (c.saturating_sub(1), (c + 1).min(PATCH - 1));
-            let (gx, gy) = (0.5 * (line[right] - line[left]), 0.5 * (down[c] - up[c]));
-            let terms = [gx, gy, gx * gx, gx * gy, gy * gy];
-            g.iter_mut().zip(terms).for_each(|(g, t)| *g += t);
-        }
-    }
-    let n = (PATCH * PATCH) as f32;
-    let [gx, gy, xx, xy, yy] = g;
-    let (xx, xy, yy) = (xx - gx * gx / n, xy - gx * gy / n, yy - gy * gy / n);
-    // Three numbers are taken from the differences: a shift and the light.
-    let left = (square - sum * sum / n) / (n - 3.0);
-    let variance = SMOOTHED * f64::from(0.5 * left * (xx + yy) / (xx * yy - xy * xy));
-    (variance >= 0.0).then_some(variance)
-}
-
 /// The whole place of the window, one from its border on, with the least sum of absolute differences.
 fn best_place(template: &Block, window: &Image<f32>) -> (i64, i64) {
     let mut best = (f32::INFINITY, 0, 0);
@@ -276,54 +231,4 @@ fn best_place(template: &Block, window: &Image<f32>) -> (i64, i64) {
         }
     }
     (best.1, best.2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    /// Waves of a height that grows to the right, counts, with noise of 4 counts.
-    fn view(shift: Vector2<f64>, rng: &mut ChaCha8Rng) -> Pixels {
-        let mut image = Image::filled(320, 240, 0.0f32);
-        for y in 0..240 {
-            for (x, v) in image.row_mut(y).iter_mut().enumerate() {
-                let p = Vector2::new(x as f64, y as f64) - shift;
-                let noise: f64 = StandardNormal.sample(rng);
-                let waves = (0.55 * p.x + 0.2 * p.y).sin() + (0.5 * p.y - 0.15 * p.x).sin() + (0.31 * p.x).cos();
-                *v = (100.0 + (10.0 + 0.1 * p.x) * waves + 4.0 * noise) as f32;
-            }
-        }
-        Pixels::GrayF32(image)
-    }
-
-    #[test]
-    fn a_place_s_variance_is_that_of_its_error() {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let places: Vec<Patch> =
-            (0..96).map(|i| Patch { x: 20 + 22 * (i % 12), y: 20 + 24 * (i / 12), weight: 0.5 }).collect();
-        let (mut fine, mut matches) = (FinePatches::default(), Vec::new());
-        // The sum of errors' squares over that of their variances, of the left half and of the right one, which has more texture.
-        let (mut errors, mut stated) = ([0.0; 2], [0.0; 2]);
-        for k in 0..20 {
-            let shift = Vector2::new(0.05 * f64::from(k), 0.4 - 0.07 * f64::from(k));
-            fine.choose(&view(Vector2::zeros(), &mut rng), 1, &places);
-            assert_eq!(fine.find(&view(shift, &mut rng), &Homography::shift(shift.map(f64::round)), &mut matches), 96);
-            assert!(matches.len() > 90 && matches.len() == fine.variances.len());
-            for (m, v) in matches.iter().zip(&fine.variances) {
-                let half = usize::from(m.from.x > 160.0);
-                errors[half] += 0.5 * (m.to - m.from - shift).norm_squared();
-                stated[half] += v;
-            }
-            let votes = matches.clone();
-            fine.weigh(&mut matches);
-            assert!(votes.iter().all(|m| m.weight == 0.5) && matches.iter().all(|m| m.weight > 0.0 && m.weight < 1.0));
-        }
-        let ratios: [f64; 2] = std::array::from_fn(|i| errors[i] / stated[i]);
-        // All of the noise is near the texture's frequencies only where these are low: what is stated is an upper bound, alike for all.
-        assert!(ratios.iter().all(|r| (0.25..1.5).contains(r)), "{ratios:?}");
-        assert!((ratios[0] / ratios[1]).ln().abs() < 0.5 && stated[1] < 0.6 * stated[0], "{ratios:?} {stated:?}");
-    }
 }
