@@ -262,6 +262,22 @@ mod tests {
     }
 
     #[test]
+    fn the_two_rims_of_one_thing_count_once() {
+        let scans = |apart: Vector2<f64>| -> Vec<Sightings> {
+            let both = |k: u32| {
+                let at = Vector2::new(20.0 + 4.0 * f64::from(k), 50.0);
+                vec![Sighting::of_box(at, 0.1, 10.0), Sighting::of_box(at + apart, 0.2, 10.0)]
+            };
+            (0..12).map(|k| Sightings { time_s: 0.04 * f64::from(k), all: both(k) }).collect()
+        };
+        let rims = Evidence::of(&scans(Vector2::new(16.0, 0.0)), SIDE_PX * SIDE_PX);
+        let things = Evidence::of(&scans(Vector2::new(0.0, 150.0)), SIDE_PX * SIDE_PX);
+        assert_eq!([rims.moving.len(), things.moving.len()], [2, 2]);
+        assert!((rims.gain_alone() - rims.moving[0].gain.max(rims.moving[1].gain) + rims.by_chance[1]).abs() < 1e-9);
+        assert!((things.gain_alone() - things.gain()).abs() < 1e-9 && things.gain() > 60.0, "{}", things.words());
+    }
+
+    #[test]
     fn nothing_comes_of_nothing() {
         let none = Evidence::of(&[], 100.0);
         assert_eq!((none.moving.len(), none.gain()), (0, 0.0));

@@ -139,7 +139,7 @@ fn motion(middle: Vector2<f64>, v: [f64; 8]) -> Matrix3<f64> {
 /// Whether pair `k` belongs to the half that is looked at; the other one is only reported. Blocks of pairs with every image, every kind, with and without things that move by
 /// themselves take turns: an even number alone would take half of the images.
 pub fn is_looked_at(sources: &[Source], k: usize) -> bool {
-    k / (2 * KINDS.len() * sources.len()) % 2 == 0
+    (k / (2 * KINDS.len() * sources.len())).is_multiple_of(2)
 }
 
 /// Pair `k`: its own seed, so that it is the same however many are made.
