@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 /// Orders of the scans in which chains are counted for comparison.
 const SURROGATES: usize = 4;
 /// Scans of a pass that are looked at, and their detections at most: a guard of time.
-const MOST_SCANS: usize = 250;
+pub const MOST_SCANS: usize = 250;
 const MOST_DETECTIONS: usize = 20_000;
 /// By chance a gain is larger once in a thousand choices: e to the minus gain.
 pub const SURE_GAIN: f64 = 6.9;

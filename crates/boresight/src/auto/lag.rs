@@ -10,7 +10,7 @@ use super::digits::round;
 use super::evidence::Evidence;
 use crate::Scan;
 use crate::camera::CameraPath;
-use crate::vision::threshold::ThresholdConfig;
+use crate::vision::steadied::SECOND_LAG;
 use nalgebra::Vector2;
 
 /// Thickness over way of a disc that moves by just its own diameter: thicker ones, in the median, move by less than their size.
@@ -19,27 +19,26 @@ const WHOLE: f64 = std::f64::consts::FRAC_PI_4;
 const LONGEST_S: f64 = 1.28;
 /// The frames read ahead last so many lags at least: in the first four or so, later frames stand in.
 const LEAST_LAGS: f64 = 8.0;
-/// The older of the two frames that are compared with is so many lags old.
-const SECOND: f64 = 3.0;
-/// Share of the present frame that this one must show, in the mean: nothing is seen in the rest.
-const LEAST_SHOWN: f64 = 0.5;
+/// Share of the present frame that the older of the two compared with must show, in the mean: nothing is seen in the rest.
+const LEAST_COVERED: f64 = 0.5;
 /// Of fewer ways the median is not known.
 const LEAST_WAYS: usize = 20;
 
-/// The lag to look with in the place of the configured one, s, with the reason, if the targets in the scans made with that are too large for it; `size_px` is the frame's.
-pub(super) fn longer(scans: &[Scan], threshold: &ThresholdConfig, size_px: [f64; 2]) -> Option<(f64, String)> {
-    let ThresholdConfig::Steadied(steadied) = threshold else { return None };
-    let longer_s = round(2.0 * steadied.lag_s);
+/// The lag to look with in the place of `lag_s`, s, with the reason, if the targets in the scans made with that are too large for it; `shown` is the evidence of these scans, `size_px`
+/// the frame's size.
+pub(super) fn longer(scans: &[Scan], shown: &Evidence, lag_s: f64, size_px: [f64; 2]) -> Option<(f64, String)> {
+    let longer_s = round(2.0 * lag_s);
     let lasts_s = scans.last()?.time.seconds_since(scans[0].time);
-    if longer_s > LONGEST_S || lasts_s < LEAST_LAGS * longer_s || shown(scans, SECOND * longer_s, size_px) < LEAST_SHOWN
+    if longer_s > LONGEST_S
+        || lasts_s < LEAST_LAGS * longer_s
+        || covered(scans, SECOND_LAG * longer_s, size_px) < LEAST_COVERED
     {
         return None;
     }
-    let share = thickness_of_way(&Evidence::of_scans(scans, size_px[0] * size_px[1]), steadied.lag_s)?;
+    let share = thickness_of_way(shown, lag_s)?;
     (share > WHOLE).then(|| {
         let words = format!(
-            "Within {} s what moves goes on by {:.1} times its thickness only: steadied frames twice as long ago are compared with, which show it whole.",
-            steadied.lag_s,
+            "Within {lag_s} s what moves goes on by {:.1} times its thickness only: steadied frames twice as long ago are compared with, which show it whole.",
             1.0 / share
         );
         (longer_s, words)
@@ -47,7 +46,7 @@ pub(super) fn longer(scans: &[Scan], threshold: &ThresholdConfig, size_px: [f64;
 }
 
 /// Share of a frame that one so long ago shows as well, in the mean, by how far the camera came since.
-fn shown(scans: &[Scan], ago_s: f64, size_px: [f64; 2]) -> f64 {
+fn covered(scans: &[Scan], ago_s: f64, size_px: [f64; 2]) -> f64 {
     let mut path = CameraPath::default();
     let places: Vec<Vector2<f64>> = scans
         .iter()
@@ -91,7 +90,6 @@ fn thickness_of_way(evidence: &Evidence, lag_s: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::steadied::SteadiedConfig;
     use crate::{CameraMotion, Detection, Extent, FrameIndex, Timestamp};
     use nalgebra::Matrix2;
 
@@ -109,12 +107,8 @@ mod tests {
                     .with_camera_motion(Some(motion))
             })
             .collect();
-        longer(
-            &scans,
-            &ThresholdConfig::Steadied(SteadiedConfig { lag_s: 0.32, ..SteadiedConfig::default() }),
-            [400.0, 100.0],
-        )
-        .map(|l| l.0)
+        let size_px = [400.0, 100.0];
+        longer(&scans, &Evidence::of_scans(&scans, size_px[0] * size_px[1]), 0.32, size_px).map(|l| l.0)
     }
 
     fn said(n: u64, size: [f64; 2]) -> Option<f64> {

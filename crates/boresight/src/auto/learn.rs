@@ -6,7 +6,7 @@
 
 use super::choose::Choice;
 use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
-use super::evidence::Evidence;
+use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
@@ -14,6 +14,7 @@ use super::{contest, initiation_score, lag, later_looks, noise, speed};
 use crate::camera::CameraPath;
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
+use crate::vision::steadied::SteadiedConfig;
 use crate::vision::threshold::ThresholdConfig;
 use crate::vision::{AtOnce, Detector};
 use crate::{Config, Error, FrameSource, Result, Scan};
@@ -39,10 +40,13 @@ pub fn learn<E: From<Error>>(
     let mut pass = learn_set(frames, choice, request)?;
     let info = frames.info().clone();
     let size_px = [info.width as f64, info.height as f64];
-    while let Some((lag_s, reason)) = lag::longer(pass.scans(), &choice.config.detector.threshold, size_px) {
+    let area_px2 = size_px[0] * size_px[1];
+    while let ThresholdConfig::Steadied(SteadiedConfig { lag_s, .. }) = choice.config.detector.threshold {
+        let shown = Evidence::of_scans(pass.scans(), area_px2);
+        let Some((longer_s, reason)) = lag::longer(pass.scans(), &shown, lag_s, size_px) else { break };
         let mut longer = assumed.clone();
         if let ThresholdConfig::Steadied(steadied) = &mut longer.config.detector.threshold {
-            steadied.lag_s = lag_s;
+            steadied.lag_s = longer_s;
         }
         longer.reasons.push(reason);
         let asked = longer.config.detector.clone();
@@ -51,15 +55,15 @@ pub fn learn<E: From<Error>>(
         if longer.config.detector != asked {
             break;
         }
-        assumed = longer.clone();
-        let mut again = learn_set(frames, &mut longer, request)?;
+        let (mut again, mut at_once) = first_pass(frames, &longer.config, request)?;
+        again.take_on(frames, &mut at_once, evidence::MOST_SCANS);
         // Rims count once for their target: what a longer lag shows must gain as much.
-        let area_px2 = size_px[0] * size_px[1];
-        let [short, long] = [&mut pass, &mut again].map(|pass| Evidence::of_scans(pass.scans(), area_px2));
-        if long.gain_alone() < short.gain_alone() {
+        if Evidence::of_scans(again.scans(), area_px2).gain_alone() < shown.gain_alone() {
             break;
         }
-        (*choice, pass) = (longer, again);
+        assumed = longer.clone();
+        pass = learn_on(again, at_once, frames, &mut longer, request)?;
+        *choice = longer;
     }
     let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
     if let Some((polarity, reason)) = later {
@@ -82,10 +86,21 @@ pub fn learn<E: From<Error>>(
 
 /// As [`learn`], where what is set is in the configuration.
 fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<FirstPass> {
+    let (pass, at_once) = first_pass(frames, &choice.config, request)?;
+    learn_on(pass, at_once, frames, choice, request)
+}
+
+/// As [`learn_set`], with a first pass that has begun.
+fn learn_on(
+    mut pass: FirstPass,
+    mut at_once: AtOnce,
+    frames: &mut Replay,
+    choice: &mut Choice,
+    request: &Request,
+) -> Result<FirstPass> {
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let area_px2 = (info.width * info.height).max(1) as f64;
-    let (mut pass, mut at_once) = first_pass(frames, &choice.config, request)?;
     let leaves_out = matches!(choice.config.detector.threshold, ThresholdConfig::Isolated(_));
     if leaves_out && choice.config.tracker.report == Report::All {
         // Where the first frames say already what the many targets reach, the others are not searched for less.

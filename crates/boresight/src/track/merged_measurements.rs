@@ -347,7 +347,8 @@ mod tests {
     fn a_small_member_that_crosses_a_large_one_is_placed_by_neither_edge() {
         // The box is as wide as the large one was: it alone makes both edges. By its own edges the small one would stand at 11 or 29 px.
         let parts = parts(&[20.0, 21.0], &[20.0, 2.0], Some(0), &[1]);
-        let [large, small] = &parts[..] else { panic!("{parts:?}") };
+        assert_eq!(parts.len(), 2);
+        let (large, small) = (parts[0], parts[1]);
         assert!(
             (large.position[0] - 20.0).abs() < 1e-3 && (large.noise.xx - 1.49).abs() < 0.01 && large.measures,
             "{large:?}"

@@ -12,4 +12,5 @@ mod segmenter;
 
 pub use config::SteadiedConfig;
 pub(crate) use cover::plane_image;
+pub(crate) use references::SECOND_LAG;
 pub(super) use segmenter::Steadied;

@@ -14,7 +14,7 @@ const PER_LAG: f64 = 4.0;
 /// Lags after which a frame is forgotten.
 const OLDEST: f64 = 3.5;
 /// Lags to the second frame: what a target moved by in two lags it does not cover twice.
-const SECOND: f64 = 3.0;
+pub(crate) const SECOND_LAG: f64 = 3.0;
 /// Lags that frames shown beforehand cover: enough to have one a lag and one three lags away at every time.
 const SHOWN: f64 = 3.75;
 
@@ -109,9 +109,9 @@ impl References {
         };
         let first = nearest(&|lags| lags >= reach(1.0)).or_else(|| nearest(&|lags| -lags >= reach(1.0)))?;
         let is_old = away(first) > 0.0;
-        let second = nearest(&|lags| lags >= reach(SECOND))
+        let second = nearest(&|lags| lags >= reach(SECOND_LAG))
             .or_else(|| nearest(&|lags| is_old && -lags >= reach(1.0)))
-            .or_else(|| nearest(&|lags| -lags >= reach(SECOND)))?;
+            .or_else(|| nearest(&|lags| -lags >= reach(SECOND_LAG)))?;
         Some([first, second])
     }
 
