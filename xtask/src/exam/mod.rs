@@ -6,6 +6,7 @@
 //! NIS: mean over the updates of reported tracks, 2 if what the filter believes is true. ms: wall time of choice, decoding, detection
 //! and tracking, one run of this machine.
 
+mod aims;
 pub mod clips;
 mod composed;
 mod scenes;
@@ -214,11 +215,12 @@ pub fn run(args: &Args) -> Result<()> {
     if args.own.is_some() || args.variant.is_some() || args.composed.is_some() {
         return Ok(());
     }
-    let tables = tables::run(&data, &args.only, args.sort.as_deref())?;
-    print!("\n{tables}");
+    let (tables, n_above, n_compared) = tables::run(&data, &args.only, args.sort.as_deref())?;
+    let aims = aims::table(&done, n_above, n_compared);
+    print!("\n{tables}\n{aims}");
     if !asked {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/exam.md");
-        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{tables}\n{text}\n{SENSITIVITY}"))?;
+        std::fs::write(path, format!("{INTRODUCTION}{head}{closing}\n{aims}\n{tables}\n{text}\n{SENSITIVITY}"))?;
     }
     Ok(())
 }

@@ -13,8 +13,8 @@ fn figures(s: &MotScores) -> [f64; 3] {
     [hota::mean(&s.hota.hota()), s.identity.idf1(), s.clear.mota()].map(|v| 100.0 * v)
 }
 
-/// The table as Markdown; `sort` is a folder with SORT's tracks where none are published.
-pub fn run(data: &Path, only: &[String], sort: Option<&Path>) -> Result<String> {
+/// The table as Markdown, on how many sequences all three figures are above SORT's, and of how many; `sort` is a folder with SORT's tracks where none are published.
+pub fn run(data: &Path, only: &[String], sort: Option<&Path>) -> Result<(String, usize, usize)> {
     let mut out = String::from(
         "## Tables of detections\n\n`boresight track det.txt` without options; SORT's tracks of the same detections beside it (MOT15: those \
          published, MOT17: made by `scripts/sort_peer.py`).\n\n\
@@ -52,5 +52,5 @@ pub fn run(data: &Path, only: &[String], sort: Option<&Path>) -> Result<String> 
         out,
         "\nAbove SORT in HOTA on {hota}, in IDF1 on {idf1}, in MOTA on {mota}, in all three on {n_all} of {n_compared} sequences."
     )?;
-    Ok(out)
+    Ok((out, n_all, n_compared))
 }
