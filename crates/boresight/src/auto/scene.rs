@@ -143,8 +143,10 @@ fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
         let (w, h) = (image.width().div_ceil(step), image.height().div_ceil(step));
         let mut out = Image::filled(w, h, 0.0f32);
         for y in 0..h {
-            for (o, &p) in out.row_mut(y).iter_mut().zip(image.row(y * step).iter().step_by(step)) {
-                *o = value(p);
+            let to = out.row_mut(y).iter_mut();
+            match step {
+                1 => to.zip(image.row(y)).for_each(|(o, &p)| *o = value(p)),
+                _ => to.zip(image.row(y * step).iter().step_by(step)).for_each(|(o, &p)| *o = value(p)),
             }
         }
         out

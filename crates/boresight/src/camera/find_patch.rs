@@ -221,26 +221,10 @@ fn between(image: &Image<f32>, p: Vector2<f64>) -> Option<f32> {
 
 /// The part of a pixel between the best whole place and the true one; `None` if it leads away from there.
 pub(super) fn refine(template: &Block, now: &Image<f32>, at: (i64, i64)) -> Option<Vector2<f64>> {
-    const N: f32 = (PATCH * PATCH) as f32;
-    let mut gradients = [[Vector2::<f32>::zeros(); PATCH]; PATCH];
-    let mut mean = Vector2::<f32>::zeros();
-    for r in 0..PATCH {
-        for c in 0..PATCH {
-            let (up, down) = (r.saturating_sub(1), (r + 1).min(PATCH - 1));
-            let (left, right) = (c.saturating_sub(1), (c + 1).min(PATCH - 1));
-            let g = Vector2::new(
-                (template[r][right] - template[r][left]) / (right - left) as f32,
-                (template[down][c] - template[up][c]) / (down - up) as f32,
-            );
-            gradients[r][c] = g;
-            mean += g / N;
-        }
-    }
+    let gradients = gradients(template);
     let mut square = Matrix2::<f64>::zeros();
-    for g in gradients.iter_mut().flatten() {
-        // Without the mean a change of brightness drops out.
-        *g -= mean;
-        let g: Vector2<f64> = g.cast();
+    for (gx, gy) in gradients.0.iter().flatten().zip(gradients.1.iter().flatten()) {
+        let g = Vector2::new(f64::from(*gx), f64::from(*gy));
         square += g * g.transpose();
     }
     let factor = square.cholesky()?;
@@ -259,32 +243,83 @@ pub(super) fn refine(template: &Block, now: &Image<f32>, at: (i64, i64)) -> Opti
     Some(part)
 }
 
+/// Gradients of a patch along x and along y.
+type Gradients = (Block, Block);
+
+widest! {
+    /// The gradients, less their mean: without it a change of brightness drops out.
+    fn gradients(template: &Block) -> Gradients {
+        const N: f32 = (PATCH * PATCH) as f32;
+        let [mut gx, mut gy] = [[[0.0f32; PATCH]; PATCH]; 2];
+        for (line, t) in gx.iter_mut().zip(template) {
+            for c in 1..PATCH - 1 {
+                line[c] = (t[c + 1] - t[c - 1]) / 2.0;
+            }
+            line[0] = t[1] - t[0];
+            line[PATCH - 1] = t[PATCH - 1] - t[PATCH - 2];
+        }
+        for (r, line) in gy.iter_mut().enumerate() {
+            let (up, down) = (r.saturating_sub(1), (r + 1).min(PATCH - 1));
+            for ((g, d), u) in line.iter_mut().zip(&template[down]).zip(&template[up]) {
+                *g = (d - u) / (down - up) as f32;
+            }
+        }
+        for g in [&mut gx, &mut gy] {
+            let mean: f32 = g.as_flattened().iter().map(|v| v / N).sum();
+            g.as_flattened_mut().iter_mut().for_each(|v| *v -= mean);
+        }
+        (gx, gy)
+    }
+}
+
 /// Sum of g e with the template's first pixel at `at`; `None` if that needs pixels outside.
-fn pull(
-    template: &Block,
-    gradients: &[[Vector2<f32>; PATCH]; PATCH],
-    now: &Image<f32>,
-    at: Vector2<f64>,
-) -> Option<Vector2<f32>> {
+fn pull(template: &Block, gradients: &Gradients, now: &Image<f32>, at: Vector2<f64>) -> Option<Vector2<f32>> {
     if !(at.x >= 0.0 && at.y >= 0.0) {
         return None;
     }
-    // All pixels of the patch lie at the same fraction of a pixel.
     let (x, y) = (at.x as usize, at.y as usize);
-    let (u, v) = ((at.x - x as f64) as f32, (at.y - y as f64) as f32);
-    let row = |r: usize| (y + r < now.height()).then(|| now.row(y + r).get(x..x + PATCH + 1)).flatten();
-    let mut above = row(0)?;
-    let mut sum = Vector2::<f32>::zeros();
-    for (r, (line, g)) in template.iter().zip(gradients).enumerate() {
-        let below = row(r + 1)?;
-        for c in 0..PATCH {
-            let upper = above[c] * (1.0 - u) + above[c + 1] * u;
-            let lower = below[c] * (1.0 - u) + below[c + 1] * u;
-            sum += g[c] * (upper * (1.0 - v) + lower * v - line[c]);
-        }
-        above = below;
+    if x + PATCH >= now.width() || y + PATCH >= now.height() {
+        return None;
     }
-    Some(sum)
+    // All pixels of the patch lie at the same fraction of a pixel.
+    let part = [(at.x - x as f64) as f32, (at.y - y as f64) as f32];
+    let [mut gx_e, mut gy_e] = [[[0.0; PATCH]; PATCH]; 2];
+    weighted_errors(template, gradients, (now, x, y), part, (&mut gx_e, &mut gy_e));
+    // One after the other, whatever the vectors' width.
+    let sum = |products: &Block| products.as_flattened().iter().fold(0.0, |sum, v| sum + v);
+    Some(Vector2::new(sum(&gx_e), sum(&gy_e)))
+}
+
+widest! {
+    /// The products of the gradients with the differences of a patch, its first pixel behind (x, y) by a part of a pixel, from the template.
+    fn weighted_errors(
+        template: &Block,
+        gradients: &Gradients,
+        patch: (&Image<f32>, usize, usize),
+        part: [f32; 2],
+        out: (&mut Block, &mut Block),
+    ) {
+        let ((now, x, y), [u, v]) = (patch, part);
+        let along = |r: usize| {
+            let mut line = [0.0f32; PATCH];
+            if let Some(row) = now.row(y + r)[x..].first_chunk::<{ PATCH + 1 }>() {
+                for (c, l) in line.iter_mut().enumerate() {
+                    *l = row[c] * (1.0 - u) + row[c + 1] * u;
+                }
+            }
+            line
+        };
+        let mut upper = along(0);
+        for r in 0..PATCH {
+            let lower = along(r + 1);
+            for c in 0..PATCH {
+                let e = upper[c] * (1.0 - v) + lower[c] * v - template[r][c];
+                out.0[r][c] = gradients.0[r][c] * e;
+                out.1[r][c] = gradients.1[r][c] * e;
+            }
+            upper = lower;
+        }
+    }
 }
 
 #[cfg(test)]

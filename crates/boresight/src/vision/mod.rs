@@ -22,6 +22,7 @@ pub(crate) mod noise_level;
 pub(crate) mod pixel;
 mod polarity;
 pub mod probability;
+mod ranks;
 pub(crate) mod region;
 mod region_finder;
 mod runs;

@@ -64,6 +64,29 @@ pub(super) struct Planes<'a> {
     pub bits: u32,
 }
 
+/// Pixels of a row that are turned side by side.
+const BLOCK: usize = 64;
+
+/// A block of a row, chroma repeated for each pixel.
+struct Wide {
+    y: [u8; BLOCK],
+    u: [u8; BLOCK],
+    v: [u8; BLOCK],
+}
+
+widest! {
+    /// Converts a block of a row.
+    fn block_to_rgb(matrix: &Matrix, block: &Wide, out: &mut [[u8; 3]; BLOCK]) {
+        let [mut r, mut g, mut b] = [[0u8; BLOCK]; 3];
+        for i in 0..BLOCK {
+            [r[i], g[i], b[i]] = matrix.pixel(i32::from(block.y[i]), i32::from(block.u[i]), i32::from(block.v[i]));
+        }
+        for (i, p) in out.iter_mut().enumerate() {
+            *p = [r[i], g[i], b[i]];
+        }
+    }
+}
+
 /// Converts a picture to RGB; `false` if the planes are too short for its size.
 pub(super) fn to_rgb(planes: &Planes<'_>, matrix: &Matrix, out: &mut Vec<[u8; 3]>) -> bool {
     let Planes { width, height, y, u, v, shift, bits } = *planes;
@@ -93,10 +116,18 @@ pub(super) fn to_rgb(planes: &Planes<'_>, matrix: &Matrix, out: &mut Vec<[u8; 3]
             let chroma = |x: usize| (x >> shift.0).min(c_width - 1);
             out.extend((0..width).map(|x| matrix.pixel(down(luma, x), down(u, chroma(x)), down(v, chroma(x)))));
         } else if shift.0 == 1 {
-            let pairs =
-                luma.chunks(2).zip(u.iter().zip(v).chain(std::iter::repeat((&u[c_width - 1], &v[c_width - 1]))));
-            for (pair, (&u, &v)) in pairs {
-                out.extend(pair.iter().map(|&y| matrix.pixel(i32::from(y), i32::from(u), i32::from(v))));
+            let mut done = [[0; 3]; BLOCK];
+            for (k, luma) in luma.chunks(BLOCK).enumerate() {
+                let from = k * BLOCK / 2;
+                let mut wide = Wide { y: [0; BLOCK], u: [0; BLOCK], v: [0; BLOCK] };
+                wide.y[..luma.len()].copy_from_slice(luma);
+                for (to, plane) in [(&mut wide.u, u), (&mut wide.v, v)] {
+                    for (i, pair) in to.chunks_exact_mut(2).enumerate() {
+                        pair.fill(plane[(from + i).min(c_width - 1)]);
+                    }
+                }
+                block_to_rgb(matrix, &wide, &mut done);
+                out.extend_from_slice(&done[..luma.len()]);
             }
         } else {
             let chroma = |x: usize| (x >> shift.0).min(c_width - 1);

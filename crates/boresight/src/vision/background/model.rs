@@ -6,6 +6,7 @@
 //! with the time that has really passed.
 //! Symbols: m' = gain * m + offset, the mean under the light of this frame; r = v - m'.
 
+use super::super::ranks::Ranked;
 use super::super::spatial::SpatialPixel;
 
 /// What the comparison of one frame with the model needs.
@@ -37,7 +38,7 @@ pub struct Rates {
 }
 
 /// A pixel type with its model.
-pub trait BackgroundPixel: SpatialPixel {
+pub trait BackgroundPixel: SpatialPixel + Ranked {
     /// Mean and deviation.
     type Level: Copy + Default + Send + std::fmt::Debug + 'static;
     /// Mean absolute deviation that rounding alone gives, counts.

@@ -5,6 +5,7 @@
 //! Symbols: of a normal noise σ the median absolute deviation is 0.6745 σ, the mean absolute deviation 0.7979 σ.
 //! Limits: what covers a pixel in half of the frames is its background.
 
+use super::super::ranks::{LANES, Lanes, block};
 use super::model::BackgroundPixel;
 use crate::Image;
 
@@ -20,34 +21,89 @@ pub(super) fn learn<T: BackgroundPixel>(
     deviation: &mut Image<T::Level>,
 ) {
     let (w, h) = (mean.width(), mean.height());
-    let mut values = Vec::with_capacity(frames.len());
     let mut spreads = Image::filled(w, h, f32::NAN);
+    let mut medians = Medians::default();
     for y in 0..h {
-        let rows: Vec<&[T]> = frames.iter().map(|f| f.row(y)).collect();
         let (means, spreads) = (mean.row_mut(y), spreads.row_mut(y));
-        for x in 0..w {
-            values.clear();
-            values.extend(rows.iter().map(|r| r[x].to_f32()).filter(|v| v.is_finite()));
-            if values.is_empty() {
-                continue;
+        for x in (0..w).step_by(LANES) {
+            medians.of(frames, (x, y));
+            let values = medians.found.iter().zip(means[x..].iter_mut().zip(&mut spreads[x..]));
+            for ((median, spread), (mean, spread_here)) in values.filter(|v| !v.0.0.is_nan()) {
+                (*mean, *spread_here) = (T::level(*median), *spread);
             }
-            let middle = values.len() / 2;
-            let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-            values.iter_mut().for_each(|v| *v = (*v - median).abs());
-            means[x] = T::level(median);
-            spreads[x] = MEAN_PER_MEDIAN * *values.select_nth_unstable_by(middle, f32::total_cmp).1;
         }
     }
+    let (mut sums, mut counts) = (vec![0.0f32; w], vec![0.0f32; w]);
     for y in 0..h {
-        let rows = y.saturating_sub(reach)..(y + reach + 1).min(h);
-        for (x, deviation) in deviation.row_mut(y).iter_mut().enumerate() {
-            if spreads.row(y)[x].is_nan() {
+        sums.fill(0.0);
+        counts.fill(0.0);
+        for near in y.saturating_sub(reach)..(y + reach + 1).min(h) {
+            add_near(spreads.row(near), reach, &mut sums, &mut counts);
+        }
+        let own = spreads.row(y).iter().zip(sums.iter().zip(&counts));
+        for (deviation, (_, (sum, n))) in deviation.row_mut(y).iter_mut().zip(own).filter(|(_, own)| !own.0.is_nan()) {
+            *deviation = T::level(sum / n);
+        }
+    }
+}
+
+/// Adds to each column what is finite in the columns within `reach` of a row, and how many these are.
+fn add_near(row: &[f32], reach: usize, sums: &mut [f32], counts: &mut [f32]) {
+    for shift in 0..=2 * reach {
+        // Column x takes x + shift - reach.
+        let (to, from) = (reach.saturating_sub(shift), shift.saturating_sub(reach));
+        let columns = sums.iter_mut().zip(counts.iter_mut()).skip(to);
+        for ((sum, n), v) in columns.zip(row.iter().skip(from)) {
+            let there = !v.is_nan();
+            *sum += if there { *v } else { 0.0 };
+            *n += if there { 1.0 } else { 0.0 };
+        }
+    }
+}
+
+/// Medians over frames and the spread about them, of a block of columns.
+struct Medians<T> {
+    rows: Vec<Lanes<T>>,
+    values: Vec<f32>,
+    /// Median and spread of each column, counts; no number where no frame has one.
+    found: [(f32, f32); LANES],
+}
+
+impl<T> Default for Medians<T> {
+    fn default() -> Self {
+        Self { rows: Vec::new(), values: Vec::new(), found: [(f32::NAN, f32::NAN); LANES] }
+    }
+}
+
+impl<T: BackgroundPixel> Medians<T> {
+    /// Those of the columns from a pixel on.
+    fn of(&mut self, frames: &[&Image<T>], (x, y): (usize, usize)) {
+        self.found = [(f32::NAN, f32::NAN); LANES];
+        self.rows.clear();
+        self.rows.extend(frames.iter().map(|f| block(f.row(y), x)));
+        let middle = frames.len() / 2;
+        let [mut medians, mut spreads] = [[T::default(); LANES]; 2];
+        if T::rank(&self.rows, middle, &mut medians) {
+            for row in &mut self.rows {
+                row.iter_mut().zip(&medians).for_each(|(v, m)| *v = v.distance(*m));
+            }
+            if T::rank(&self.rows, middle, &mut spreads) {
+                for ((found, median), spread) in self.found.iter_mut().zip(medians).zip(spreads) {
+                    *found = (median.to_f32(), MEAN_PER_MEDIAN * spread.to_f32());
+                }
+                return;
+            }
+        }
+        for (i, found) in self.found.iter_mut().enumerate() {
+            self.values.clear();
+            self.values.extend(self.rows.iter().map(|r| r[i].to_f32()).filter(|v| v.is_finite()));
+            if self.values.is_empty() {
                 continue;
             }
-            let columns = x.saturating_sub(reach)..(x + reach + 1).min(w);
-            let near = rows.clone().flat_map(|y| &spreads.row(y)[columns.clone()]).filter(|v| !v.is_nan());
-            let (n, sum) = near.fold((0.0f32, 0.0f32), |(n, sum), v| (n + 1.0, sum + v));
-            *deviation = T::level(sum / n);
+            let middle = self.values.len() / 2;
+            let median = *self.values.select_nth_unstable_by(middle, f32::total_cmp).1;
+            self.values.iter_mut().for_each(|v| *v = (*v - median).abs());
+            *found = (median, MEAN_PER_MEDIAN * *self.values.select_nth_unstable_by(middle, f32::total_cmp).1);
         }
     }
 }

@@ -9,6 +9,7 @@
 //! 4. the window with the most of it (root of the area times saturation, less what the background has of the hue) wins,
 //!    if it was seen in at least 3 frames; the reference is the median of red, green and blue over its pieces.
 
+use super::super::ranks::{LANES, Ranked, block};
 use super::hsi::{Hsi, hsi};
 use crate::Image;
 
@@ -99,6 +100,9 @@ fn near(sector: usize, k: usize) -> bool {
 }
 
 fn grid(frame: &Image<[u8; 3]>, step: usize) -> Vec<[u8; 3]> {
+    if step == 1 {
+        return frame.as_slice().to_vec();
+    }
     let rows = (0..frame.height()).step_by(step);
     rows.flat_map(|y| frame.row(y).iter().step_by(step).copied()).collect()
 }
@@ -106,15 +110,19 @@ fn grid(frame: &Image<[u8; 3]>, step: usize) -> Vec<[u8; 3]> {
 /// The median of each pixel, channel by channel.
 fn median_of(frames: &[Vec<[u8; 3]>]) -> Option<Vec<[u8; 3]>> {
     let n = frames.first()?.len();
-    let mut values = vec![0u8; frames.len()];
-    let mut out = Vec::with_capacity(n);
-    for i in 0..n {
-        let mut median = [0; 3];
-        for (c, m) in median.iter_mut().enumerate() {
-            values.iter_mut().zip(frames).for_each(|(v, f)| *v = f[i][c]);
-            *m = *values.select_nth_unstable(frames.len() / 2).1;
+    let mut out = vec![[0; 3]; n];
+    let (mut rows, mut column) = (Vec::with_capacity(frames.len()), vec![0u8; frames.len()]);
+    for first in (0..3 * n).step_by(LANES) {
+        rows.clear();
+        rows.extend(frames.iter().map(|f| block(f.as_flattened(), first)));
+        let mut medians = [0; LANES];
+        if !u8::rank(&rows, frames.len() / 2, &mut medians) {
+            for (i, median) in medians.iter_mut().enumerate() {
+                column.iter_mut().zip(&rows).for_each(|(v, r)| *v = r[i]);
+                *median = *column.select_nth_unstable(frames.len() / 2).1;
+            }
         }
-        out.push(median);
+        out.as_flattened_mut()[first..].iter_mut().zip(medians).for_each(|(o, m)| *o = m);
     }
     Some(out)
 }

@@ -16,6 +16,6 @@ pub struct Mp4Options {
 
 impl Default for Mp4Options {
     fn default() -> Self {
-        Self { quantiser: 24, key_every: 60, expected_frames: None }
+        Self { quantiser: 26, key_every: 60, expected_frames: None }
     }
 }
