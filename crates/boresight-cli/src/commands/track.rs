@@ -262,7 +262,8 @@ fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> bore
     }
     if folder.makes("annotated.mp4") {
         let path = folder.path("annotated.mp4");
-        let video = AnnotatedVideo::create(path, DrawOptions::default(), Mp4Options::default())?;
+        let coded = Mp4Options { still_as_before: true, ..Mp4Options::default() };
+        let video = AnnotatedVideo::create(path, DrawOptions::default(), coded)?;
         sinks.push(match args.steady {
             true => Box::new(SteadyView::new(Box::new(video)).with_colours(colours(plan, input))),
             false => Box::new(video.with_colours(colours(plan, input))),

@@ -10,7 +10,7 @@ use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
-use super::{contest, initiation_score, lag, later_looks, noise, speed};
+use super::{contest, initiation_score, lag, later_looks, moving, noise, speed};
 use crate::camera::CameraPath;
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -64,6 +64,32 @@ pub fn learn<E: From<Error>>(
         assumed = longer.clone();
         pass = learn_on(again, at_once, frames, &mut longer, request)?;
         *choice = longer;
+    }
+    let least_px = choice.config.detector.cluster.min_area_px;
+    if let (ThresholdConfig::Moving(_), Some(least_px)) = (&choice.config.detector.threshold, least_px)
+        && least_px > moving::LEAST_PX
+    {
+        let mut smaller = assumed.clone();
+        smaller.config.detector.cluster.min_area_px = Some(moving::LEAST_PX);
+        let (mut all, mut at_once) = first_pass(frames, &smaller.config, request)?;
+        all.take_on(frames, &mut at_once, evidence::MOST_SCANS);
+        let evidence = Evidence::of_scans(all.scans(), area_px2);
+        if let Some((area_px, reason)) = moving::smaller(&evidence, pass.scans(), least_px) {
+            smaller.config.detector.cluster.min_area_px = Some(area_px);
+            smaller.reasons.push(reason);
+            let asked = smaller.config.detector.clone();
+            smaller.change(set)?;
+            // Who says which areas count gets those.
+            if smaller.config.detector == asked {
+                assumed = smaller.clone();
+                let begun = match area_px {
+                    moving::LEAST_PX => (all, at_once),
+                    _ => first_pass(frames, &smaller.config, request)?,
+                };
+                pass = learn_on(begun.0, begun.1, frames, &mut smaller, request)?;
+                *choice = smaller;
+            }
+        }
     }
     let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
     if let Some((polarity, reason)) = later {
@@ -258,133 +284,5 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::in_memory::InMemory;
-    use super::*;
-    use crate::vision::DetectorConfig;
-    use crate::vision::isolated::IsolatedConfig;
-    use crate::{Frame, FrameIndex, Image, PixelKind, Pixels, SourceInfo, Timestamp};
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    const SIZE: [usize; 2] = [160, 120];
-
-    /// 100 frames on which `draw` has drawn, and what describes them.
-    fn filmed(draw: impl Fn(u64, &mut Image<u8>)) -> (Vec<Frame>, SourceInfo) {
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let frames = (0..100u64)
-            .map(|k| {
-                let noise = (0..SIZE[0] * SIZE[1]).map(|_| 60 + rng.random_range(0..6u8)).collect();
-                let mut image = Image::from_vec(SIZE[0], SIZE[1], noise).unwrap();
-                draw(k, &mut image);
-                Frame {
-                    index: FrameIndex(k),
-                    time: Timestamp::from_secs_f64(0.04 * k as f64),
-                    pixels: Pixels::Gray8(image),
-                }
-            })
-            .collect();
-        let info = SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width: SIZE[0],
-            height: SIZE[1],
-            kind: PixelKind::Gray8,
-            n_frames: Some(100),
-            rate_hz: Some(25.0),
-            true_times: true,
-        };
-        (frames, info)
-    }
-
-    /// Draws a bright square of 4 px.
-    fn square(image: &mut Image<u8>, [x, y]: [f64; 2], value: u8) {
-        (0..4).for_each(|dy| image.row_mut(y as usize + dy)[x as usize..x as usize + 4].fill(value));
-    }
-
-    /// The choice that is learnt from, for isolated blobs of at least this score.
-    fn assumed(min_score: f64, report: Report) -> Choice {
-        let mut config = Config::default();
-        config.detector = DetectorConfig {
-            threshold: ThresholdConfig::Isolated(IsolatedConfig { min_score, ..IsolatedConfig::default() }),
-            ..DetectorConfig::default()
-        };
-        config.tracker.report = report;
-        Choice::alone(config, Vec::new())
-    }
-
-    /// What is reported of noise with bright squares at these places and speeds, px a frame.
-    fn reported(squares: &[([f64; 2], f64)]) -> (Report, Vec<String>) {
-        let (frames, info) = filmed(|k, image| {
-            squares.iter().for_each(|([x, y], speed)| square(image, [x + speed * k as f64, *y], 200));
-        });
-        let mut choice = assumed(IsolatedConfig::default().min_score, Report::Moving);
-        let mut frames = Replay::new(Box::new(InMemory(frames.into_iter(), info)), 100);
-        learn(&mut frames, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
-        (choice.config.tracker.report, choice.reasons)
-    }
-
-    #[test]
-    fn where_specks_are_left_out_the_scans_made_ahead_are_those_of_the_configuration_that_is_written() {
-        // Twelve bright squares, or so many that the frames of the choice tell what they reach, and forty faint specks that stay for eight frames each.
-        for columns in [4, 8] {
-            specks_are_left_out(columns);
-        }
-    }
-
-    fn specks_are_left_out(columns: u32) {
-        let (frames, info) = filmed(|k, image| {
-            (0..3 * columns).for_each(|i| {
-                let (column, row) = (f64::from(i % columns), f64::from(i / columns));
-                square(image, [8.0 + 144.0 / f64::from(columns) * column + 0.2 * k as f64, 10.0 + 40.0 * row], 200);
-            });
-            let mut specks = ChaCha8Rng::seed_from_u64(100 + k / 8);
-            for _ in 0..40 {
-                let place = [specks.random_range(4.0..150.0), specks.random_range(4.0..110.0)];
-                if place[1] as usize % 40 > 20 {
-                    square(image, place, 75 + specks.random_range(0..10));
-                }
-            }
-        });
-        let mut choice = assumed(2.5, Report::All);
-        choice.config.detector.camera = crate::camera::CameraConfig::Moving;
-        choice.config.tracker.min_initiation_score = 4.0;
-        let mut replay = Replay::new(Box::new(InMemory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
-        let mut learnt = learn(&mut replay, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
-        let ThresholdConfig::Isolated(isolated) = &choice.config.detector.threshold else { panic!("another detector") };
-        assert!(isolated.min_score > 2.5, "{:?}", choice.reasons);
-        let mut anew = crate::vision::build(&choice.config.detector, &info).unwrap();
-        for frame in &frames {
-            let [mut a, mut b] = [Scan::default(), Scan::default()];
-            learnt.detect(frame, &mut a).unwrap();
-            anew.detect(frame, &mut b).unwrap();
-            assert_eq!(format!("{a:?}"), format!("{b:?}"));
-        }
-    }
-
-    #[test]
-    fn the_camera_has_come_as_far_as_its_farthest_place() {
-        let shift = |x: f64| Some(crate::CameraMotion::exact_shift(nalgebra::Vector2::new(x, 0.0)));
-        let after = |steps: &[f64]| {
-            let scan = |(k, x): (usize, &f64)| {
-                Scan::at(FrameIndex(k as u64), Timestamp::default()).with_camera_motion(shift(*x))
-            };
-            farthest_px(&steps.iter().enumerate().map(scan).collect::<Vec<_>>())
-        };
-        assert_eq!(after(&[[2.0; 60], [-2.0; 60]].concat()), 120.0, "there and back is as far as there");
-        assert_eq!(after(&[1.0, -1.0].repeat(100)), 1.0, "a shake goes nowhere");
-        assert_eq!(after(&[]), 0.0);
-    }
-
-    #[test]
-    fn what_stands_is_reported_where_nothing_moves_and_only_there() {
-        let still = ([40.0, 40.0], 0.0);
-        let (report, reasons) = reported(&[still]);
-        assert_eq!(report, Report::All, "{reasons:?}");
-        assert!(reasons.iter().any(|r| r.contains("Nothing moves by itself")));
-        assert_eq!(reported(&[still, ([20.0, 80.0], 1.0)]).0, Report::Moving);
-        let many: Vec<([f64; 2], f64)> =
-            (0..8).map(|i| ([20.0 + 30.0 * f64::from(i % 4), 30.0 + 40.0 * f64::from(i / 4)], 0.0)).collect();
-        assert_eq!(reported(&many).0, Report::Moving, "eight things are a landscape");
-    }
-}
+#[path = "learn/tests.rs"]
+mod tests;

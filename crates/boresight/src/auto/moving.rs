@@ -1,7 +1,10 @@
 //! Things that move before a fixed camera: people, cars, animals; detector and tracker from the size of what moves.
 
+use super::chains::Chain;
 use super::digits::round;
+use super::evidence::Evidence;
 use super::scene::{Camera, Scene};
+use super::sightings::Sighting;
 use crate::camera::CameraConfig;
 use crate::track::{
     ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, Report, TrackerConfig,
@@ -9,7 +12,7 @@ use crate::track::{
 use crate::vision::background::{BackgroundConfig, ShadowConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
-use crate::{Config, Frame, Result, SourceInfo};
+use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};
 
 /// Share of the frames in which something must move.
 const SHARE_OF_FRAMES: f64 = 0.2;
@@ -28,6 +31,12 @@ const MOST_REGIONS: f64 = 40.0;
 const MOST_EXPLAINED: f64 = 0.5;
 /// Parts of one thing lie nearer than this share of its shorter side. Chosen on vtest.avi, where people walk side by side: IDF1 85.9 % with 0.15, 80.3 % with 0.2.
 const PARTS_APART: f64 = 0.15;
+/// Regions count from this share of the area on that half of what moves has, or more: what is smaller is parts and flicker.
+const SHARE_OF_AREA: f64 = 0.35;
+/// And from this area on, px: three by three, the least that a clean-up by majority leaves whole.
+pub(super) const LEAST_PX: u32 = 9;
+/// Share of its detections in which a smaller thing may be as large as those that count: two things that overlap are one region.
+const NOW_AND_THEN: f64 = 0.05;
 /// Fewer frames than this show no background.
 const LEAST_FRAMES: usize = 12;
 
@@ -72,7 +81,7 @@ pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut 
         scene.regions,
         100.0 * explained
     ));
-    let least = round((0.35 * scene.area_px).max(9.0)) as u32;
+    let least = least_area(scene.area_px);
     // Measured on vtest.avi: dark clothes are darker than 0.6 of the ground, shadows are not.
     let background = BackgroundConfig {
         threshold_sd: 6.0,
@@ -100,6 +109,54 @@ pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut 
     ));
 }
 
+/// Regions count from this area on where half of what moves has at least so much, px.
+fn least_area(area_px: f64) -> u32 {
+    round((SHARE_OF_AREA * area_px).max(f64::from(LEAST_PX))) as u32
+}
+
+/// The area from which on regions count, px, with the reason, where smaller ones than `least_px` surely move by themselves: chains of `all` in most of whose scans something of that area or
+/// more, as `shown` has it, is elsewhere. A thing that is now and then as large as those that count is of their kind.
+pub(super) fn smaller(all: &Evidence, shown: &[Scan], least_px: u32) -> Option<(u32, String)> {
+    let area_px = |hit: &(usize, Sighting)| hit.1.side_px * hit.1.thickness_px;
+    let counts = |hit: &&(usize, Sighting)| area_px(hit) >= f64::from(least_px);
+    let is_small = |c: &Chain| c.hits.iter().filter(counts).count() as f64 <= NOW_AND_THEN * c.hits.len() as f64;
+    let counted = all.sure().filter(|c| is_small(c) && has_left_its_place(c) && is_beside(c, &all.times_s, shown));
+    let beside: Vec<&Chain> = counted.collect();
+    let mut areas: Vec<f64> = beside.iter().flat_map(|c| &c.hits).map(area_px).collect();
+    areas.sort_by(f64::total_cmp);
+    let median = *areas.get(areas.len() / 2)?;
+    let area_px = least_area(median);
+    (area_px < least_px).then(|| {
+        let one = beside.len() == 1;
+        let words = format!(
+            "Beside these {} smaller thing{} surely move{}, of {median:.0} px in the median: regions of {area_px} px or more count.",
+            beside.len(),
+            if one { "" } else { "s" },
+            if one { "s" } else { "" },
+        );
+        (area_px, words)
+    })
+}
+
+/// Whether a chain came farther than the longest side it had: what a background has wrongly learnt shrinks and changes its outline where it is.
+fn has_left_its_place(chain: &Chain) -> bool {
+    let longest_px = chain.hits.iter().map(|h| h.1.side_px).fold(0.0, f64::max);
+    chain.hits.first().is_some_and(|(_, first)| chain.hits.iter().any(|(_, h)| (h.at - first.at).norm() > longest_px))
+}
+
+/// Whether something is elsewhere, and nothing near, in most of a chain's scans.
+fn is_beside(chain: &Chain, times_s: &[f64], shown: &[Scan]) -> bool {
+    let elsewhere = |(k, hit): &&(usize, Sighting)| {
+        let time_s = |s: &Scan| s.time.ns as f64 * 1e-9;
+        let at = shown.partition_point(|s| time_s(s) < times_s[*k]);
+        let seen = shown.get(at).filter(|s| time_s(s) == times_s[*k]).map_or(&[][..], |s| &s.detections);
+        let side_px = |d: &Detection| d.extent.width_px.max(d.extent.height_px);
+        let touches = |d: &Detection| (d.position - hit.at).norm() <= side_px(d) + hit.side_px + 2.0;
+        !seen.is_empty() && !seen.iter().any(touches)
+    };
+    2 * chain.hits.iter().filter(elsewhere).count() > chain.hits.len()
+}
+
 /// The tracker for things whose outline changes: the noise grows with their size.
 pub(super) fn tracker(side_px: f64, info: &SourceInfo, tracker: &mut TrackerConfig) {
     *tracker = TrackerConfig::default();
@@ -121,7 +178,8 @@ pub(super) fn tracker(side_px: f64, info: &SourceInfo, tracker: &mut TrackerConf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PixelKind;
+    use crate::{Extent, FrameIndex, PixelKind, Timestamp};
+    use nalgebra::{Matrix2, Vector2};
 
     #[test]
     fn what_is_wider_than_half_of_the_frame_is_the_ground() {
@@ -143,5 +201,38 @@ mod tests {
         };
         assert!(fits([100.0, 250.0]), "people who stand near");
         assert!(!fits([424.0, 88.0]) && !fits([100.0, 400.0]));
+    }
+
+    /// What is said of smaller things where regions of 60 px or more count: a box of 20 x 20 px goes to the right, and one of `size` px, half of both filled, goes from `from` by `step` px a
+    /// frame; in every `n_large`-th frame it has 100 px.
+    fn said(from: [f64; 2], step: [f64; 2], size: f64, n_large: u64) -> Option<(u32, String)> {
+        let region = |at: Vector2<f64>, side: f64, area_px: u32| {
+            let extent = Extent::around(at, side, side);
+            Detection::at(at, Matrix2::identity() * 0.01).with_extent(extent).with_area_px(area_px)
+        };
+        let scans = |least_px: u32| -> Vec<Scan> {
+            let scan = |k: u64| {
+                let t = k as f64;
+                let small = Vector2::new(from[0] + step[0] * t, from[1] + step[1] * t);
+                let area_px = if k % n_large == n_large - 1 { 100 } else { (0.5 * size * size) as u32 };
+                let mut all = vec![region(Vector2::new(30.0 + 2.0 * t, 40.0), 20.0, 200), region(small, size, area_px)];
+                all.retain(|d| d.area_px >= least_px);
+                Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * t)).with_detections(all)
+            };
+            (0..60).map(scan).collect()
+        };
+        smaller(&Evidence::of_scans(&scans(LEAST_PX), 320.0 * 240.0), &scans(60), 60)
+    }
+
+    #[test]
+    fn a_smaller_thing_that_goes_its_own_way_counts_and_parts_ghosts_and_those_of_the_same_kind_do_not() {
+        let never = u64::MAX;
+        let (area_px, reason) = said([200.0, 180.0], [-1.5, 0.5], 6.0, never).expect("goes its own way");
+        // A third of its 18 px is less than can be told from noise.
+        assert!(area_px == LEAST_PX && reason.contains("1 smaller thing surely moves, of 18 px"), "{reason}");
+        assert_eq!(said([200.0, 180.0], [-1.5, 0.5], 9.0, never).map(|s| s.0), Some(14), "a third of 40 px");
+        assert_eq!(said([42.0, 52.0], [2.0, 0.0], 6.0, never), None, "a part goes with its thing");
+        assert_eq!(said([200.0, 180.0], [0.02, 0.0], 6.0, never), None, "a ghost stays where it is");
+        assert_eq!(said([200.0, 180.0], [-1.5, 0.5], 9.0, 4), None, "now and then it is as large as those that count");
     }
 }

@@ -136,7 +136,7 @@ mod tests {
             let of_u8: Vec<Lanes<u8>> = bytes.iter().map(|r| block(r, 0)).collect();
             prop_assert_eq!(f32::rank(&blocks, rank, &mut of_floats), u8::rank(&of_u8, rank, &mut of_bytes));
             prop_assert_eq!(of_floats, of_bytes.map(f32::from));
-            let wide: Vec<Vec<u16>> = bytes.iter().map(|r| r.iter().map(|v| u16::from(*v) * 257 ^ 0x0f0f).collect()).collect();
+            let wide: Vec<Vec<u16>> = bytes.iter().map(|r| r.iter().map(|v| (u16::from(*v) * 257) ^ 0x0f0f).collect()).collect();
             check(&wide, rank);
         }
     }

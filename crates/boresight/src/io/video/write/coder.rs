@@ -144,8 +144,7 @@ impl H264Coder {
             .complexity(Complexity::Low)
             .scene_change_detect(false)
             .adaptive_quantization(false)
-            // What stands still is not searched again: a third less time where the camera stands.
-            .background_detection(true)
+            .background_detection(self.options.still_as_before)
             .intra_frame_period(IntraFramePeriod::from_num_frames(self.options.key_every.max(1)))
             .vui(VuiConfig::bt709().full_range(is_gray));
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config)

@@ -10,12 +10,14 @@ pub struct Mp4Options {
     pub quantiser: u8,
     /// Frames between two from which decoding can start.
     pub key_every: u32,
+    /// Takes what stands still as it was in the frame before, whatever is left between the two: a third less time before a fixed camera. For videos to be looked at, not measured.
+    pub still_as_before: bool,
     /// Number of frames, if known: their table is then put in front, so that players can start before all is loaded.
     pub expected_frames: Option<u64>,
 }
 
 impl Default for Mp4Options {
     fn default() -> Self {
-        Self { quantiser: 26, key_every: 60, expected_frames: None }
+        Self { quantiser: 26, key_every: 60, still_as_before: false, expected_frames: None }
     }
 }
