@@ -5,6 +5,7 @@
 //! coordinates of the first scan's background and tracks back into the image's.
 
 mod course;
+mod cover;
 mod estimate;
 mod find_patch;
 mod fine;
