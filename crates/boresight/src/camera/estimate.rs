@@ -4,7 +4,7 @@
 //! How: the frame is made small ([`super::reduce`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
-//! is chosen by what they say ([`super::plane`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]).
+//! is chosen by what they say ([`super::plane`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]), and its covariance is that of residuals left out of the fit ([`super::plane_cov`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
 //! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
@@ -21,6 +21,7 @@ use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
+use super::plane_cov::plane_cov;
 use super::reduce::{factor, reduce};
 use super::rest::{Rest, STILL, moves};
 use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
@@ -286,7 +287,7 @@ impl CameraMotionEstimator {
         }
         Some(Found {
             now_from_key: scaled(&plane.to_from, scales.fine, scales.factor),
-            cov: scaled_cov(&plane.cov, 1.0 / scale),
+            cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle, !self.known)?, 1.0 / scale),
             turned: plane.n_numbers > 2,
             covers: true,
             n_coarse: 0,
