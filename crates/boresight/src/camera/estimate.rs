@@ -4,7 +4,7 @@
 //! How: the frame is made small ([`super::reduce`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
-//! is chosen by what they say ([`super::plane`]).
+//! is chosen by what they say ([`super::plane`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]), and its covariance is that of residuals left out of the fit ([`super::plane_cov`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
 //! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
@@ -13,6 +13,7 @@
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
 use super::course::Course;
+use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, Vote, find, find_near, vote};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
@@ -20,6 +21,7 @@ use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
+use super::plane_cov::plane_cov;
 use super::reduce::{factor, reduce};
 use super::rest::{Rest, STILL, moves};
 use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
@@ -49,11 +51,9 @@ const KEY_TURN: f64 = 0.25;
 const MOST_HELD: u32 = 12;
 /// Frames, one after the other, in which the key frame is not found, before the last frame takes its place: a fifth of a second at 25 frames/s. Noise hides it for a frame or two.
 const WAIT_FRAMES: u32 = 5;
-/// Share of the image's cells that the background shows in, at least: a target that covers a third of the image shows in more than half of them, for it touches cells that it does not
-/// fill. Where it shows in fewer, as below a sky, a first motion is believed once it was found in so many frames one after the other.
-const LEAST_COVER: f64 = 0.6;
-/// Where this share agrees the others are not asked.
+/// Share of the image's cells from which on the others are not asked.
 const CLEAR_COVER: f64 = 0.75;
+/// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other.
 const UNSURE_FRAMES: u32 = 3;
 /// Share of the key frame's patches that must lie where they lay, so that the others are not looked for. Chosen: a target may hide a fourth.
 const AT_REST: f64 = 0.75;
@@ -70,6 +70,7 @@ pub struct CameraMotionEstimator {
     key: KeyFrame,
     fine: FinePatches,
     wide: Wide,
+    cover: Cover,
     view: OtherView,
     /// The last frame: where the key frame is not found it takes its place.
     last: KeyFrame,
@@ -230,7 +231,6 @@ impl CameraMotionEstimator {
         let agrees = |m: &&Match| (start.apply(m.from) - m.to).norm() <= agree_px;
         let n_agree = self.matches.iter().filter(agrees).count();
         let n_cells = CELLS.0 * CELLS.1;
-        let mut covers = true;
         if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
             let (mut n_for, mut n_against) = (0, 0);
             for p in key.patches.iter().chain(&key.weak) {
@@ -245,10 +245,9 @@ impl CameraMotionEstimator {
             if n_against >= MIN_PATCHES && n_against > n_for {
                 return None;
             }
-            covers = n_for.max(n_agree) as f64 >= LEAST_COVER * n_cells as f64;
         }
-        let found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
-            Some(fine) => Found { covers, n_coarse, ..fine },
+        let mut found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
+            Some(fine) => Found { n_coarse, ..fine },
             // Nothing else speaks for it.
             None => Found { covers: false, n_coarse, ..coarse },
         };
@@ -257,6 +256,9 @@ impl CameraMotionEstimator {
         if key.even && !key.proven && !moved {
             return None;
         }
+        // Nothing but the frames themselves speaks for a first motion.
+        found.covers =
+            found.covers && (self.known || self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE);
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
             std::mem::swap(&mut self.key, &mut self.last);
@@ -285,7 +287,7 @@ impl CameraMotionEstimator {
         }
         Some(Found {
             now_from_key: scaled(&plane.to_from, scales.fine, scales.factor),
-            cov: scaled_cov(&plane.cov, 1.0 / scale),
+            cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle, !self.known)?, 1.0 / scale),
             turned: plane.n_numbers > 2,
             covers: true,
             n_coarse: 0,

@@ -175,7 +175,7 @@ widest! {
 }
 
 /// The patch as it should look now; `None` if that needs pixels outside the key frame.
-fn template(key: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Block> {
+pub(super) fn template(key: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Block> {
     let mut out = [[0.0; PATCH]; PATCH];
     if predicted.is_shift() {
         for (r, line) in out.iter_mut().enumerate() {

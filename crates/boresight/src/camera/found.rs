@@ -13,7 +13,7 @@ pub(super) struct Found {
     pub now_from_key: Homography,
     pub cov: MotionCov,
     pub turned: bool,
-    /// Whether it shows in enough of the image to be the background's beyond doubt.
+    /// Whether it is the background's beyond doubt: where nothing was known before, it must explain most of the image.
     pub covers: bool,
     /// Patches of the reduced frame that were found.
     pub n_coarse: usize,

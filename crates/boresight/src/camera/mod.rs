@@ -5,6 +5,7 @@
 //! coordinates of the first scan's background and tracks back into the image's.
 
 mod course;
+mod cover;
 mod estimate;
 mod find_patch;
 mod fine;
@@ -12,9 +13,11 @@ mod fit;
 mod follow_plane;
 mod found;
 mod key_frame;
+mod mixed;
 mod motion;
 mod other_view;
 mod plane;
+mod plane_cov;
 mod reduce;
 mod register;
 mod rest;
