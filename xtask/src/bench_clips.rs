@@ -20,8 +20,8 @@ pub struct Clip {
     pub given: &'static [&'static str],
 }
 
-/// Quantiser of the simulated videos: at 1080p some 10 Mbit/s, as the comparison with peers has it.
-const QUANTISER: u8 = 32;
+/// Quantiser of the simulated videos: 50 spots at 1080p are some 5 Mbit/s.
+const QUANTISER: u8 = 26;
 
 /// The clips, the simulated ones of `frames` frames.
 pub fn clips(folder: &Path, frames: u64) -> Result<Vec<Clip>> {

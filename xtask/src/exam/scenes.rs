@@ -22,9 +22,9 @@ const SIZE_PX: [usize; 2] = [320, 240];
 /// Two standard deviations of a spot: what counts as near.
 const NEAR_PX: f64 = 3.0;
 const SEEDS: [u64; 2] = [1, 2];
-/// The kind that an encoder has seen, and its quantiser: some 5 Mbit/s.
+/// The kind that an encoder has seen, and its quantiser: some 2.4 Mbit/s.
 const COMPRESSED: &str = "simulated: 50 spots, 720p, H.264";
-const QUANTISER: u8 = 32;
+const QUANTISER: u8 = 26;
 
 /// Kind, pan (px a frame), shake (px), turn (degrees a frame), growth (share a frame).
 const CAMERAS: [(&str, [f64; 2], f64, f64, f64); 11] = [
