@@ -3,8 +3,7 @@
 //! Each aim is one figure of some kinds of clips; where an aim says "each", it is that of the worst clip.
 
 use super::clips::Clip;
-use super::mean;
-use super::score::Score;
+use super::score::{Score, mean};
 use std::fmt::Write as _;
 
 type Done<'a> = &'a (Clip, char, Score);

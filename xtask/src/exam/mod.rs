@@ -16,7 +16,7 @@ mod variants;
 
 use anyhow::{Result, ensure};
 use clips::{Clip, is_wanted};
-use score::{Score, score};
+use score::{Score, mean, score};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -88,14 +88,6 @@ fn row(clip: &Clip, half: char, s: &Score) -> String {
         s.nis,
         s.ms_a_frame
     )
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut n) = (0.0, 0u32);
-    for v in values.filter(|v| v.is_finite()) {
-        (sum, n) = (sum + v, n + 1);
-    }
-    (n > 0).then(|| sum / f64::from(n))
 }
 
 /// The means of a half of a kind; targets of low contrast are left out of what is held.

@@ -42,6 +42,15 @@ impl Sink for Collect {
     }
 }
 
+/// Mean of what is finite.
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut n) = (0.0, 0u32);
+    for v in values.filter(|v| v.is_finite()) {
+        (sum, n) = (sum + v, n + 1);
+    }
+    (n > 0).then(|| sum / f64::from(n))
+}
+
 /// The figures of a clip.
 pub struct Score {
     /// Share of the truth's rows with a reported track near.

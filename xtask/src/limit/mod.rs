@@ -87,6 +87,7 @@ pub fn run(args: &Args) -> Result<()> {
         camera::table(args.pairs, &data, args.python.as_deref(), args.wrong, p)
     })?;
     if args.only.is_empty() {
+        page.push_str(concat!("\n", include_str!("pictures.txt")));
         let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");
         std::fs::write(docs.join("limit.md"), page)?;
         std::fs::write(docs.join("images/limit.svg"), curve::svg(&curves))?;

@@ -1,3 +1,5 @@
+//! Tests of the first pass, on drawn frames.
+
 use super::super::in_memory::InMemory;
 use super::*;
 use crate::vision::DetectorConfig;
