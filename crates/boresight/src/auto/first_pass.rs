@@ -44,6 +44,18 @@ impl FirstPass {
         }
     }
 
+    /// Leaves out regions smaller than this, ahead and from now on, as a detector would whose configuration says so and keeps `most` detections a frame; `false`, and nothing done, where it might
+    /// have found others.
+    pub fn leave_out_below(&mut self, area_px: u32, most: Option<u32>) -> bool {
+        // Of a full scan some were left out for those that go now.
+        let is_full = |s: &Scan| most.is_some_and(|most| s.detections.len() >= most as usize);
+        if self.scans.iter().any(is_full) || !self.detector.leave_out_below(area_px) {
+            return false;
+        }
+        self.scans.iter_mut().for_each(|s| s.detections.retain(|d| d.area_px >= area_px));
+        true
+    }
+
     /// The scans made ahead.
     pub fn scans(&mut self) -> &[Scan] {
         self.scans.make_contiguous()

@@ -11,12 +11,12 @@ use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
 use super::{contest, initiation_score, lag, later_looks, moving, noise, speed};
-use crate::camera::CameraPath;
+use crate::camera::{CameraConfig, CameraPath};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
 use crate::vision::steadied::SteadiedConfig;
 use crate::vision::threshold::ThresholdConfig;
-use crate::vision::{AtOnce, Detector};
+use crate::vision::{AtOnce, Detector, DetectorConfig};
 use crate::{Config, Error, FrameSource, Result, Scan};
 
 /// Things that stand still and are reported where nothing moves, a frame at most: as many as one looks at one by one.
@@ -36,8 +36,12 @@ pub fn learn<E: From<Error>>(
 ) -> Result<Box<dyn Detector>, E> {
     let set = |c: &mut Choice| set(std::mem::take(&mut c.config)).map(|config| c.config = config);
     choice.change(set)?;
+    let begun = with_smaller(frames, choice, request, set)?;
     let mut assumed = choice.clone();
-    let mut pass = learn_set(frames, choice, request)?;
+    let mut pass = match begun {
+        Some((pass, at_once)) => learn_on(pass, at_once, frames, choice, request)?,
+        None => learn_set(frames, choice, request)?,
+    };
     let info = frames.info().clone();
     let size_px = [info.width as f64, info.height as f64];
     let area_px2 = size_px[0] * size_px[1];
@@ -49,10 +53,7 @@ pub fn learn<E: From<Error>>(
             steadied.lag_s = longer_s;
         }
         longer.reasons.push(reason);
-        let asked = longer.config.detector.clone();
-        longer.change(set)?;
-        // Who says which lag gets that one.
-        if longer.config.detector != asked {
+        if !stands(&mut longer, set)? {
             break;
         }
         let (mut again, mut at_once) = first_pass(frames, &longer.config, request)?;
@@ -65,32 +66,6 @@ pub fn learn<E: From<Error>>(
         pass = learn_on(again, at_once, frames, &mut longer, request)?;
         *choice = longer;
     }
-    let least_px = choice.config.detector.cluster.min_area_px;
-    if let (ThresholdConfig::Moving(_), Some(least_px)) = (&choice.config.detector.threshold, least_px)
-        && least_px > moving::LEAST_PX
-    {
-        let mut smaller = assumed.clone();
-        smaller.config.detector.cluster.min_area_px = Some(moving::LEAST_PX);
-        let (mut all, mut at_once) = first_pass(frames, &smaller.config, request)?;
-        all.take_on(frames, &mut at_once, evidence::MOST_SCANS);
-        let evidence = Evidence::of_scans(all.scans(), area_px2);
-        if let Some((area_px, reason)) = moving::smaller(&evidence, pass.scans(), least_px) {
-            smaller.config.detector.cluster.min_area_px = Some(area_px);
-            smaller.reasons.push(reason);
-            let asked = smaller.config.detector.clone();
-            smaller.change(set)?;
-            // Who says which areas count gets those.
-            if smaller.config.detector == asked {
-                assumed = smaller.clone();
-                let begun = match area_px {
-                    moving::LEAST_PX => (all, at_once),
-                    _ => first_pass(frames, &smaller.config, request)?,
-                };
-                pass = learn_on(begun.0, begun.1, frames, &mut smaller, request)?;
-                *choice = smaller;
-            }
-        }
-    }
     let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
     if let Some((polarity, reason)) = later {
         let mut wider = assumed;
@@ -98,16 +73,50 @@ pub fn learn<E: From<Error>>(
             isolated.polarity = polarity;
         }
         wider.reasons.push(reason);
-        let asked = wider.config.detector.clone();
-        wider.change(set)?;
-        // Who says which polarity gets that one.
-        if wider.config.detector == asked {
+        if stands(&mut wider, set)? {
             pass = learn_set(frames, &mut wider, request)?;
             *choice = wider;
         }
     }
     choice.change(set)?;
     Ok(Box::new(pass))
+}
+
+/// Changes a choice by what is set; whether its detector stays as it is: who says which one gets that.
+fn stands<E>(choice: &mut Choice, set: impl FnMut(&mut Choice) -> Result<(), E>) -> Result<bool, E> {
+    let asked = choice.config.detector.clone();
+    choice.change(set)?;
+    Ok(choice.config.detector == asked)
+}
+
+/// Lets smaller regions count where such move by themselves before a fixed camera, and returns the first pass that has begun with the area chosen; none where nothing was looked for, or where it
+/// must be made anew.
+fn with_smaller<E: From<Error>>(
+    frames: &mut Replay,
+    choice: &mut Choice,
+    request: &Request,
+    set: impl FnMut(&mut Choice) -> Result<(), E>,
+) -> Result<Option<(FirstPass, AtOnce)>, E> {
+    let mut every = choice.config.clone();
+    let DetectorConfig { threshold, cluster, camera, max_detections, .. } = &mut every.detector;
+    let (ThresholdConfig::Moving(_), CameraConfig::Fixed) = (threshold, camera) else { return Ok(None) };
+    let Some(least_px) = cluster.min_area_px.filter(|a| *a > moving::LEAST_PX) else { return Ok(None) };
+    let most = *max_detections;
+    cluster.min_area_px = Some(moving::LEAST_PX);
+    let (mut pass, mut at_once) = first_pass(frames, &every, request)?;
+    pass.take_on(frames, &mut at_once, evidence::MOST_SCANS);
+    let info = frames.info();
+    let evidence = Evidence::of_scans(pass.scans(), (info.width * info.height) as f64);
+    let mut kept_px = least_px;
+    if let Some((area_px, reason)) = moving::smaller(&evidence, pass.scans(), least_px) {
+        let mut smaller = choice.clone();
+        smaller.config.detector.cluster.min_area_px = Some(area_px);
+        smaller.reasons.push(reason);
+        if stands(&mut smaller, set)? {
+            (*choice, kept_px) = (smaller, area_px);
+        }
+    }
+    Ok(pass.leave_out_below(kept_px, most).then_some((pass, at_once)))
 }
 
 /// As [`learn`], where what is set is in the configuration.

@@ -114,14 +114,15 @@ fn least_area(area_px: f64) -> u32 {
     round((SHARE_OF_AREA * area_px).max(f64::from(LEAST_PX))) as u32
 }
 
-/// The area from which on regions count, px, with the reason, where smaller ones than `least_px` surely move by themselves: chains of `all` in most of whose scans something of that area or
-/// more, as `shown` has it, is elsewhere. A thing that is now and then as large as those that count is of their kind.
-pub(super) fn smaller(all: &Evidence, shown: &[Scan], least_px: u32) -> Option<(u32, String)> {
+/// The area from which on regions count, px, with the reason, where smaller ones than `least_px` surely move by themselves: chains of `evidence` in most of whose `scans` something of that area
+/// or more is elsewhere. A thing that is now and then as large as those that count is of their kind.
+pub(super) fn smaller(evidence: &Evidence, scans: &[Scan], least_px: u32) -> Option<(u32, String)> {
     let area_px = |hit: &(usize, Sighting)| hit.1.side_px * hit.1.thickness_px;
     let counts = |hit: &&(usize, Sighting)| area_px(hit) >= f64::from(least_px);
     let is_small = |c: &Chain| c.hits.iter().filter(counts).count() as f64 <= NOW_AND_THEN * c.hits.len() as f64;
-    let counted = all.sure().filter(|c| is_small(c) && has_left_its_place(c) && is_beside(c, &all.times_s, shown));
-    let beside: Vec<&Chain> = counted.collect();
+    let is_elsewhere = |c: &Chain| is_beside(c, &evidence.times_s, scans, least_px);
+    let beside: Vec<&Chain> =
+        evidence.sure().filter(|c| is_small(c) && has_left_its_place(c) && is_elsewhere(c)).collect();
     let mut areas: Vec<f64> = beside.iter().flat_map(|c| &c.hits).map(area_px).collect();
     areas.sort_by(f64::total_cmp);
     let median = *areas.get(areas.len() / 2)?;
@@ -129,7 +130,7 @@ pub(super) fn smaller(all: &Evidence, shown: &[Scan], least_px: u32) -> Option<(
     (area_px < least_px).then(|| {
         let one = beside.len() == 1;
         let words = format!(
-            "Beside these {} smaller thing{} surely move{}, of {median:.0} px in the median: regions of {area_px} px or more count.",
+            "Besides, {} smaller thing{} surely move{}, of {median:.0} px in the median: regions of {area_px} px or more count, not of {least_px}.",
             beside.len(),
             if one { "" } else { "s" },
             if one { "s" } else { "" },
@@ -144,15 +145,16 @@ fn has_left_its_place(chain: &Chain) -> bool {
     chain.hits.first().is_some_and(|(_, first)| chain.hits.iter().any(|(_, h)| (h.at - first.at).norm() > longest_px))
 }
 
-/// Whether something is elsewhere, and nothing near, in most of a chain's scans.
-fn is_beside(chain: &Chain, times_s: &[f64], shown: &[Scan]) -> bool {
+/// Whether something of that area or more is elsewhere, and nothing such near, in most of a chain's scans.
+fn is_beside(chain: &Chain, times_s: &[f64], scans: &[Scan], least_px: u32) -> bool {
     let elsewhere = |(k, hit): &&(usize, Sighting)| {
         let time_s = |s: &Scan| s.time.ns as f64 * 1e-9;
-        let at = shown.partition_point(|s| time_s(s) < times_s[*k]);
-        let seen = shown.get(at).filter(|s| time_s(s) == times_s[*k]).map_or(&[][..], |s| &s.detections);
+        let at = scans.partition_point(|s| time_s(s) < times_s[*k]);
+        let mut large =
+            scans.get(at).into_iter().flat_map(|s| &s.detections).filter(|d| d.area_px >= least_px).peekable();
         let side_px = |d: &Detection| d.extent.width_px.max(d.extent.height_px);
         let touches = |d: &Detection| (d.position - hit.at).norm() <= side_px(d) + hit.side_px + 2.0;
-        !seen.is_empty() && !seen.iter().any(touches)
+        large.peek().is_some() && !large.any(touches)
     };
     2 * chain.hits.iter().filter(elsewhere).count() > chain.hits.len()
 }
@@ -210,18 +212,17 @@ mod tests {
             let extent = Extent::around(at, side, side);
             Detection::at(at, Matrix2::identity() * 0.01).with_extent(extent).with_area_px(area_px)
         };
-        let scans = |least_px: u32| -> Vec<Scan> {
+        let scans: Vec<Scan> = {
             let scan = |k: u64| {
                 let t = k as f64;
                 let small = Vector2::new(from[0] + step[0] * t, from[1] + step[1] * t);
                 let area_px = if k % n_large == n_large - 1 { 100 } else { (0.5 * size * size) as u32 };
-                let mut all = vec![region(Vector2::new(30.0 + 2.0 * t, 40.0), 20.0, 200), region(small, size, area_px)];
-                all.retain(|d| d.area_px >= least_px);
+                let all = vec![region(Vector2::new(30.0 + 2.0 * t, 40.0), 20.0, 200), region(small, size, area_px)];
                 Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * t)).with_detections(all)
             };
             (0..60).map(scan).collect()
         };
-        smaller(&Evidence::of_scans(&scans(LEAST_PX), 320.0 * 240.0), &scans(60), 60)
+        smaller(&Evidence::of_scans(&scans, 320.0 * 240.0), &scans, 60)
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //! Symbols: rest, the part of a pixel between the whole place that the search is laid around and the motion's. Units: reduced px.
 //! Limits: tiles whose search leaves the image are not asked; a motion less than half a pixel off is not told from the true one; a ground without any texture is not seen to stand still.
 
-use super::find_patch::template;
+use super::find_patch::{Block, row_of_differences, template};
 use super::key_frame::{PATCH, Patch};
 use crate::{Homography, Image};
 use nalgebra::Vector2;
@@ -116,20 +116,10 @@ fn lay(key: &Image<f32>, now: &Image<f32>, patch: Patch, motion: &Homography) ->
 }
 
 widest! {
-    /// Sums of absolute differences with the template's first pixel in each row and column of the search: those of a row are added up side by side.
-    fn differences(template: &[[f32; PATCH]; PATCH], now: &Image<f32>, first: (usize, usize), out: &mut Sums) {
+    /// Sums of absolute differences with the template's first pixel in each row and column of the search.
+    fn differences(template: &Block, now: &Image<f32>, first: (usize, usize), out: &mut Sums) {
         for (i, sums) in out.iter_mut().enumerate() {
-            let mut row = [0.0f32; LANES];
-            for (r, line) in template.iter().enumerate() {
-                let pixels = &now.row(first.1 + i + r)[first.0..];
-                for (c, t) in line.iter().enumerate() {
-                    let Some(beside) = pixels[c..].first_chunk::<LANES>() else { continue };
-                    for (sum, p) in row.iter_mut().zip(beside) {
-                        *sum += (t - p).abs();
-                    }
-                }
-            }
-            *sums = row;
+            *sums = row_of_differences(template, (first.1 + i..).map(|y| &now.row(y)[first.0..]));
         }
     }
 }

@@ -157,21 +157,30 @@ fn window(now: &Image<f32>, (left, top): (i64, i64)) -> Window {
 }
 
 widest! {
-    /// Sums of absolute differences with the template's first pixel in each row and column of the search: those of a row are added up side by side.
+    /// Sums of absolute differences with the template's first pixel in each row and column of the search.
     fn differences(template: &Block, window: &Window, out: &mut [[f32; LANES]; SIDE]) {
         for (i, sums) in out.iter_mut().enumerate() {
-            let mut row = [0.0f32; LANES];
-            for (line, pixels) in template.iter().zip(&window[i..]) {
-                for (c, t) in line.iter().enumerate() {
-                    let Some(beside) = pixels[c..].first_chunk::<LANES>() else { continue };
-                    for (sum, p) in row.iter_mut().zip(beside) {
-                        *sum += (t - p).abs();
-                    }
-                }
-            }
-            *sums = row;
+            *sums = row_of_differences(template, window[i..].iter().map(|w| &w[..]));
         }
     }
+}
+
+/// Sums of absolute differences with the template's first pixel in each of the first columns of a row of the search, added up side by side; `lines` are the pixels from there on, line by line.
+#[inline(always)]
+pub(super) fn row_of_differences<'a, const N: usize>(
+    template: &Block,
+    lines: impl Iterator<Item = &'a [f32]>,
+) -> [f32; N] {
+    let mut row = [0.0f32; N];
+    for (line, pixels) in template.iter().zip(lines) {
+        for (c, t) in line.iter().enumerate() {
+            let Some(beside) = pixels[c..].first_chunk::<N>() else { continue };
+            for (sum, p) in row.iter_mut().zip(beside) {
+                *sum += (t - p).abs();
+            }
+        }
+    }
+    row
 }
 
 /// The patch as it should look now; `None` if that needs pixels outside the key frame.

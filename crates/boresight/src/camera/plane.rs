@@ -20,7 +20,6 @@ const MAJORITY: f64 = 0.4;
 /// Equations for each number of a group, at least; a match is two. A group that is not tried counts as impossible, so that few matches would make a small group look sure: a frame with 14 of them
 /// was off by 1.1 px at 0.16 px stated.
 const EQUATIONS_A_NUMBER: usize = 3;
-
 /// Rounds of reweighting.
 const ROUNDS: usize = 6;
 /// Matches nearer than this to the fit are all the same to it, px: what a patch of noise and aliasing can tell.
@@ -188,21 +187,19 @@ pub(super) fn fit(matches: &[Match], start: &Homography, middle: Vector2<f64>, l
     let spreads = groups.map(|g| g.map_or(f64::INFINITY, |at| spread(matches, &at)));
     let least = spreads.into_iter().fold(f64::INFINITY, f64::min);
     let all: f64 = matches.iter().map(|m| m.weight).sum();
-    let mut best: Option<(f64, Plane)> = None;
+    let mut chosen: Option<(usize, f64)> = None;
     let mut criteria = [f64::INFINITY; GROUPS.len()];
     for (i, k) in GROUPS.into_iter().enumerate() {
         let Some(at) = groups[i] else { continue };
         let (loss, inside) = loss(matches, &at, least);
-        let criterion = loss + k as f64 * (2.0 * inside).max(2.0).ln();
-        criteria[i] = criterion;
-        let is_near = |b: &Plane| corners_apart(&b.to_from, &at, middle) <= least_px;
-        if best.as_ref().is_none_or(|(b, plane)| criterion < *b && !(plane.n_numbers == 2 && is_near(plane))) {
-            let share = inside / all.max(f64::MIN_POSITIVE);
-            best =
-                Some((criterion, Plane { to_from: at, spread_px: spreads[i], share, n_numbers: k, groups, criteria }));
+        criteria[i] = loss + k as f64 * (2.0 * inside).max(2.0).ln();
+        let is_near = |b: usize| groups[b].is_some_and(|b| corners_apart(&b, &at, middle) <= least_px);
+        if chosen.is_none_or(|(b, _)| criteria[i] < criteria[b] && !(GROUPS[b] == 2 && is_near(b))) {
+            chosen = Some((i, inside / all.max(f64::MIN_POSITIVE)));
         }
     }
-    best.map(|(_, plane)| Plane { criteria, ..plane })
+    let (i, share) = chosen?;
+    Some(Plane { to_from: groups[i]?, spread_px: spreads[i], share, n_numbers: GROUPS[i], groups, criteria })
 }
 
 /// The farthest distance between what two motions make of the image's corners, px.
@@ -216,16 +213,16 @@ pub(super) fn corners_apart(a: &Homography, b: &Homography, middle: Vector2<f64>
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    const MIDDLE: Vector2<f64> = Vector2::new(255.5, 134.5);
+    pub(in super::super) const MIDDLE: Vector2<f64> = Vector2::new(255.5, 134.5);
 
     /// 96 matches with a noise of 0.05 px, a third of them off by up to a pixel.
-    fn matches(truth: &Homography, seed: u64) -> Vec<Match> {
+    pub(in super::super) fn matches(truth: &Homography, seed: u64) -> Vec<Match> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..96)
             .map(|i| {

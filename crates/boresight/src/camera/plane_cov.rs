@@ -187,28 +187,13 @@ fn difference(from: &Homography, to: &Homography, middle: Vector2<f64>) -> SVect
 
 #[cfg(test)]
 mod tests {
+    use super::super::plane::tests::{MIDDLE, matches};
     use super::super::plane::{Limits, correction, fit};
     use super::*;
     use crate::motion_jacobian;
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
-
-    const MIDDLE: Vector2<f64> = Vector2::new(255.5, 134.5);
-
-    /// 96 matches with a noise of 0.05 px, a third of them off by up to a pixel.
-    fn matches(truth: &Homography, seed: u64) -> Vec<Match> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        (0..96)
-            .map(|i| {
-                let from = Vector2::new(20.0 + 40.0 * f64::from(i % 12), 20.0 + 32.0 * f64::from(i / 12));
-                let noise: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
-                let astray = if i % 3 == 1 { 0.3 + 0.7 * rng.random::<f64>() } else { 0.0 };
-                let to = truth.apply(from) + 0.05 * Vector2::from(noise) + astray * Vector2::new(1.0, -0.5);
-                Match { from, to, weight: 1.0 }
-            })
-            .collect()
-    }
 
     #[test]
     fn the_covariance_is_that_of_the_errors_in_every_group() {

@@ -80,6 +80,10 @@ impl Detector for WithCamera {
         self.detector.prime(frames)
     }
 
+    fn leave_out_below(&mut self, area_px: u32) -> bool {
+        self.detector.leave_out_below(area_px)
+    }
+
     fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {
         let done = self.detector.begin(frame, scan)?;
         scan.camera_motion = self.camera.step(&frame.pixels);
@@ -279,6 +283,16 @@ impl Detector for FrameDetector {
                 d.prime(&times_s, &grey.iter().collect::<Vec<_>>())
             }
         }
+    }
+
+    fn leave_out_below(&mut self, area_px: u32) -> bool {
+        let config = &mut self.config;
+        let are_regions = matches!(config.threshold, ThresholdConfig::Moving(_));
+        let is_possible = are_regions && config.follow.is_none() && config.centroid.fit.is_none();
+        if is_possible {
+            config.cluster.min_area_px = Some(area_px);
+        }
+        is_possible
     }
 
     fn begin(&mut self, frame: &Frame, scan: &mut Scan) -> Result<bool> {

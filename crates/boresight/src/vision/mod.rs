@@ -104,6 +104,11 @@ pub trait Detector: Send {
         self.detect(frame, scan).map(|()| true)
     }
 
+    /// Leaves out regions smaller than this from now on, as one whose configuration says so (`cluster.min-area-px`); `false`, and nothing changed, where a detector cannot.
+    fn leave_out_below(&mut self, _area_px: u32) -> bool {
+        false
+    }
+
     /// One more detector that finds the same, for another thread and any of the frames; `None` if what is found in a frame depends on those before.
     fn twin(&self) -> Option<Box<dyn Detector>> {
         None

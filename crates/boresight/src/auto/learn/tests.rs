@@ -127,3 +127,36 @@ fn what_stands_is_reported_where_nothing_moves_and_only_there() {
         (0..8).map(|i| ([20.0 + 30.0 * f64::from(i % 4), 30.0 + 40.0 * f64::from(i / 4)], 0.0)).collect();
     assert_eq!(reported(&many).0, Report::Moving, "eight things are a landscape");
 }
+
+#[test]
+fn regions_left_out_of_scans_made_ahead_are_those_that_the_configuration_leaves_out() {
+    // A large thing and small ones that move before a fixed camera.
+    let (frames, info) = filmed(|k, image| {
+        let x = 10.0 + k as f64;
+        [[x, 20.0], [x + 4.0, 20.0], [x, 24.0], [x + 4.0, 24.0], [140.0 - x, 60.0], [x, 90.0]]
+            .into_iter()
+            .for_each(|at| square(image, at, 200));
+    });
+    let mut config = assumed(2.5, Report::All).config;
+    config.detector.threshold = ThresholdConfig::Moving(crate::vision::background::BackgroundConfig::default());
+    let replay = || Replay::new(Box::new(InMemory(frames.clone().into_iter(), info.clone())), 48).up_to(60);
+    let of = |min_area_px: u32| {
+        let mut config = config.clone();
+        config.detector.cluster.min_area_px = Some(min_area_px);
+        let mut replay = replay();
+        let (mut pass, mut at_once) = first_pass(&mut replay, &config, &Request::default()).unwrap();
+        pass.take_on(&mut replay, &mut at_once, 60);
+        pass
+    };
+    let (mut left_out, mut anew) = (of(9), of(40));
+    assert!(!left_out.leave_out_below(40, Some(1)), "of a full scan nobody knows what it left out");
+    assert!(left_out.scans().iter().any(|s| s.detections.len() == 3));
+    assert!(left_out.leave_out_below(40, Some(100)));
+    for frame in &frames {
+        let [mut a, mut b] = [Scan::default(), Scan::default()];
+        left_out.detect(frame, &mut a).unwrap();
+        anew.detect(frame, &mut b).unwrap();
+        assert_eq!(format!("{a:?}"), format!("{b:?}"));
+        assert!(frame.index.0 < 30 || a.detections.len() == 1, "{}", a.detections.len());
+    }
+}

@@ -183,6 +183,25 @@ mod tests {
     }
 
     #[test]
+    fn every_pixel_has_its_own_luma_and_the_chroma_of_its_pair_whatever_the_width() {
+        let m = Matrix::new(1, false, 4);
+        for width in [1usize, 2, 5, 63, 64, 65, 127, 130, 131] {
+            // Chroma of odd pictures rounded up or down.
+            for c_width in [width.div_ceil(2), width / 2].into_iter().filter(|c| *c > 0) {
+                let plane = |n: usize, by: usize| (0..n).map(|i| (i * by % 251) as u8).collect::<Vec<_>>();
+                let (y, u, v) = (plane(4 * width, 7), plane(2 * c_width, 31), plane(2 * c_width, 57));
+                let planes = Planes { width, height: 4, y: &y, u: &u, v: &v, shift: (1, 1), bits: 8 };
+                let mut out = Vec::new();
+                assert!(to_rgb(&planes, &m, &mut out));
+                for (i, p) in out.iter().enumerate() {
+                    let c = i / width / 2 * c_width + (i % width / 2).min(c_width - 1);
+                    assert_eq!(*p, m.pixel(y[i].into(), u[c].into(), v[c].into()), "{width} {c_width} {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn planes_that_are_too_short_are_refused() {
         let p = Planes { width: 4, height: 4, y: &[0; 15], u: &[0; 4], v: &[0; 4], shift: (1, 1), bits: 8 };
         assert!(!to_rgb(&p, &Matrix::new(0, true, 4), &mut Vec::new()));

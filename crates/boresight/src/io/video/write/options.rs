@@ -10,7 +10,7 @@ pub struct Mp4Options {
     pub quantiser: u8,
     /// Frames between two from which decoding can start.
     pub key_every: u32,
-    /// Takes what stands still as it was in the frame before, whatever is left between the two: a third less time before a fixed camera. For videos to be looked at, not measured.
+    /// Takes what stands still as it was in the frame before, whatever is left between the two: a quarter less time before a fixed camera. For videos to be looked at, not measured.
     pub still_as_before: bool,
     /// Number of frames, if known: their table is then put in front, so that players can start before all is loaded.
     pub expected_frames: Option<u64>,
