@@ -12,6 +12,8 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   boresight preview flight.mp4
       twelve moments of the whole file with what each detector finds there, and the command that runs it, on flight.preview.html
+  boresight track flight.mp4 --candidate 2
+      tracks with the second of them
   boresight preview frames/ --rate-hz 100 -o look.html
       a folder of images")]
 pub struct Args {
@@ -57,9 +59,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         for row in &sheet.rows {
             match (&row.refusal, row.gain) {
                 (None, Some(gain)) => {
-                    say!("{:>26}: {:.3} detections a frame, evidence of motion {gain:.0} nats", row.name, row.per_frame)
+                    say!(
+                        "{} {:>26}: {:.3} detections a frame, evidence of motion {gain:.0} nats",
+                        row.number,
+                        row.name,
+                        row.per_frame
+                    )
                 }
-                (why, _) => say!("{:>26}: {}", row.name, why.as_deref().unwrap_or("nothing to show")),
+                (why, _) => say!("{} {:>26}: {}", row.number, row.name, why.as_deref().unwrap_or("nothing to show")),
             }
         }
         say!("page: {}", output.display());

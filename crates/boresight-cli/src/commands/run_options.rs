@@ -22,6 +22,9 @@ pub struct InputArgs {
     /// Detector, instead of the one chosen, with the tracker and the rates that fit it: isolated, cfar (small and faint), integrate (below the noise of a frame), moving (fixed camera), steadied (moving camera), spot (particles), local (cells), colour.
     #[arg(long, value_name = "NAME")]
     pub detector: Option<auto::DetectorKind>,
+    /// Candidate, by the number that `boresight preview INPUT` gives it, instead of the one chosen: 1 is the choice without options.
+    #[arg(long, value_name = "N", conflicts_with = "detector")]
+    pub candidate: Option<usize>,
     /// Change one key of the configuration, chosen or given: `tracker.coast-s=1`. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
@@ -55,6 +58,13 @@ pub struct InputArgs {
     /// Print nothing but errors, and what is lost of the input.
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+impl InputArgs {
+    /// The detector asked for by its word or by its number.
+    fn detector(&self) -> anyhow::Result<Option<auto::DetectorKind>> {
+        Ok(self.candidate.map_or(Ok(self.detector), auto::DetectorKind::of_candidate)?)
+    }
 }
 
 /// How tracks are made; short for keys of the configuration.
@@ -130,7 +140,8 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
         boresight::io::set_memory_budget(mb.saturating_mul(1 << 20));
     }
     let given = args.config.as_deref().map(Config::from_file).transpose()?;
-    if let Some(kind) = args.detector {
+    let asked = args.detector()?;
+    if let Some(kind) = asked {
         let why = match (&given, boresight::io::is_table(&args.input)) {
             (Some(_), _) => "with --config the detector stands in the configuration",
             (None, true) => "a table of detections needs no detector",
@@ -187,11 +198,8 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
         let input = Input::Frames(source, detector);
         return Ok(Plan::of_frames(input, config, reasons, info));
     }
-    let request = auto::Request {
-        detector: args.detector,
-        false_tracks_per_hour: tracker.false_tracks_per_hour,
-        threads: args.threads,
-    };
+    let request =
+        auto::Request { detector: asked, false_tracks_per_hour: tracker.false_tracks_per_hour, threads: args.threads };
     let (mut source, mut choice) = auto::open_and_choose(&args.input, &base, &request)?;
     let info = source.info().clone();
     let detector = auto::learn(&mut source, &mut choice, &request, |config| changed(config, args, tracker))?;
@@ -358,6 +366,7 @@ mod tests {
             input: "-".into(),
             config: None,
             detector: None,
+            candidate: None,
             sets: Vec::new(),
             rate_hz: None,
             columns: None,

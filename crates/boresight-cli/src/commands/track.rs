@@ -211,7 +211,10 @@ fn is_on_disk(input: &OsStr) -> bool {
 fn can_be_added(args: &Args, options: &str) -> bool {
     let of_choice = args.input.config.is_none();
     if options.starts_with("--detector") {
-        of_choice && args.input.detector.is_none() && !boresight::io::is_table(&args.input.input)
+        of_choice
+            && args.input.detector.is_none()
+            && args.input.candidate.is_none()
+            && !boresight::io::is_table(&args.input.input)
     } else if options.starts_with("--false-tracks-per-hour") {
         of_choice && args.tracker.false_tracks_per_hour.is_none()
     } else {

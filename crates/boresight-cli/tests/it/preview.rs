@@ -22,11 +22,32 @@ fn the_page_shows_every_candidate_with_the_command_that_runs_it() {
         let chosen = page.contains(&format!("chosen: {word}"));
         assert!(chosen || page.contains(&format!("one.mp4' --detector {word}</code>")), "{word}");
     }
+    assert!(page.contains(">1 the choice without options<") && page.contains(">9 colour<"), "their numbers");
     assert!(page.contains("it'\\''s one.mp4'</code>"), "the command without options");
     assert_eq!(page.matches("data:image/png;base64,").count(), 12);
     let shown = page.matches("<div class=\"sheet\">").count();
     assert!(shown >= 4 && page.matches("<figure").count() == 12 * shown, "{shown}");
     assert!(stderr(&said).contains("detections a frame"), "{}", stderr(&said));
+}
+
+#[test]
+fn a_candidate_asked_for_by_its_number_is_the_one_of_that_row() {
+    let dir = tempfile::tempdir().unwrap();
+    let run_with = |options: &[&str], name: &str| {
+        let out = dir.path().join(name);
+        let own = clip();
+        let always = ["track", own.to_str().unwrap(), "-q", "--no-video", "--no-report", "-o", out.to_str().unwrap()];
+        run_ok([&always, options].concat());
+        (text(&out.join("tracks.csv")), text(&out.join("config.toml")))
+    };
+    let (first, third) = (run_with(&["--candidate", "1"], "1"), run_with(&["--candidate", "3"], "3"));
+    assert!(first == run_with(&[], "none"), "1 is the choice without options");
+    assert!(third == run_with(&["--detector", "cfar"], "cfar") && third.1 != first.1, "3 is cfar");
+    for wrong in [&["--candidate", "10"][..], &["--candidate", "2", "--detector", "cfar"]] {
+        let said = run([&["track", clip().to_str().unwrap()], wrong].concat());
+        let why = stderr(&said);
+        assert!(!said.status.success() && (why.contains("3 cfar") || why.contains("cannot be used with")), "{why}");
+    }
 }
 
 #[test]

@@ -38,6 +38,27 @@ impl DetectorKind {
         Self::Colour,
     ];
 
+    /// Its number among the candidates that a preview shows; 1 is the choice without options.
+    pub fn candidate(self) -> usize {
+        Self::ALL.iter().position(|k| *k == self).map_or(1, |i| i + 2)
+    }
+
+    /// The candidate of a number: `None` for 1, the choice without options.
+    /// # Errors
+    /// A number that no candidate has, with the list.
+    pub fn of_candidate(number: usize) -> crate::Result<Option<Self>> {
+        let of = |i: usize| Self::ALL.get(i).copied();
+        match number {
+            1 => Ok(None),
+            _ => number.checked_sub(2).and_then(of).map(Some).ok_or_else(|| {
+                let all = Self::ALL.map(|k| format!("{} {k}", k.candidate())).join(", ");
+                crate::Error::new(crate::ErrorKind::Config, "there is no such candidate").at(number).hint(format!(
+                    "1 the choice without options, {all}; `boresight preview INPUT` shows what each finds"
+                ))
+            }),
+        }
+    }
+
     /// Its word: the key below `detector.threshold`.
     pub const fn name(self) -> &'static str {
         match self {
@@ -105,6 +126,18 @@ impl Request {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_number_means_its_candidate_and_another_is_refused_with_the_list() {
+        assert_eq!(DetectorKind::of_candidate(1).unwrap(), None);
+        for kind in DetectorKind::ALL {
+            assert_eq!(DetectorKind::of_candidate(kind.candidate()).unwrap(), Some(kind));
+        }
+        for none in [0, DetectorKind::ALL.len() + 2, usize::MAX] {
+            let error = DetectorKind::of_candidate(none).unwrap_err().to_string();
+            assert!(error.contains(&none.to_string()) && error.contains("3 cfar"), "{error}");
+        }
+    }
 
     #[test]
     fn every_word_means_its_detector_and_another_is_refused_with_the_list() {

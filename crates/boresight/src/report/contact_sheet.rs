@@ -51,6 +51,8 @@ pub struct SheetMark(pub [f64; 4]);
 /// One way to detect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SheetRow {
+    /// Its number among all candidates, from 1.
+    pub number: usize,
     /// Its word.
     pub name: String,
     /// What it is for.
@@ -159,12 +161,12 @@ impl ContactSheet {
         html! {
             div class="scroll" { table class="sums" {
                 thead { tr {
-                    th scope="col" { "Detector" } th scope="col" class="number" { "Detections a frame" }
+                    th scope="col" { "Candidate" } th scope="col" class="number" { "Detections a frame" }
                     th scope="col" class="number" { "Evidence of motion" } th scope="col" class="use" { "For" }
                 } }
                 tbody { @for (k, row) in self.rows.iter().enumerate() {
                     tr {
-                        th scope="row" { a href={ "#r" (k) } { (row.name) } }
+                        th scope="row" { a href={ "#r" (k) } { (row.number) " " (row.name) } }
                         @if row.refusal.is_some() { td class="number soft" { "not shown" } td {} }
                         @else { td class="number" { (short(row.per_frame, 3)) } td class="number" { (gain(row)) } }
                         td class="use" { (printable(&row.purpose)) }
@@ -177,7 +179,7 @@ impl ContactSheet {
     fn row(&self, k: usize, row: &SheetRow) -> Markup {
         html! {
             section id={ "r" (k) } {
-                h2 { (row.name) @if !row.purpose.is_empty() { span class="for" { (printable(&row.purpose)) } } }
+                h2 { (row.number) " " (row.name) @if !row.purpose.is_empty() { span class="for" { (printable(&row.purpose)) } } }
                 @match &row.refusal {
                     Some(why) => p class="soft" { (printable(why)) },
                     None => {

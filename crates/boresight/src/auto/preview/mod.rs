@@ -245,6 +245,7 @@ fn row(
     command: &str,
 ) -> SheetRow {
     let mut row = SheetRow {
+        number: candidate.options.map_or(1, DetectorKind::candidate),
         name: candidate.options.map_or_else(|| "the choice without options".to_string(), |k| k.to_string()),
         purpose: candidate.options.map_or(String::new(), |k| k.purpose().to_string()),
         command: candidate.options.map_or_else(|| command.to_string(), |k| format!("{command} --detector {k}")),
