@@ -31,10 +31,15 @@ pub enum Variant {
     HalfSize,
     /// With white noise of three counts.
     Noisy,
+    /// The light falls to half and comes back, once in six seconds, as an exposure follows what comes by.
+    Dimming,
 }
 
 /// Deviation of the noise added, counts.
 const NOISE_COUNTS: f64 = 3.0;
+/// Time in which the light falls and comes back, s, and its mean and half of its range.
+const DIMMING_S: f64 = 6.0;
+const DIMMED: [f64; 2] = [0.75, 0.25];
 /// More frames than this are not held in memory.
 const MOST_FRAMES: usize = 4000;
 
@@ -91,6 +96,13 @@ pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Option<Clip>> 
             }
         }
         Variant::Noisy => add_noise(&mut frames)?,
+        Variant::Dimming => {
+            for (k, frame) in frames.iter_mut().enumerate() {
+                let turns = k as f64 / rate_hz / DIMMING_S;
+                let light = DIMMED[0] + DIMMED[1] * (std::f64::consts::TAU * turns).cos();
+                frame.as_mut_slice().iter_mut().for_each(|p| *p = (light * f64::from(*p)).round() as u8);
+            }
+        }
     }
     rows.sort_by_key(|r| (r.frame, r.id));
     let stem = of.name.replace(['/', '.', ' ', ','], "_");

@@ -38,6 +38,17 @@ pub struct Chain {
 }
 
 impl Chain {
+    /// From its first detection to its last one, px.
+    pub fn way_px(&self) -> Vector2<f64> {
+        self.hits.last().zip(self.hits.first()).map_or(Vector2::zeros(), |(b, a)| b.1.at - a.1.at)
+    }
+
+    /// Whether its way may be that one, px, by the covariances of its ends.
+    pub fn may_go_by(&self, way_px: Vector2<f64>) -> bool {
+        let ends = self.hits.last().zip(self.hits.first());
+        ends.is_some_and(|(b, a)| (b.1.at - a.1.at - way_px).norm_squared() <= MOVED * (a.1.variance + b.1.variance))
+    }
+
     /// Whether it goes with another one, as a thing's edge or shadow goes with the thing: in most of the scans with both they touch.
     pub fn goes_with(&self, other: &Self) -> bool {
         let (mut both, mut near) = (0usize, 0usize);

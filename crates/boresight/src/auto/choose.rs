@@ -1,15 +1,16 @@
 //! The choice: which kind of scene the first frames show, and the configuration that follows, with reasons.
 //!
 //! Source: our own. Tried in this order, the first that fits: a target told by its colour, things that move before a fixed camera, particles,
-//! cells; else isolated targets, in whose place faint ones or movers on steadied frames may be taken, these with the isolated ones as runner-up.
+//! cells; else isolated targets, in whose place faint ones or movers on steadied frames may be taken, these with the isolated ones as runner-up. Where the camera is not seen to stand, what moves before a fixed one stands against
+//! whatever was chosen.
 
 use super::asked;
 use super::interval::interval_s;
 use super::request::Request;
-use super::scene::{self, Scene};
+use super::scene::{self, Camera, Scene};
 use super::spread::growing;
 use super::whole_tracks::report_whole;
-use super::{cells, colour, faint, moving, particles, spots, steadied};
+use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
 use crate::io::Colour;
 use crate::vision::threshold::Polarity;
 use crate::{Config, Frame, Result, SourceInfo, shown_rate};
@@ -26,6 +27,8 @@ pub struct Choice {
     pub reasons: Vec<String>,
     /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
     pub(super) runner_up: Option<Box<Choice>>,
+    /// What is taken in its place if the first pass says that the camera stands ([`super::if_fixed`]).
+    pub(super) if_fixed: Option<Box<Choice>>,
     /// Gain of what was seen to move, nats: 0 where nothing surely does, infinite where what is seen is told by something else ([`super::later_looks`]).
     pub(super) gain: f64,
 }
@@ -33,7 +36,7 @@ pub struct Choice {
 impl Choice {
     /// A choice that nothing stands against.
     pub(super) fn alone(config: Config, reasons: Vec<String>) -> Self {
-        Self { config, reasons, runner_up: None, gain: f64::INFINITY }
+        Self { config, reasons, runner_up: None, if_fixed: None, gain: f64::INFINITY }
     }
 
     /// Whether anything was seen.
@@ -44,15 +47,16 @@ impl Choice {
     /// As [`super::report_whole`], whichever detector the first pass bears out.
     pub fn report_whole(&mut self, rate_hz: f64) {
         report_whole(rate_hz, &mut self.config, &mut self.reasons);
-        if let Some(other) = self.runner_up.as_deref_mut() {
+        for other in [&mut self.runner_up, &mut self.if_fixed].into_iter().filter_map(Option::as_deref_mut) {
             other.report_whole(rate_hz);
         }
     }
 
-    /// Changes this choice and the one that may be taken in its place in the same way.
+    /// Changes this choice and those that may be taken in its place in the same way.
     pub(super) fn change<E>(&mut self, mut change: impl FnMut(&mut Self) -> Result<(), E>) -> Result<(), E> {
         change(self)?;
-        self.runner_up.as_deref_mut().map_or(Ok(()), change)
+        let mut others = [&mut self.runner_up, &mut self.if_fixed].into_iter().filter_map(Option::as_deref_mut);
+        others.try_for_each(change)
     }
 }
 
@@ -117,13 +121,19 @@ pub(super) fn choose_looked(
             k => format!("frame {k} and the next"),
         },
     ));
+    let if_fixed = match request.detector {
+        None => if_fixed::look(looked, scene, info, n_threads, Choice::alone(config.clone(), reasons.clone()))?,
+        Some(_) => None,
+    };
     // Who asks for grey gets grey.
     let coloured = base.input.colour != Colour::Gray;
     if let Some(kind) = request.detector {
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(second, scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
-    } else if let Some(explained) = moving::look(looked, scene, info, n_threads)? {
+    } else if scene.camera == Camera::Fixed
+        && let Some(explained) = moving::look(looked, scene, info, n_threads)?
+    {
         moving::configure(scene, explained, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
@@ -165,7 +175,7 @@ pub(super) fn choose_looked(
             }
         }
     }
-    let mut choice = Choice { config, reasons, runner_up, gain };
+    let mut choice = Choice { config, reasons, runner_up, if_fixed, gain };
     choice.change(|c| {
         c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
         c.reasons.push(format!(

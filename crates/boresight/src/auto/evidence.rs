@@ -7,9 +7,10 @@
 use super::chains::{Chain, Field};
 use super::first_scans::first;
 use super::ground::Ground;
-use super::sightings::Sightings;
+use super::sightings::{Sighting, Sightings};
 use crate::camera::SteadyGround;
 use crate::{Scan, SourceInfo};
+use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -23,6 +24,8 @@ const MOST_DETECTIONS: usize = 20_000;
 pub const SURE_GAIN: f64 = 6.9;
 /// Deviations by which a number of steps, or a gain, is surely more than another.
 const STDS: f64 = 3.0;
+/// Fewer chains that go one way are things side by side: a ground has as many features as [`crate::camera`] asks for.
+const LEAST_OF_GROUND: usize = 6;
 /// Share of the steps that may be faster than the speed called fastest.
 const FASTER_SHARE: f64 = 0.01;
 
@@ -111,6 +114,36 @@ impl Evidence {
     pub fn gain_alone(&self) -> f64 {
         let alone = |a: &&Chain| !self.moving.iter().any(|b| b.gain > a.gain && a.goes_with(b));
         self.moving.iter().filter(alone).map(|c| c.gain).sum::<f64>() - self.by_chance[1]
+    }
+
+    /// The chains that do not go the way of most of them: many things that go one way are the ground before a camera that moves.
+    fn apart(&self) -> Vec<&Chain> {
+        let median = |axis: usize| {
+            let mut all: Vec<f64> = self.moving.iter().map(|c| self.velocity(c)[axis]).collect();
+            all.sort_by(f64::total_cmp);
+            all.get(all.len() / 2).copied().unwrap_or(0.0)
+        };
+        let common = Vector2::new(median(0), median(1));
+        let (with, apart): (Vec<_>, Vec<_>) = self.moving.iter().partition(|c| c.may_go_by(self.span_s(c) * common));
+        if with.len() < LEAST_OF_GROUND || with.len() <= apart.len() { self.moving.iter().collect() } else { apart }
+    }
+
+    /// Gain a scan of the chains that do not go the way of most of them and with none of `other`, nats, beyond that of the surrogates.
+    pub fn gain_apart_a_scan(&self, other: Option<&Self>) -> f64 {
+        let is_seen = |c: &Chain| other.is_some_and(|o| o.moving.iter().any(|b| c.goes_with(b)));
+        let gain: f64 = self.apart().into_iter().filter(|c| !is_seen(c)).map(|c| c.gain).sum();
+        (gain - self.by_chance[1]) / self.times_s.len().max(1) as f64
+    }
+
+    /// Time from a chain's first detection to its last one, s.
+    fn span_s(&self, chain: &Chain) -> f64 {
+        let at = |hit: Option<&(usize, Sighting)>| hit.and_then(|h| self.times_s.get(h.0)).copied().unwrap_or(0.0);
+        at(chain.hits.last()) - at(chain.hits.first())
+    }
+
+    /// Mean velocity of a chain, px/s.
+    fn velocity(&self, chain: &Chain) -> Vector2<f64> {
+        chain.way_px() / self.span_s(chain).max(f64::MIN_POSITIVE)
     }
 
     /// Gain of those chains that go with none of `other`, nats, beyond that of the surrogates.

@@ -1,6 +1,6 @@
 //! Whether the ground stands, told by blocks: even texture and slow shades have no feature to follow, but they fit themselves best where they are.
 //!
-//! Source: our own. The mean of the first frames and that of the last ones are compared block by block at shift 0 and at the eight shifts of [`SHIFT_PX`] around
+//! Source: our own. The mean of the first frames and that of the last ones, in the same light, are compared block by block at shift 0 and at the eight shifts of [`SHIFT_PX`] around
 //! it; by chance, or on ground that has gone, 0 has the least squared difference in one block of nine, on ground that stands in more. A turn or a zoom leaves the middle where it is, so each quarter of
 //! the frame is asked for itself, and no other shift may win as often there.
 //! Limits: what moves by less than half of [`SHIFT_PX`] of the grid between the frames compared stands; a sensor's own pattern stands as well.
@@ -22,7 +22,14 @@ pub fn stands(grids: &[Image<f32>]) -> bool {
     let Some(first) = grids.first().filter(|_| n > 0) else { return false };
     let (w, h) = (first.width(), first.height());
     let mut quarters = [[0usize; 9]; 4];
-    let [a, b] = [&grids[..n], &grids[grids.len() - n..]].map(mean);
+    let [a, mut b] = [&grids[..n], &grids[grids.len() - n..]].map(mean);
+    // What most of the frame became brighter by is light.
+    let mut brighter: Vec<f32> = b.as_slice().iter().zip(a.as_slice()).map(|(b, a)| b - a).collect();
+    let middle = brighter.len() / 2;
+    if middle > 0 {
+        let light = *brighter.select_nth_unstable_by(middle, f32::total_cmp).1;
+        b.as_mut_slice().iter_mut().for_each(|v| *v -= light);
+    }
     for y in (SHIFT_PX..(h + 1).saturating_sub(BLOCK + SHIFT_PX)).step_by(BLOCK) {
         for x in (SHIFT_PX..(w + 1).saturating_sub(BLOCK + SHIFT_PX)).step_by(BLOCK) {
             let quarter = usize::from(2 * (x + BLOCK / 2) > w) + 2 * usize::from(2 * (y + BLOCK / 2) > h);
@@ -85,6 +92,11 @@ mod tests {
 
     /// Twelve frames of an even pattern, of slow shades or of neither, with noise; the ground moves by so much a frame, px.
     fn frames(pattern: f64, shade: f64, px_a_frame: f64) -> Vec<Image<f32>> {
+        in_light(pattern, shade, px_a_frame, 0.0)
+    }
+
+    /// The same in a light that changes by so many counts a frame.
+    fn in_light(pattern: f64, shade: f64, px_a_frame: f64, light: f64) -> Vec<Image<f32>> {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let ground: Vec<f64> = (0..400 * 160).map(|_| pattern * (rng.random::<f64>() - 0.5)).collect();
         (0..12)
@@ -94,7 +106,7 @@ mod tests {
                     .map(|i| {
                         let (x, y) = (i % 160 + moved, i / 160);
                         let shades = shade * (0.05 * x as f64).sin() * (0.04 * y as f64).cos();
-                        (ground[y * 400 + x] + shades + 6.0 * (rng.random::<f64>() - 0.5)) as f32
+                        (light * f64::from(k) + ground[y * 400 + x] + shades + 6.0 * (rng.random::<f64>() - 0.5)) as f32
                     })
                     .collect();
                 Image::from_vec(160, 160, pixels).unwrap()
@@ -110,6 +122,7 @@ mod tests {
         assert!(!stands(&frames(0.0, 30.0, 1.0)));
         assert!(!stands(&frames(0.0, 0.0, 0.0)), "noise alone");
         assert!(!stands(&[]));
+        assert!(stands(&in_light(6.0, 0.0, 0.0, -3.0)) && !stands(&in_light(6.0, 0.0, 1.0, -3.0)), "the light falls");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
-use super::{contest, initiation_score, lag, later_looks, moving, noise, speed};
+use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, speed};
 use crate::camera::{CameraConfig, CameraPath};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -36,6 +36,21 @@ pub fn learn<E: From<Error>>(
 ) -> Result<Box<dyn Detector>, E> {
     let set = |c: &mut Choice| set(std::mem::take(&mut c.config)).map(|config| c.config = config);
     choice.change(set)?;
+    if let Some(fixed) = choice.if_fixed.take()
+        && fixed.config.detector != choice.config.detector
+    {
+        let mut scans_of = |config: &Config| -> Result<Vec<Scan>> {
+            let (mut pass, mut at_once) = first_pass(frames, config, request)?;
+            pass.take_on(frames, &mut at_once, evidence::MOST_SCANS);
+            Ok(pass.scans().to_vec())
+        };
+        let [own, candidate] = [scans_of(&choice.config)?, scans_of(&fixed.config)?];
+        let info = frames.info();
+        if let Some(reason) = if_fixed::wins(&own, &candidate, (info.width * info.height) as f64) {
+            *choice = *fixed;
+            choice.reasons.push(reason);
+        }
+    }
     let begun = with_smaller(frames, choice, request, set)?;
     let mut assumed = choice.clone();
     let mut pass = match begun {

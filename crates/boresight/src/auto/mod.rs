@@ -20,6 +20,7 @@ mod first_pass;
 mod first_scans;
 mod fixed_blocks;
 mod ground;
+mod if_fixed;
 #[cfg(test)]
 mod in_memory;
 mod initiation_score;

@@ -40,7 +40,7 @@ const NOW_AND_THEN: f64 = 0.05;
 /// Fewer frames than this show no background.
 const LEAST_FRAMES: usize = 12;
 
-/// Whether what moves before a fixed camera is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
+/// Whether what moves, if the camera stands, is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<f64>> {
@@ -50,11 +50,10 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize
     Ok(Some(scene.explained(frames, info, n_threads)?).filter(|e| *e <= MOST_EXPLAINED))
 }
 
-/// Whether what moves is large, lasting and new enough.
+/// Whether what moves, if the camera stands, is large, lasting and new enough.
 fn fits(scene: &Scene, info: &SourceInfo) -> bool {
     let side = scene.size_px[0].max(scene.size_px[1]);
-    scene.camera == Camera::Fixed
-        && scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
+    scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
         && side >= LEAST_SIDE * info.width.max(info.height) as f64
         && scene.size_px[0] <= MOST_SHARE[0] * info.width as f64
         && scene.size_px[1] <= MOST_SHARE[1] * info.height as f64

@@ -104,7 +104,8 @@ fn choose_from(
 ) -> Result<Choice> {
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
-    let look_again = scene.camera == Camera::Fixed || request.detector == Some(DetectorKind::Colour);
+    // Who does not know whether it stands looks longer.
+    let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
     let second = second(frames, look_again);
     let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)?;
     if choice.is_evident() || request.detector.is_some() {

@@ -1,7 +1,7 @@
 //! Camera motion from pixels: how the background moved in the image since the frame before.
 //!
 //! Source: our own; block matching against a key frame with a consensus, as every video stabiliser does it in some form.
-//! How: the frame is made small ([`super::reduce`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
+//! How: the frame is made small ([`super::reduce`]) and brought to the light of those before ([`super::light`]); patches of the key frame ([`super::key_frame`]) are looked for where the course so far
 //! ([`super::course`]) leads them ([`super::find_patch`]), and, where they are not there, all over a frame made smaller still ([`super::wide`]); a consensus says which of them
 //! are the background's ([`super::fit`]). Patches of the frame itself are then found to a small part of a pixel ([`super::fine`]), and a translation, similarity, affine map or homography
 //! is chosen by what they say ([`super::plane`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]), and its covariance is that of residuals left out of the fit ([`super::plane_cov`]).
@@ -19,6 +19,7 @@ use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
+use super::light::Light;
 use super::other_view::OtherView;
 use super::plane::{self, Limits, corners_apart};
 use super::plane_cov::plane_cov;
@@ -55,6 +56,9 @@ const WAIT_FRAMES: u32 = 5;
 const CLEAR_COVER: f64 = 0.75;
 /// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other.
 const UNSURE_FRAMES: u32 = 3;
+/// It may be that of a thing, and is not believed, where its patches spread over less than this share of the image's width, and half as many or more stand still: a ground below a sky reaches from
+/// side to side, and nothing that stands out stands before a camera that moves.
+const UNSURE_SPREAD: f64 = 0.5;
 /// Share of the key frame's patches that must lie where they lay, so that the others are not looked for. Chosen: a target may hide a fourth.
 const AT_REST: f64 = 0.75;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
@@ -66,6 +70,7 @@ const FINE_LOST_PX: f64 = 0.5;
 #[derive(Clone, Debug, Default)]
 pub struct CameraMotionEstimator {
     now: Image<f32>,
+    light: Light,
     sums: Vec<f32>,
     key: KeyFrame,
     fine: FinePatches,
@@ -95,6 +100,7 @@ impl CameraMotionEstimator {
     /// Takes the next frame and returns the background's motion since the last one; `None` where nothing can be said.
     pub fn step(&mut self, pixels: &Pixels) -> Option<CameraMotion> {
         reduce(pixels, &mut self.now, &mut self.sums);
+        self.light.bring(&mut self.now);
         self.view.take(&self.now);
         let middle = 0.5 * Vector2::new(self.now.width() as f64 - 1.0, self.now.height() as f64 - 1.0);
         let scales = Scales { middle, factor: factor(pixels.width()), fine: fine_factor(pixels.width()) };
@@ -103,13 +109,15 @@ impl CameraMotionEstimator {
             return None;
         }
         let mut found = self.find(pixels, &scales);
+        found = found.or_else(|| self.find_in_other_light(pixels, &scales));
         let last = if self.key_is_last { &self.key.image } else { &self.last.image };
         if found.is_none() && self.view.is_other(last, &self.now) {
             self.start_anew(pixels, &scales);
             return Some(full_size(&Homography::identity(), &MotionCov::zeros(), MotionBasis::Cut, &scales));
         }
         let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
-        self.n_unsure = if is_unsure { self.n_unsure + 1 } else { 0 };
+        let is_of_ground = is_unsure && found.is_some_and(|f| !f.0.may_be_a_thing);
+        self.n_unsure = if is_of_ground { self.n_unsure + 1 } else { 0 };
         if is_unsure && self.n_unsure < UNSURE_FRAMES {
             found = None;
         }
@@ -137,6 +145,20 @@ impl CameraMotionEstimator {
         (self.known, self.turning, self.n_held) = (false, false, 0);
         self.rest = Rest::default();
         self.carried = MotionCov::zeros();
+    }
+
+    /// Looks once more where the light has changed; what does not help is undone.
+    fn find_in_other_light(&mut self, pixels: &Pixels, scales: &Scales) -> Option<(Found, bool)> {
+        let last = if self.key_is_last { &self.key.image } else { &self.last.image };
+        let was = self.light.change(&mut self.now, last)?;
+        let found =
+            self.find(pixels, scales).filter(|f| self.light.is_that_of(&self.key, &self.now, &f.0.now_from_key, was));
+        if found.is_none() {
+            self.light.is_again(was);
+            reduce(pixels, &mut self.now, &mut self.sums);
+            self.light.bring(&mut self.now);
+        }
+        found
     }
 
     /// Looks for the key frame, then for the last one, then for both all over; whether it was the last one that was found, which is the key frame then.
@@ -229,16 +251,21 @@ impl CameraMotionEstimator {
             plane::fit(&self.matches, &coarse.now_from_key, middle, limits).map_or(coarse.now_from_key, |p| p.to_from);
         // Where the patches that agree are not most of the image's, a thing of much texture may have outvoted the rest.
         let agrees = |m: &&Match| (start.apply(m.from) - m.to).norm() <= agree_px;
-        let n_agree = self.matches.iter().filter(agrees).count();
+        let agreeing = || self.matches.iter().filter(agrees).map(|m| m.from.x);
+        let n_agree = agreeing().count();
+        let ends = agreeing().fold([f64::INFINITY, f64::NEG_INFINITY], |e, x| [e[0].min(x), e[1].max(x)]);
+        let is_wide = ends[1] - ends[0] >= UNSURE_SPREAD * self.now.width() as f64;
+        let mut n_still = 0;
         let n_cells = CELLS.0 * CELLS.1;
         if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
             let (mut n_for, mut n_against) = (0, 0);
-            for p in key.patches.iter().chain(&key.weak) {
+            for (i, p) in key.patches.iter().chain(&key.weak).enumerate() {
                 let from = p.middle();
                 let places = [start.apply(from), last.apply(from)];
                 match vote((&key.image, &self.now), *p, &predicted.similarity_at(from), places, agree_px) {
                     Vote::For => n_for += 1,
                     Vote::Against => n_against += 1,
+                    Vote::Still => n_still += usize::from(i < key.patches.len() && !key.even),
                     Vote::Neither => {}
                 }
             }
@@ -246,10 +273,11 @@ impl CameraMotionEstimator {
                 return None;
             }
         }
+        let may_be_a_thing = !is_wide && 2 * n_still >= n_agree;
         let mut found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
-            Some(fine) => Found { n_coarse, ..fine },
+            Some(fine) => Found { n_coarse, may_be_a_thing, ..fine },
             // Nothing else speaks for it.
-            None => Found { covers: false, n_coarse, ..coarse },
+            None => Found { covers: false, n_coarse, may_be_a_thing, ..coarse },
         };
         let moved = corners_apart(&found.now_from_key, &Homography::identity(), middle) > BELIEVED;
         let key = if at_last { &self.last } else { &self.key };
@@ -290,6 +318,7 @@ impl CameraMotionEstimator {
             cov: scaled_cov(&plane_cov(&plane, &self.matches, fine_middle, !self.known)?, 1.0 / scale),
             turned: plane.n_numbers > 2,
             covers: true,
+            may_be_a_thing: false,
             n_coarse: 0,
         })
     }

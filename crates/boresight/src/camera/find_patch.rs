@@ -71,6 +71,8 @@ pub(super) enum Vote {
     For,
     /// It looks clearly more like another place than like its own.
     Against,
+    /// It lies where it lay in the last frame.
+    Still,
     Neither,
 }
 
@@ -78,7 +80,7 @@ pub(super) enum Vote {
 /// deviates by 6 %, and the least of 441 lies three deviations below.
 const CLEARLY: f32 = 1.5;
 
-/// Whether a patch lies at `place`, where a motion has its middle, within `agree_px`; what seems to lie where it lay in the last frame, at `still`, has no vote: a codec's copies and a
+/// Whether a patch lies at `place`, where a motion has its middle, within `agree_px`; what seems to lie where it lay in the last frame, at `still`, votes neither for nor against it: a codec's copies and a
 /// sensor's pattern stand.
 pub(super) fn vote(
     (key, now): (&Image<f32>, &Image<f32>),
@@ -111,8 +113,10 @@ pub(super) fn vote(
     }
     // A whole place is right to half a pixel.
     let is_near = |p: Vector2<f64>| (best.1 - p).amax() <= agree_px + 0.5;
-    if !(best.0.is_finite() && own.is_finite()) || (is_near(still) && !is_near(place)) {
+    if !(best.0.is_finite() && own.is_finite()) {
         Vote::Neither
+    } else if is_near(still) && !is_near(place) {
+        Vote::Still
     } else if is_near(place) {
         Vote::For
     } else if own > CLEARLY * best.0 {

@@ -15,6 +15,8 @@ pub(super) struct Found {
     pub turned: bool,
     /// Whether it is the background's beyond doubt: where nothing was known before, it must explain most of the image.
     pub covers: bool,
+    /// Whether it may be the motion of a thing before a ground that stands.
+    pub may_be_a_thing: bool,
     /// Patches of the reduced frame that were found.
     pub n_coarse: usize,
 }
@@ -38,6 +40,7 @@ pub(super) fn coarse(
             cov: of_similarity(&fit.cov),
             turned: fit.turned,
             covers: true,
+            may_be_a_thing: false,
             n_coarse: 0,
         });
     }
@@ -48,5 +51,12 @@ pub(super) fn coarse(
     matches.iter_mut().for_each(|m| m.from = back.apply(m.from));
     let fit = fit?;
     let now_from_key = predicted.then(&Homography::of_similarity(&fit.now_from_key));
-    Some(Found { now_from_key, cov: of_similarity(&fit.cov), turned: true, covers: true, n_coarse: 0 })
+    Some(Found {
+        now_from_key,
+        cov: of_similarity(&fit.cov),
+        turned: true,
+        covers: true,
+        may_be_a_thing: false,
+        n_coarse: 0,
+    })
 }

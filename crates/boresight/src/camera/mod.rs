@@ -13,6 +13,7 @@ mod fit;
 mod follow_plane;
 mod found;
 mod key_frame;
+mod light;
 mod mixed;
 mod motion;
 mod other_view;

@@ -93,8 +93,8 @@ fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(Source
     let frames = first.ahead();
     let seen = scene::look(frames, &info)?;
     let second = match seen.camera {
-        Camera::Fixed => second_look::frames(input, base, PROBE_FRAMES),
-        _ => Vec::new(),
+        Camera::Moving => Vec::new(),
+        Camera::Fixed | Camera::Unknown => second_look::frames(input, base, PROBE_FRAMES),
     };
     let camera = seen.camera;
     let seen = looked_again(seen, &second, &info)?;

@@ -59,6 +59,28 @@ fn a_pan_of_2_to_5_px_a_frame_over_any_texture_is_never_unknown() {
 }
 
 #[test]
+fn light_that_is_switched_is_no_motion() {
+    for pan in [0.0, 3.0] {
+        let mut camera = CameraMotionEstimator::default();
+        for (k, mut frame) in
+            frames(&mut scene((320, 240), 16.0, [pan, 0.3 * pan], 0.0, 0.0, 60)).into_iter().enumerate()
+        {
+            let Pixels::Gray8(image) = &mut frame.pixels else { panic!("eight bits") };
+            if k / 15 % 2 == 1 {
+                image.as_mut_slice().iter_mut().for_each(|p| *p = (0.7 * f64::from(*p)) as u8);
+            }
+            let motion = camera.step(&frame.pixels);
+            if k < 3 {
+                continue;
+            }
+            let motion = motion.unwrap_or_else(|| panic!("pan {pan}: unknown in frame {k}"));
+            let error = motion.shift_px() - pan * Vector2::new(1.0, 0.3);
+            assert!(motion.basis == MotionBasis::Measured && error.norm() < 0.3, "pan {pan}, frame {k}: {error}");
+        }
+    }
+}
+
+#[test]
 fn turn_and_zoom_are_measured_to_a_twentieth_of_a_degree_and_of_a_percent() {
     for (turn, zoom) in [(1.0, 0.0), (-0.5, 0.01)] {
         let mut source = scene((320, 240), 16.0, [1.0, 0.0], turn, zoom, 60);

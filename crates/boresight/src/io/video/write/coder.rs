@@ -18,6 +18,8 @@ use shiguredo_mp4::boxes::{Avc1Box, AvccBox, SampleEntry, VisualSampleEntryField
 /// Kinds of the parts of a coded picture that describe it (H.264, table 7-1): sequence and picture parameter set.
 const NAL_SPS: u8 = 7;
 const NAL_PPS: u8 = 8;
+/// What the encoder takes where it is given no rate control, whatever range it is told. With one it holds to any other quantiser, and writes on standard error that it skips no frame.
+const OWN_QUANTISER: u8 = 26;
 /// Shortest side that the encoder takes, px.
 const MIN_SIDE: usize = 16;
 
@@ -138,8 +140,7 @@ impl H264Coder {
         let q = self.options.quantiser.clamp(0, 51);
         let config = EncoderConfig::new()
             .skip_frames(false)
-            // Held to one quantiser; without a rate control the encoder takes 26, whatever range it is given.
-            .rate_control_mode(RateControlMode::Quality)
+            .rate_control_mode(if q == OWN_QUANTISER { RateControlMode::Off } else { RateControlMode::Quality })
             .qp(QpRange::new(q, q))
             .complexity(Complexity::Low)
             .scene_change_detect(false)
@@ -249,10 +250,12 @@ mod tests {
             let value = |i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 13) as u8;
             Pixels::Gray8(Image::from_vec(64, 64, (0..64 * 64).map(value).collect()).unwrap())
         };
-        let bytes = [12, 18, 24, 30, 36].map(|quantiser| {
-            let mut coder = H264Coder::new(Mp4Options { quantiser, ..Mp4Options::default() });
-            (0..4).map(|k| coder.code(&noise(k), false).unwrap().data.len()).sum::<usize>()
-        });
+        let bytes = [OWN_QUANTISER - 12, OWN_QUANTISER - 6, OWN_QUANTISER, OWN_QUANTISER + 6, OWN_QUANTISER + 12].map(
+            |quantiser| {
+                let mut coder = H264Coder::new(Mp4Options { quantiser, ..Mp4Options::default() });
+                (0..4).map(|k| coder.code(&noise(k), false).unwrap().data.len()).sum::<usize>()
+            },
+        );
         for pair in bytes.windows(2) {
             assert!(pair[0] > pair[1] + 4 * 64 * 64 / 32, "{bytes:?}");
         }
