@@ -6,8 +6,7 @@
 //! Limits: those of [`super::chains`].
 
 use super::choose::Choice;
-use super::evidence::Evidence;
-use super::steadied::LEAST_EXPLAINED;
+use super::evidence::{Evidence, LEAST_EXPLAINED};
 use crate::Scan;
 
 /// Why the choice is not borne out by its first pass, whose chains are `evidence`; nothing if it is.

@@ -22,6 +22,8 @@ pub const MOST_SCANS: usize = 250;
 const MOST_DETECTIONS: usize = 20_000;
 /// By chance a gain is larger once in a thousand choices: e to the minus gain.
 pub const SURE_GAIN: f64 = 6.9;
+/// Share of the regions detected that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
+pub const LEAST_EXPLAINED: f64 = 0.2;
 /// Deviations by which a number of steps, or a gain, is surely more than another.
 const STDS: f64 = 3.0;
 /// Fewer chains that go one way are things side by side: a ground has as many features as [`crate::camera`] asks for.

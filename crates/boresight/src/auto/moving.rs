@@ -2,7 +2,7 @@
 
 use super::chains::Chain;
 use super::digits::round;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::scene::{Camera, Scene};
 use super::sightings::Sighting;
 use crate::camera::CameraConfig;
@@ -114,7 +114,7 @@ fn least_area(area_px: f64) -> u32 {
 }
 
 /// The area from which on regions count, px, with the reason, where smaller ones than `least_px` surely move by themselves: chains of `evidence` in most of whose `scans` something of that area
-/// or more is elsewhere. A thing that is now and then as large as those that count is of their kind.
+/// or more is elsewhere, and which hold enough of what would be detected besides. A thing that is now and then as large as those that count is of their kind.
 pub(super) fn smaller(evidence: &Evidence, scans: &[Scan], least_px: u32) -> Option<(u32, String)> {
     let area_px = |hit: &(usize, Sighting)| hit.1.side_px * hit.1.thickness_px;
     let counts = |hit: &&(usize, Sighting)| area_px(hit) >= f64::from(least_px);
@@ -126,6 +126,13 @@ pub(super) fn smaller(evidence: &Evidence, scans: &[Scan], least_px: u32) -> Opt
     areas.sort_by(f64::total_cmp);
     let median = *areas.get(areas.len() / 2)?;
     let area_px = least_area(median);
+    let looked = scans.iter().filter(|s| !s.blind).take(evidence.times_s.len());
+    let is_added = |d: &&Detection| (area_px..least_px).contains(&d.area_px);
+    let n_added = looked.flat_map(|s| &s.detections).filter(is_added).count();
+    let n_held = areas.iter().filter(|a| **a < f64::from(least_px)).count();
+    if (n_held as f64) < LEAST_EXPLAINED * n_added as f64 {
+        return None;
+    }
     (area_px < least_px).then(|| {
         let one = beside.len() == 1;
         let words = format!(
@@ -181,6 +188,8 @@ mod tests {
     use super::*;
     use crate::{Extent, FrameIndex, PixelKind, Timestamp};
     use nalgebra::{Matrix2, Vector2};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn what_is_wider_than_half_of_the_frame_is_the_ground() {
@@ -207,19 +216,27 @@ mod tests {
     /// What is said of smaller things where regions of 60 px or more count: a box of 20 x 20 px goes to the right, and one of `size` px, half of both filled, goes from `from` by `step` px a
     /// frame; in every `n_large`-th frame it has 100 px.
     fn said(from: [f64; 2], step: [f64; 2], size: f64, n_large: u64) -> Option<(u32, String)> {
+        said_among(0, from, step, size, n_large)
+    }
+
+    /// The same among so many flickers a frame.
+    fn said_among(n_flickers: usize, from: [f64; 2], step: [f64; 2], size: f64, n_large: u64) -> Option<(u32, String)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
         let region = |at: Vector2<f64>, side: f64, area_px: u32| {
             let extent = Extent::around(at, side, side);
             Detection::at(at, Matrix2::identity() * 0.01).with_extent(extent).with_area_px(area_px)
         };
         let scans: Vec<Scan> = {
-            let scan = |k: u64| {
+            let mut scan = |k: u64| {
                 let t = k as f64;
                 let small = Vector2::new(from[0] + step[0] * t, from[1] + step[1] * t);
                 let area_px = if k % n_large == n_large - 1 { 100 } else { (0.5 * size * size) as u32 };
-                let all = vec![region(Vector2::new(30.0 + 2.0 * t, 40.0), 20.0, 200), region(small, size, area_px)];
+                let mut all = vec![region(Vector2::new(30.0 + 2.0 * t, 40.0), 20.0, 200), region(small, size, area_px)];
+                let mut any = |length: f64| length * rng.random::<f64>();
+                all.extend((0..n_flickers).map(|_| region(Vector2::new(any(320.0), any(240.0)), 6.0, 18)));
                 Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * t)).with_detections(all)
             };
-            (0..60).map(scan).collect()
+            (0..60).map(&mut scan).collect()
         };
         smaller(&Evidence::of_scans(&scans, 320.0 * 240.0), &scans, 60)
     }
@@ -234,5 +251,8 @@ mod tests {
         assert_eq!(said([42.0, 52.0], [2.0, 0.0], 6.0, never), None, "a part goes with its thing");
         assert_eq!(said([200.0, 180.0], [0.02, 0.0], 6.0, never), None, "a ghost stays where it is");
         assert_eq!(said([200.0, 180.0], [-1.5, 0.5], 9.0, 4), None, "now and then it is as large as those that count");
+        let among = |n: usize| said_among(n, [200.0, 180.0], [-1.5, 0.5], 6.0, never);
+        assert_eq!(among(3).map(|s| s.0), Some(LEAST_PX), "three flickers a frame");
+        assert_eq!(among(9), None, "nine: mostly clutter");
     }
 }

@@ -7,7 +7,7 @@
 
 use super::chains::Chain;
 use super::digits::round;
-use super::evidence::{Evidence, SURE_GAIN};
+use super::evidence::{Evidence, LEAST_EXPLAINED, SURE_GAIN};
 use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
 use super::spread::growing;
@@ -29,8 +29,6 @@ const LEAST_AREA: f64 = 3e-5;
 const LEAST_PX: f64 = 4.0;
 /// Rims of one target lie as far apart as this share of the frame's longer side: 7 px of 512. A car of 10 px keeps its id with 7 and is two with 3.
 const RIMS: f64 = 0.0137;
-/// Share of the regions that chains must explain: the tracker counts hits, and would make tracks of what is mostly clutter.
-pub(super) const LEAST_EXPLAINED: f64 = 0.2;
 /// Share of the sure isolated blobs that chains explain, from which on isolated targets tell what a fixed camera shows.
 const TOLD: f64 = 0.5;
 
