@@ -6,7 +6,7 @@ use super::clips::{self, Clip, Columns};
 use anyhow::{Context, Result, bail};
 use boresight::io::OpenOptions;
 use boresight::{Image, Pixels, TrackRow};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -96,13 +96,7 @@ pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Option<Clip>> 
             }
         }
         Variant::Noisy => add_noise(&mut frames)?,
-        Variant::Dimming => {
-            for (k, frame) in frames.iter_mut().enumerate() {
-                let turns = k as f64 / rate_hz / DIMMING_S;
-                let light = DIMMED[0] + DIMMED[1] * (std::f64::consts::TAU * turns).cos();
-                frame.as_mut_slice().iter_mut().for_each(|p| *p = (light * f64::from(*p)).round() as u8);
-            }
-        }
+        Variant::Dimming => dim(&mut frames, rate_hz),
     }
     rows.sort_by_key(|r| (r.frame, r.id));
     let stem = of.name.replace(['/', '.', ' ', ','], "_");
@@ -135,6 +129,17 @@ fn halved(image: &Image<u8>) -> Result<Image<u8>> {
         out.extend((0..w).map(|x| ((four(2 * x) + 2) / 4) as u8));
     }
     Image::from_vec(w, h, out).context("an image of another size")
+}
+
+/// Lets the light fall and come back. What falls between two counts is rounded up as often as it is near the upper one: a sensor's noise does that, and without it a smooth sky's steps from one
+/// count to the next would walk.
+fn dim(frames: &mut [Image<u8>], rate_hz: f64) {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        let turns = k as f64 / rate_hz / DIMMING_S;
+        let light = DIMMED[0] + DIMMED[1] * (std::f64::consts::TAU * turns).cos();
+        frame.as_mut_slice().iter_mut().for_each(|p| *p = (light * f64::from(*p) + rng.random::<f64>()) as u8);
+    }
 }
 
 fn add_noise(frames: &mut [Image<u8>]) -> Result<()> {
