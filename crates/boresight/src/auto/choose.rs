@@ -122,7 +122,7 @@ pub(super) fn choose_looked(
         },
     ));
     let if_fixed = match request.detector {
-        None => if_fixed::look(looked, scene, info, n_threads, Choice::alone(config.clone(), reasons.clone()))?,
+        None => if_fixed::look(looked, scene, info, n_threads, (config.clone(), reasons.clone()))?,
         Some(_) => None,
     };
     // Who asks for grey gets grey.
@@ -175,6 +175,7 @@ pub(super) fn choose_looked(
             }
         }
     }
+    let if_fixed = if_fixed.map(|(config, reasons)| Box::new(Choice::alone(config, reasons)));
     let mut choice = Choice { config, reasons, runner_up, if_fixed, gain };
     choice.change(|c| {
         c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;

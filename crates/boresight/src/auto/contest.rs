@@ -11,7 +11,7 @@ use crate::Scan;
 
 /// Why the choice is not borne out by its first pass, whose chains are `evidence`; nothing if it is.
 pub(super) fn lost(evidence: &Evidence, scans: &[Scan], choice: &Choice, instead: &Choice) -> Option<String> {
-    let share = explained(evidence, scans);
+    let share = evidence.explained(scans);
     (share < LEAST_EXPLAINED).then(|| {
         let [name, other] = [choice, instead].map(|c| c.config.detector.threshold.name());
         format!(
@@ -24,19 +24,6 @@ pub(super) fn lost(evidence: &Evidence, scans: &[Scan], choice: &Choice, instead
             other,
         )
     })
-}
-
-/// Whether the chains hold enough of the scans' detections: the tracker counts hits, and would make tracks of what is mostly clutter.
-pub(super) fn is_explained(evidence: &Evidence, scans: &[Scan]) -> bool {
-    explained(evidence, scans) >= LEAST_EXPLAINED
-}
-
-/// Share of the scans' detections that the chains hold.
-fn explained(evidence: &Evidence, scans: &[Scan]) -> f64 {
-    // Those that the chains were looked for in: scans in which nothing could be seen were not.
-    let looked = scans.iter().filter(|s| !s.blind).take(evidence.times_s.len());
-    let n_detections: usize = looked.map(|s| s.detections.len()).sum();
-    evidence.n_hits() as f64 / n_detections.max(1) as f64
 }
 
 #[cfg(test)]

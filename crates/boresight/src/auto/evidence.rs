@@ -107,6 +107,14 @@ impl Evidence {
         self.moving.iter().map(|c| c.hits.len()).sum()
     }
 
+    /// Share of the scans' detections that the chains hold.
+    pub fn explained(&self, scans: &[Scan]) -> f64 {
+        // Those that the chains were looked for in: scans in which nothing could be seen were not.
+        let looked = scans.iter().filter(|s| !s.blind).take(self.times_s.len());
+        let n_detections: usize = looked.map(|s| s.detections.len()).sum();
+        self.n_hits() as f64 / n_detections.max(1) as f64
+    }
+
     /// Gain of what moves beyond that of the surrogates, nats.
     pub fn gain(&self) -> f64 {
         self.moving.iter().map(|c| c.gain).sum::<f64>() - self.by_chance[1]

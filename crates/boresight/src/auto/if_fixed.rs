@@ -5,14 +5,12 @@
 //! are run, and the candidate is taken if its chains go with none of the choice's and gain more, a scan, than all of these. Where the choice follows the camera in most scans, nothing is open.
 //! Limits: those of [`super::chains`]; what both see is the choice's.
 
-use super::choose::Choice;
-use super::contest;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::moving;
 use super::scene::{Camera, Scene};
-use crate::{Frame, MotionBasis, Result, Scan, SourceInfo};
+use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
 
-/// The candidate, from what was seen so far, if little but things that move differs from the background; `frames` are those looked at.
+/// The candidate's configuration and reasons, from those so far, if little but things that move differs from the background; `frames` are those looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(
@@ -20,14 +18,14 @@ pub fn look(
     scene: &Scene,
     info: &SourceInfo,
     n_threads: usize,
-    mut so_far: Choice,
-) -> Result<Option<Box<Choice>>> {
+    (mut config, mut reasons): (Config, Vec<String>),
+) -> Result<Option<(Config, Vec<String>)>> {
     if scene.camera == Camera::Fixed {
         return Ok(None);
     }
     let Some(explained) = moving::look(frames, scene, info, n_threads)? else { return Ok(None) };
-    moving::configure(scene, explained, info, &mut so_far.config, &mut so_far.reasons);
-    Ok(Some(Box::new(so_far)))
+    moving::configure(scene, explained, info, &mut config, &mut reasons);
+    Ok(Some((config, reasons)))
 }
 
 /// Why the candidate is taken, if its scans say more than those of the choice do.
@@ -39,7 +37,7 @@ pub fn wins(own: &[Scan], candidate: &[Scan], area_px2: f64) -> Option<String> {
     let [choice, fixed] = [own, candidate].map(|scans| Evidence::of_scans(scans, area_px2));
     let a_scan = [fixed.gain_apart_a_scan(Some(&choice)), choice.gain_apart_a_scan(None).max(0.0)];
     let is_more = fixed.is_sure() && a_scan[0] > a_scan[1];
-    (is_more && contest::is_explained(&fixed, candidate)).then(|| {
+    (is_more && fixed.explained(candidate) >= LEAST_EXPLAINED).then(|| {
         format!(
             "Whether the camera stands is not seen. If it does, {} in {} frames, {:.1} nats a frame, where what else may be chosen gains {:.1} besides what goes one way, as the ground does: \
              so it does.",
