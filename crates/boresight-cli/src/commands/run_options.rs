@@ -141,17 +141,18 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     }
     let given = args.config.as_deref().map(Config::from_file).transpose()?;
     let asked = args.detector()?;
-    if let Some(kind) = asked {
+    let by = match (args.candidate, args.detector) {
+        (Some(number), _) => Some(format!("--candidate {number}")),
+        (None, kind) => kind.map(|kind| format!("--detector {kind}")),
+    };
+    if let Some(by) = by {
         let why = match (&given, boresight::io::is_table(&args.input)) {
             (Some(_), _) => "with --config the detector stands in the configuration",
             (None, true) => "a table of detections needs no detector",
             (None, false) => "",
         };
         if !why.is_empty() {
-            return Err(Error::new(ErrorKind::Config, why)
-                .at(format!("--detector {kind}"))
-                .hint("leave one of the two out")
-                .into());
+            return Err(Error::new(ErrorKind::Config, why).at(by).hint("leave one of the two out").into());
         }
     }
     if let (Some(_), Some(rate)) = (&given, tracker.false_tracks_per_hour) {

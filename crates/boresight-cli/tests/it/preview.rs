@@ -43,10 +43,14 @@ fn a_candidate_asked_for_by_its_number_is_the_one_of_that_row() {
     let (first, third) = (run_with(&["--candidate", "1"], "1"), run_with(&["--candidate", "3"], "3"));
     assert!(first == run_with(&[], "none"), "1 is the choice without options");
     assert!(third == run_with(&["--detector", "cfar"], "cfar") && third.1 != first.1, "3 is cfar");
-    for wrong in [&["--candidate", "10"][..], &["--candidate", "2", "--detector", "cfar"]] {
+    let given = dir.path().join("1/config.toml");
+    for (wrong, why) in [
+        (&["--candidate", "10"][..], "3 cfar"),
+        (&["--candidate", "2", "--detector", "cfar"], "cannot be used with"),
+        (&["--candidate", "1", "--config", given.to_str().unwrap()], "--candidate 1"),
+    ] {
         let said = run([&["track", clip().to_str().unwrap()], wrong].concat());
-        let why = stderr(&said);
-        assert!(!said.status.success() && (why.contains("3 cfar") || why.contains("cannot be used with")), "{why}");
+        assert!(!said.status.success() && stderr(&said).contains(why), "{wrong:?}: {}", stderr(&said));
     }
 }
 

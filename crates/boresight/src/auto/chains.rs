@@ -248,16 +248,12 @@ impl<'a> Field<'a> {
             }
             hits.iter().for_each(|h| used[h.0][h.1] = true);
             let hits: Vec<(usize, Sighting)> = hits.into_iter().map(|h| (h.0, place(h).seen)).collect();
-            let [a, b] = [hits[0].1, hits[hits.len() - 1].1];
             let speed = |w: &[(usize, Sighting)]| {
                 (w[1].1.at - w[0].1.at).norm() / (self.scans[w[1].0].time_s - self.scans[w[0].0].time_s)
             };
-            out.push(Chain {
-                gain: gain + start,
-                speeds_px_per_s: hits.windows(2).map(speed).collect(),
-                moves: (b.at - a.at).norm_squared() > MOVED * (a.variance + b.variance),
-                hits,
-            });
+            let speeds_px_per_s = hits.windows(2).map(speed).collect();
+            let chain = Chain { gain: gain + start, speeds_px_per_s, moves: false, hits };
+            out.push(Chain { moves: !chain.may_go_by(Vector2::zeros()), ..chain });
         }
         out
     }

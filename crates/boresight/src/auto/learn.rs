@@ -36,22 +36,8 @@ pub fn learn<E: From<Error>>(
 ) -> Result<Box<dyn Detector>, E> {
     let set = |c: &mut Choice| set(std::mem::take(&mut c.config)).map(|config| c.config = config);
     choice.change(set)?;
-    if let Some(fixed) = choice.if_fixed.take()
-        && fixed.config.detector != choice.config.detector
-    {
-        let mut scans_of = |config: &Config| -> Result<Vec<Scan>> {
-            let (mut pass, mut at_once) = first_pass(frames, config, request)?;
-            pass.take_on(frames, &mut at_once, evidence::MOST_SCANS);
-            Ok(pass.scans().to_vec())
-        };
-        let [own, candidate] = [scans_of(&choice.config)?, scans_of(&fixed.config)?];
-        let info = frames.info();
-        if let Some(reason) = if_fixed::wins(&own, &candidate, (info.width * info.height) as f64) {
-            *choice = *fixed;
-            choice.reasons.push(reason);
-        }
-    }
-    let begun = with_smaller(frames, choice, request, set)?;
+    let of_own = with_fixed(frames, choice, request)?;
+    let begun = of_own.map_or_else(|| with_smaller(frames, choice, request, set), |begun| Ok(Some(begun)))?;
     let mut assumed = choice.clone();
     let mut pass = match begun {
         Some((pass, at_once)) => learn_on(pass, at_once, frames, choice, request)?,
@@ -102,6 +88,30 @@ fn stands<E>(choice: &mut Choice, set: impl FnMut(&mut Choice) -> Result<(), E>)
     let asked = choice.config.detector.clone();
     choice.change(set)?;
     Ok(choice.config.detector == asked)
+}
+
+/// Takes the candidate of a fixed camera if there is one and the first passes of both say so; else the choice's own first pass, which has begun, if it was asked for.
+fn with_fixed(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Option<(FirstPass, AtOnce)>> {
+    let Some(fixed) = choice.if_fixed.take().filter(|f| f.config.detector != choice.config.detector) else {
+        return Ok(None);
+    };
+    let mut begin = |config: &Config| -> Result<(FirstPass, AtOnce)> {
+        let (mut pass, mut at_once) = first_pass(frames, config, request)?;
+        pass.take_on(frames, &mut at_once, evidence::MOST_SCANS);
+        Ok((pass, at_once))
+    };
+    let mut own = begin(&choice.config)?;
+    if !if_fixed::is_followed(own.0.scans()) {
+        let mut candidate = begin(&fixed.config)?;
+        let info = frames.info();
+        let area_px2 = (info.width * info.height) as f64;
+        if let Some(reason) = if_fixed::wins(own.0.scans(), candidate.0.scans(), area_px2) {
+            *choice = *fixed;
+            choice.reasons.push(reason);
+            return Ok(None);
+        }
+    }
+    Ok(Some(own))
 }
 
 /// Lets smaller regions count where such move by themselves before a fixed camera, and returns the first pass that has begun with the area chosen; none where nothing was looked for, or where it

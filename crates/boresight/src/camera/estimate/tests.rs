@@ -281,3 +281,22 @@ fn a_fixed_camera_is_exactly_fixed_under_a_sensor_s_noise() {
         assert!(k == 0 || shift.is_some_and(|m| m.now_from_before.is_identity()), "frame {k}: {shift:?}");
     }
 }
+
+#[test]
+fn a_car_before_an_even_road_with_a_few_marks_is_not_the_camera() {
+    // A textured thing over a sixth of the view goes up; the road is noise, with marks near the border that stand.
+    let texture = ground();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut camera = CameraMotionEstimator::default();
+    for k in 0..20usize {
+        let mut frame = Image::filled(320, 240, 0u8);
+        frame.as_mut_slice().iter_mut().for_each(|p| *p = 100 + rng.random_range(0..4));
+        for (x, y) in [(30, 20), (150, 15), (290, 25), (20, 200), (285, 195)] {
+            (0..14).for_each(|r| frame.row_mut(y + r)[x..x + 14].copy_from_slice(&texture.row(y + r)[x..x + 14]));
+        }
+        let top = 100 - 3 * k;
+        (0..130).for_each(|r| frame.row_mut(top + r)[115..205].copy_from_slice(&texture.row(200 + r)[200..290]));
+        let motion = camera.step(&Pixels::Gray8(frame));
+        assert!(motion.is_none_or(|m| m.shift_px().norm() < 1.0), "frame {k}: {motion:?}");
+    }
+}
