@@ -24,3 +24,4 @@ pub mod smooth;
 pub mod stitch;
 mod stop;
 pub mod track;
+mod video_scale;

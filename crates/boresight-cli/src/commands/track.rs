@@ -7,6 +7,7 @@ use super::run_options::{self, InputArgs, Plan, TrackerArgs};
 use super::run_outcome;
 use super::run_summary::RunSummary;
 use super::stop::Stop;
+use super::video_scale::{self, VideoScale};
 use crate::console::say;
 use crate::progress;
 use boresight::draw::{AnnotatedVideo, Colours, DrawOptions, PngFolder, SteadyView, Thumbnail};
@@ -59,6 +60,10 @@ pub struct Args {
     /// Write no annotated video.
     #[arg(long)]
     no_video: bool,
+    /// Size of the annotated video beside the frames': 1, 2 to 8 times, or 1/2 to 1/32; absent, small frames are enlarged until they can be read, and those of more than 1280 x 720 pixels
+    /// reduced, by a whole number.
+    #[arg(long, value_name = "SCALE", value_parser = video_scale::parse, conflicts_with = "no_video")]
+    video_scale: Option<VideoScale>,
     /// Write no report.
     #[arg(long)]
     no_report: bool,
@@ -266,7 +271,7 @@ fn sinks(folder: &RunFolder, plan: &Plan, args: &Args, unit: LengthUnit) -> bore
     if folder.makes("annotated.mp4") {
         let path = folder.path("annotated.mp4");
         let coded = Mp4Options { still_as_before: true, ..Mp4Options::default() };
-        let video = AnnotatedVideo::create(path, DrawOptions::default(), coded)?;
+        let video = AnnotatedVideo::create(path, video_scale::drawn(args.video_scale), coded)?;
         sinks.push(match args.steady {
             true => Box::new(SteadyView::new(Box::new(video)).with_colours(colours(plan, input))),
             false => Box::new(video.with_colours(colours(plan, input))),

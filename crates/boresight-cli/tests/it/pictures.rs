@@ -71,6 +71,26 @@ fn a_table_is_drawn_on_the_pictures_of_its_numbers() {
 }
 
 #[test]
+fn the_annotated_video_has_the_size_that_is_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    sequence(dir.path(), 6);
+    let pictures = path(&dir.path().join("img1"));
+    let size = |out: &str, more: &[&str]| {
+        let of = [&["--frames", &pictures, "--no-report", "-q"], more].concat();
+        assert!(track(dir.path(), out, &of).status.success());
+        let video = path(&dir.path().join(out).join("annotated.mp4"));
+        let source = boresight::io::open(&video, &OpenOptions::default()).unwrap();
+        [source.info().width, source.info().height]
+    };
+    // Small frames are enlarged until numbers can be read.
+    assert_eq!(size("as-it-is", &[]), SIDES.map(|n| 8 * n));
+    assert_eq!(size("own", &["--video-scale", "1"]), SIDES);
+    assert_eq!(size("smaller", &["--video-scale", "1/2"]), SIDES.map(|n| n / 2));
+    let wrong = track(dir.path(), "wrong", &["--frames", &pictures, "--video-scale", "0.5"]);
+    assert!(wrong.status.code() == Some(2) && stderr(&wrong).contains("1/2 to 1/32"), "{}", stderr(&wrong));
+}
+
+#[test]
 fn a_missing_picture_is_said_and_the_others_keep_their_frames() {
     let dir = tempfile::tempdir().unwrap();
     sequence(dir.path(), 24);

@@ -9,13 +9,13 @@
 use super::canvas::{Canvas, Pen, Rgb};
 use super::colours::Colours;
 use super::labels::{Labels, Rect};
+use super::options::DrawOptions;
+use super::reduced::Reduced;
 use super::text::Lettering;
-use super::tone::{Tone, legible_scale};
+use super::tone::Tone;
 use crate::palette::track_colour;
 use crate::{CameraMotion, Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Standard deviations of the 95 % ellipse: sqrt(5.991), chi-square, 2 degrees of freedom.
@@ -31,68 +31,14 @@ const TRAIL_ALPHA: [f32; 2] = [0.25, 1.0];
 /// A dark edge keeps lines in sight on ground of their own brightness: its opacity.
 const EDGE_ALPHA: f32 = 0.5;
 
-/// What is drawn, and how.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct DrawOptions {
-    /// Enlargement of the picture, whole number, 1..=8; 0 chooses one at which numbers can be read.
-    pub scale: u32,
-    /// Length of the trails, s, 0..=3600; 0 draws none.
-    pub trail_s: f64,
-    /// Whether detections that no track took are marked with a small cross.
-    pub detections: bool,
-    /// Whether tracks that are not confirmed yet are drawn.
-    pub tentative: bool,
-    /// Whether the 95 % ellipse of the position is drawn.
-    pub ellipses: bool,
-    /// Whether boxes are drawn.
-    pub boxes: bool,
-    /// Whether track numbers are drawn.
-    pub labels: bool,
-    /// Whether a line with frame, time and number of tracks is drawn at the top.
-    pub caption: bool,
-}
-
-impl Default for DrawOptions {
-    fn default() -> Self {
-        Self {
-            scale: 0,
-            trail_s: 2.0,
-            detections: true,
-            tentative: false,
-            ellipses: true,
-            boxes: true,
-            labels: true,
-            caption: true,
-        }
-    }
-}
-
-impl DrawOptions {
-    /// Checks the values.
-    /// # Errors
-    /// [`ErrorKind::Config`] with the key, its value and what is expected.
-    pub fn validate(&self, at: &str) -> Result<()> {
-        if self.scale > 8 {
-            return Err(Error::new(ErrorKind::Config, "expected a whole number from 0 to 8")
-                .at(format!("{at}.scale = {}", self.scale))
-                .hint("0 chooses an enlargement at which track numbers can be read"));
-        }
-        if !(0.0..=3600.0).contains(&self.trail_s) {
-            return Err(Error::new(ErrorKind::Config, "expected seconds from 0 to 3600")
-                .at(format!("{at}.trail-s = {}", self.trail_s))
-                .hint("2 shows where a target has come from without hiding the picture"));
-        }
-        Ok(())
-    }
-}
-
 /// Where a track was, px, oldest first.
 type Trail = VecDeque<(Timestamp, (f64, f64))>;
 
 /// Draws views, one after the other; remembers the trails and the brightness.
 pub struct Annotator {
     options: DrawOptions,
+    most: (usize, usize),
+    reduced: Reduced,
     tone: Tone,
     lettering: Option<(f32, Lettering)>,
     trails: BTreeMap<TrackId, Trail>,
@@ -123,6 +69,8 @@ impl Annotator {
         options.validate("draw")?;
         Ok(Self {
             options,
+            most: (usize::MAX, usize::MAX),
+            reduced: Reduced::default(),
             tone: Tone::default(),
             lettering: None,
             trails: BTreeMap::new(),
@@ -138,6 +86,12 @@ impl Annotator {
         self.colours = colours;
     }
 
+    /// Makes no picture that is larger than that (longer side, shorter side), px.
+    #[cfg(feature = "encode")]
+    pub(super) fn set_most(&mut self, most: (usize, usize)) {
+        self.most = most;
+    }
+
     /// Draws a view into `out`, which is made as large as needed.
     /// # Errors
     /// [`ErrorKind::Output`] if the view has no frame to draw on.
@@ -147,13 +101,14 @@ impl Annotator {
                 .at(format!("frame {}", view.scan.index.0))
                 .hint("give the frames beside the table of detections, or leave pictures out")
         })?;
-        let scale = match self.options.scale {
-            0 => legible_scale(frame.pixels.width(), frame.pixels.height()),
-            n => n as usize,
-        };
+        let (scale, reduce) = self.options.sizes((frame.pixels.width(), frame.pixels.height()), self.most);
         let coloured = self.colours.as_mut().and_then(|c| c.pixels(view.scan.index));
         let coloured = coloured.filter(|p| (p.width(), p.height()) == (frame.pixels.width(), frame.pixels.height()));
-        self.tone.render(coloured.unwrap_or(&frame.pixels), scale, out);
+        let mut pixels = coloured.unwrap_or(&frame.pixels);
+        if reduce > 1 {
+            pixels = self.reduced.of(pixels, reduce);
+        }
+        self.tone.render(pixels, scale, out);
         self.remember(view);
         let height = out.height() as f32;
         let size_px = (height / 54.0).clamp(12.0, 44.0).round();
@@ -162,7 +117,7 @@ impl Annotator {
         }
         let width_px = (height / 600.0).clamp(1.0, 4.0);
         let mut canvas = Canvas::new(out);
-        let zoom = Zoom(scale as f64);
+        let zoom = Zoom(scale as f64 / reduce as f64);
         let tentative = self.options.tentative;
         let mut tracks: Vec<&TrackState> =
             view.tracks.iter().filter(|t| tentative || t.status != TrackStatus::Tentative).collect();

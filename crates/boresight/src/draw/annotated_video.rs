@@ -1,8 +1,9 @@
 //! A sink that makes an annotated video of views.
 
-use super::annotate::{Annotator, DrawOptions};
+use super::annotate::Annotator;
 use super::canvas::Rgb;
 use super::colours::Colours;
+use super::options::DrawOptions;
 use crate::io::video::{MAX_SIZE, Mp4Options, Mp4Writer};
 use crate::{Image, Result, Sink, View};
 use std::path::PathBuf;
@@ -13,14 +14,14 @@ const MIN_SIDE: usize = 16;
 /// Writes `annotated.mp4`: every frame with what was found in it.
 ///
 /// The file is created with the first frame, has its name only when whole, and is removed if the sink is dropped
-/// unfinished. Pictures beyond the encoder's size are made smaller by a whole number, smaller ones than it takes get a black
+/// unfinished. Frames beyond the encoder's size are made smaller by a whole number, smaller ones than it takes get a black
 /// margin at the right and below.
 pub struct AnnotatedVideo {
     path: PathBuf,
     annotator: Annotator,
     options: Mp4Options,
     writer: Option<Mp4Writer>,
-    large: Image<Rgb>,
+    narrow: Image<Rgb>,
 }
 
 opaque_debug!(AnnotatedVideo);
@@ -30,8 +31,9 @@ impl AnnotatedVideo {
     /// # Errors
     /// [`crate::ErrorKind::Config`] if an option is out of range.
     pub fn create(path: impl Into<PathBuf>, draw: DrawOptions, options: Mp4Options) -> Result<Self> {
-        let (path, annotator) = (path.into(), Annotator::new(draw)?);
-        Ok(Self { path, annotator, options, writer: None, large: Image::default() })
+        let (path, mut annotator) = (path.into(), Annotator::new(draw)?);
+        annotator.set_most(MAX_SIZE);
+        Ok(Self { path, annotator, options, writer: None, narrow: Image::default() })
     }
 
     /// Draws on the same frames in colour.
@@ -46,14 +48,9 @@ impl Sink for AnnotatedVideo {
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let mut picture = self.writer.as_ref().and_then(Mp4Writer::spare).unwrap_or_default();
         self.annotator.draw(view, &mut picture)?;
-        let shrink = shrink_for(picture.width(), picture.height());
-        if shrink > 1 {
-            std::mem::swap(&mut picture, &mut self.large);
-            reduce(&self.large, shrink, &mut picture);
-        }
         if picture.width().min(picture.height()) < MIN_SIDE {
-            std::mem::swap(&mut picture, &mut self.large);
-            margin(&self.large, &mut picture);
+            std::mem::swap(&mut picture, &mut self.narrow);
+            margin(&self.narrow, &mut picture);
         }
         if self.writer.is_none() {
             self.writer = Some(Mp4Writer::create(&self.path, picture.width(), picture.height(), self.options)?);
@@ -66,29 +63,6 @@ impl Sink for AnnotatedVideo {
 
     fn finish(self: Box<Self>) -> Result<()> {
         self.writer.map_or(Ok(()), Mp4Writer::finish)
-    }
-}
-
-/// By how much a picture must be made smaller for the encoder.
-fn shrink_for(width: usize, height: usize) -> usize {
-    let (long, short) = (width.max(height), width.min(height));
-    long.div_ceil(MAX_SIZE.0).max(short.div_ceil(MAX_SIZE.1)).max(1)
-}
-
-/// Takes the mean of `n` x `n` blocks; a side shorter than a block makes one smaller block.
-fn reduce(large: &Image<Rgb>, n: usize, out: &mut Image<Rgb>) {
-    let (across, down) = (n.min(large.width()), n.min(large.height()));
-    out.reset((large.width() / n).max(1), (large.height() / n).max(1), [0; 3]);
-    for y in 0..out.height() {
-        for (x, o) in out.row_mut(y).iter_mut().enumerate() {
-            let mut sum = [0u32; 3];
-            for row in 0..down {
-                for p in &large.row(y * n + row)[x * n..x * n + across] {
-                    sum.iter_mut().zip(p).for_each(|(s, v)| *s += u32::from(*v));
-                }
-            }
-            *o = sum.map(|s| (s / (across * down) as u32) as u8);
-        }
     }
 }
 
@@ -126,16 +100,6 @@ mod tests {
         assert_eq!((source.info().width, source.info().height, source.info().n_frames), (512, 384, Some(3)));
         source.next_frame().unwrap();
         assert_eq!(source.next_frame().unwrap().unwrap().time.ns, 40_000_000);
-    }
-
-    #[test]
-    fn pictures_beyond_the_encoder_are_made_smaller_by_a_whole_number() {
-        assert_eq!((shrink_for(3840, 2160), shrink_for(8192, 8192), shrink_for(100, 4000)), (1, 4, 2));
-        let mut out = Image::default();
-        reduce(&Image::from_vec(2, 2, vec![[0; 3], [4; 3], [8; 3], [12; 3]]).unwrap(), 2, &mut out);
-        assert_eq!(out.as_slice(), [[6; 3]]);
-        reduce(&Image::from_vec(1, 2, vec![[4; 3], [8; 3]]).unwrap(), 2, &mut out);
-        assert_eq!(out.as_slice(), [[6; 3]]);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! A sink that makes a folder of annotated PNG files, one a frame.
 
-use super::annotate::{Annotator, DrawOptions};
+use super::annotate::Annotator;
 use super::canvas::Rgb;
 use super::colours::Colours;
+use super::options::DrawOptions;
 use crate::io::{AtomicFile, AtomicFolder, remove_folder};
 use crate::{Error, ErrorKind, Image, Result, Sink, View};
 use std::fs::File;

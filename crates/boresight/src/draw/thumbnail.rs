@@ -1,7 +1,8 @@
 //! A sink that makes one small annotated picture of a run: its first frame with the most tracks that are reported.
 
-use super::annotate::{Annotator, DrawOptions};
+use super::annotate::Annotator;
 use super::canvas::Rgb;
+use super::options::DrawOptions;
 use super::png_folder::write_png;
 use crate::{Image, Result, Sink, TrackStatus, View};
 use std::path::PathBuf;

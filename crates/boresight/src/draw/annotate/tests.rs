@@ -42,12 +42,6 @@ fn rows_of(image: &Image<Rgb>, colour: Rgb) -> usize {
 }
 
 #[test]
-fn an_option_out_of_range_names_its_key() {
-    let err = DrawOptions { trail_s: -1.0, ..DrawOptions::default() }.validate("draw").unwrap_err();
-    assert!(err.to_string().starts_with("draw.trail-s = -1: expected seconds"), "{err}");
-}
-
-#[test]
 fn the_centre_of_a_pixel_stays_the_centre_of_its_block() {
     let zoom = Zoom(3.0);
     assert_eq!(zoom.point(0.0, 0.0), (1.0, 1.0));
