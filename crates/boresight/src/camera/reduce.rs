@@ -37,8 +37,14 @@ pub(super) fn blocks_of<T: Copy>(
             out.iter_mut().zip(row).for_each(|(o, p)| *o = value(*p));
             return;
         }
-        for (o, block) in out.iter_mut().zip(row.chunks_exact(factor)) {
-            *o += block.iter().map(|p| value(*p)).sum::<f32>();
+        match factor {
+            2 => add_pairs(row, out, &value),
+            4 => add_fours(row, out, &value),
+            _ => {
+                for (o, block) in out.iter_mut().zip(row.chunks_exact(factor)) {
+                    *o += block.iter().map(|p| value(*p)).sum::<f32>();
+                }
+            }
         }
     }
     let scale = 1.0 / (factor * factor) as f32;
@@ -64,11 +70,37 @@ pub(super) fn blocks<T: Copy>(
         sums.clear();
         sums.resize(w * factor, 0.0);
         for row in (y * factor..(y + 1) * factor).map(|y| image.row(y)) {
-            sums.iter_mut().zip(row).for_each(|(s, &p)| *s += value(p));
+            add_row(row, sums, &value);
         }
         for (o, block) in out.row_mut(y).iter_mut().zip(sums.chunks_exact(factor)) {
             *o = scale * block.iter().sum::<f32>();
         }
+    }
+}
+
+widest! {
+    fn add_row<T: Copy>(row: &[T], sums: &mut [f32], value: &impl Fn(T) -> f32) {
+        sums.iter_mut().zip(row).for_each(|(s, &p)| *s += value(p));
+    }
+}
+
+widest! {
+    fn add_pairs<T: Copy>(row: &[T], sums: &mut [f32], value: &impl Fn(T) -> f32) {
+        add_small::<2, T>(row, sums, value);
+    }
+}
+
+widest! {
+    fn add_fours<T: Copy>(row: &[T], sums: &mut [f32], value: &impl Fn(T) -> f32) {
+        add_small::<4, T>(row, sums, value);
+    }
+}
+
+/// Adds the sums of so many pixels each; the usual sizes of the blocks, with loops that the compiler turns into vectors.
+#[inline(always)]
+fn add_small<const N: usize, T: Copy>(row: &[T], sums: &mut [f32], value: &impl Fn(T) -> f32) {
+    for (s, block) in sums.iter_mut().zip(row.as_chunks::<N>().0) {
+        *s += block.iter().map(|p| value(*p)).sum::<f32>();
     }
 }
 

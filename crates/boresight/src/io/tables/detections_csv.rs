@@ -6,11 +6,10 @@
 //! variances a degree of freedom, and the chance of as much. Where each has a time of its own (a radar's plots), `age_s`: how long before the scan's time it was seen.
 //! Numbers are the shortest that read back to the same bits.
 
-use super::number::{push_f32, push_f64, push_seconds};
+use super::number::{push_f32, push_f64, push_int, push_seconds};
 use crate::io::atomic::Output;
 use crate::length_unit::LengthUnit;
 use crate::{PositionFit, Result, Sink, Timestamp, View};
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// The header of `detections.csv`.
@@ -27,6 +26,8 @@ const AGE_COLUMN: &str = ",age_s";
 pub struct DetectionsCsv {
     output: Output,
     lines: String,
+    /// Number and time of the frame, as its rows begin.
+    when: String,
     with_fits: bool,
     with_ages: bool,
 }
@@ -45,7 +46,13 @@ impl DetectionsCsv {
     /// # Errors
     /// [`crate::ErrorKind::Output`] if it cannot be written.
     pub fn to(output: Output) -> Result<Self> {
-        Ok(Self { output, lines: format!("{DETECTIONS_HEADER}\n"), with_fits: false, with_ages: false })
+        Ok(Self {
+            output,
+            lines: format!("{DETECTIONS_HEADER}\n"),
+            when: String::new(),
+            with_fits: false,
+            with_ages: false,
+        })
     }
 
     /// With columns that name this unit of length.
@@ -82,9 +89,13 @@ impl Sink for DetectionsCsv {
 
     fn put(&mut self, view: &View<'_>) -> Result<()> {
         let out = &mut self.lines;
+        let when = &mut self.when;
+        when.clear();
+        push_int(when, view.scan.index.0);
+        when.push(',');
+        push_seconds(when, view.scan.time);
         for d in &view.scan.detections {
-            let _ = write!(out, "{},", view.scan.index.0);
-            push_seconds(out, view.scan.time);
+            out.push_str(when);
             let e = &d.extent;
             let numbers = [
                 d.position.x,
@@ -101,7 +112,9 @@ impl Sink for DetectionsCsv {
                 out.push(',');
                 push_f64(out, v);
             }
-            let _ = write!(out, ",{},", d.area_px);
+            out.push(',');
+            push_int(out, d.area_px);
+            out.push(',');
             push_f32(out, d.peak);
             out.push(',');
             push_f64(out, d.sum);

@@ -1,10 +1,9 @@
 //! MOTChallenge results as a sink: `frame,id,left,top,width,height,conf,-1,-1,-1`, counted from 1 (see `dialect::mot`).
 
 use super::dialect::mot::mot_box_of_extent;
-use super::number::{push_f32, push_f64};
+use super::number::{push_f32, push_f64, push_int};
 use crate::io::atomic::Output;
 use crate::{Result, Sink, TrackStatus, View};
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Writes MOTChallenge text.
@@ -54,7 +53,9 @@ impl Sink for MotWriter {
             if !wanted {
                 continue;
             }
-            let _ = write!(out, "{},{}", view.scan.index.0 + 1, track.id.0);
+            push_int(out, view.scan.index.0 + 1);
+            out.push(',');
+            push_int(out, track.id.0);
             for v in mot_box_of_extent(&track.extent) {
                 out.push(',');
                 push_f64(out, v);

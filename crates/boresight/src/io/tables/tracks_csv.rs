@@ -5,11 +5,10 @@
 //! the detection that was taken among this frame's detections (empty: none). Numbers are the shortest that read back
 //! to the same bits. In metres the columns say so: `x_m`, `vx_m_per_s`.
 
-use super::number::{push_f64, push_seconds};
+use super::number::{push_f64, push_int, push_seconds};
 use crate::io::atomic::Output;
 use crate::length_unit::LengthUnit;
 use crate::{Result, Sink, TrackStatus, View};
-use std::fmt::Write;
 use std::path::PathBuf;
 
 /// The header of `tracks.csv`.
@@ -48,6 +47,8 @@ pub struct TracksCsv {
     /// Until it is written.
     header: Option<String>,
     lines: String,
+    /// Number and time of the frame, as its rows begin.
+    when: String,
 }
 
 opaque_debug!(TracksCsv);
@@ -64,7 +65,7 @@ impl TracksCsv {
     /// # Errors
     /// [`crate::ErrorKind::Output`] if it cannot be written.
     pub fn to(output: Output) -> Result<Self> {
-        Ok(Self { output, header: Some(format!("{TRACKS_HEADER}\n")), lines: String::new() })
+        Ok(Self { output, header: Some(format!("{TRACKS_HEADER}\n")), lines: String::new(), when: String::new() })
     }
 
     /// With columns that name this unit of length.
@@ -87,10 +88,17 @@ impl Sink for TracksCsv {
         self.put_header()?;
         let out = &mut self.lines;
         out.clear();
+        let when = &mut self.when;
+        when.clear();
+        push_int(when, view.scan.index.0);
+        when.push(',');
+        push_seconds(when, view.scan.time);
+        when.push(',');
         for track in view.tracks {
-            let _ = write!(out, "{},", view.scan.index.0);
-            push_seconds(out, view.scan.time);
-            let _ = write!(out, ",{},{}", track.id.0, status_word(track.status));
+            out.push_str(when);
+            push_int(out, track.id.0);
+            out.push(',');
+            out.push_str(status_word(track.status));
             let (mean, cov) = (&track.kinematics.mean, &track.kinematics.cov);
             for k in [0, 2, 1, 3] {
                 out.push(',');
@@ -108,7 +116,7 @@ impl Sink for TracksCsv {
             }
             out.push(',');
             if let Some(detection) = track.detection {
-                let _ = write!(out, "{detection}");
+                push_int(out, detection);
             }
             out.push('\n');
         }
