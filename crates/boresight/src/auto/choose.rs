@@ -79,6 +79,21 @@ pub(super) fn choose_seen(
     choose_looked(frames, &looked_again(scene, second, info)?, second, info, base, request)
 }
 
+/// What moves before a fixed camera as the frames are, or in one light where that hides it; and the share of it that isolated blobs explain.
+fn moving_in_any_light<'s>(
+    frames: &[Frame],
+    scene: &'s Scene,
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Option<(&'s Scene, f64)>> {
+    for scene in std::iter::once(scene).chain(scene.in_one_light.as_deref()) {
+        if let Some(explained) = moving::look(frames, scene, info, n_threads)? {
+            return Ok(Some((scene, explained)));
+        }
+    }
+    Ok(None)
+}
+
 /// What the frames of the second look show as a whole, if there are any, on the ground of the first ones.
 pub(super) fn looked_again(scene: Scene, second: &[Frame], info: &SourceInfo) -> Result<Scene> {
     let Some(frame) = second.first() else { return Ok(scene) };
@@ -132,7 +147,7 @@ pub(super) fn choose_looked(
     } else if let Some(reference) = coloured.then(|| colour::look(second, scene)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
     } else if scene.camera == Camera::Fixed
-        && let Some(explained) = moving::look(looked, scene, info, n_threads)?
+        && let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)?
     {
         moving::configure(scene, explained, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads)? {

@@ -14,7 +14,7 @@ use super::ground::{self, Ground};
 use super::looks;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
-use crate::vision::background::{Background, BackgroundConfig, BitImage};
+use crate::vision::background::{Background, BackgroundConfig, BitImage, in_one_light};
 use crate::vision::cluster::Clusterer;
 use crate::vision::colour::grey;
 use crate::vision::config::{ClusterConfig, DetectorConfig};
@@ -26,6 +26,8 @@ use nalgebra::Vector2;
 
 /// Width of the grid, px.
 const GRID_PX: usize = 400;
+/// The light is compared at one pixel in so many both ways, px of the grid.
+const LIGHT_STEP: usize = 4;
 /// Smallest region that counts, px of the grid.
 const MIN_AREA: u32 = 6;
 /// Frames in which isolated blobs are looked for.
@@ -74,6 +76,8 @@ pub struct Scene {
     moved: Vec<Vec<Moved>>,
     /// Where the first frame's ground lies in each frame, px; none before a fixed camera.
     pub ground: Vec<Ground>,
+    /// The same of the frames brought to one light, where that changes before a fixed camera.
+    pub in_one_light: Option<Box<Scene>>,
 }
 
 /// A moving region, px of the frame.
@@ -90,14 +94,30 @@ struct Moved {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
-    let mut scene = Scene { n_frames: frames.len(), ..Scene::default() };
     let step = info.width.div_ceil(GRID_PX).max(1);
     let grids: Vec<Image<f32>> = frames.iter().map(|f| grid(&f.pixels, step)).collect();
     let same = |g: &Image<f32>| grids.first().is_some_and(|f| (f.width(), f.height()) == (g.width(), g.height()));
     if grids.len() < 4 || !grids.iter().all(same) || grids.iter().any(|g| g.as_slice().is_empty()) {
-        return Ok(scene);
+        return Ok(Scene { n_frames: frames.len(), ..Scene::default() });
     }
-    let bytes = matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8);
+    let (scene, _) = look_at(frames, &grids, info, step)?;
+    // A change that would not count as moving is left.
+    let least = if is_of_bytes(info) { MIN_COUNTS } else { 0.0 };
+    let Some(lit) = in_one_light(&grids.iter().collect::<Vec<_>>(), LIGHT_STEP, least) else { return Ok(scene) };
+    // What differs by the light alone neither moves nor shows that the camera does. Before a camera that moves it is other ground that is brighter.
+    let (lit, edges_stand) = look_at(frames, &lit, info, step)?;
+    let lit = Scene { camera: Camera::Fixed, ground: Vec::new(), ..lit };
+    Ok(match (scene.camera, edges_stand) {
+        (Camera::Fixed, _) => Scene { in_one_light: Some(Box::new(lit)), ..scene },
+        (_, true) => lit,
+        _ => scene,
+    })
+}
+
+/// As [`look`], by grids of the frames; and whether their edges stand.
+fn look_at(frames: &[Frame], grids: &[Image<f32>], info: &SourceInfo, step: usize) -> Result<(Scene, bool)> {
+    let mut scene = Scene { n_frames: frames.len(), ..Scene::default() };
+    let bytes = is_of_bytes(info);
     let config =
         BackgroundConfig { start_s: 0.0, min_difference: bytes.then_some(MIN_COUNTS), ..BackgroundConfig::default() };
     let mut background = Background::<f32>::new(config)?;
@@ -108,7 +128,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     // Parts of one thing lie near each other.
     let join = ClusterConfig { distance_px: 4.0, min_area_px: Some(MIN_AREA), ..ClusterConfig::default() };
     let mut clusters = Clusterer::new(&join);
-    for g in &grids {
+    for g in grids {
         // No time passes: the background stays what it is.
         background.update(g, 0.0)?;
         edges_moved += edges.iter().filter(|e| e.has_moved(g)).count();
@@ -130,11 +150,21 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     }
     let stay = edges_moved as f64 / (edges.len() * grids.len()).max(1) as f64;
     let enough_edges = edges.len() * 1000 > grids[0].as_slice().len();
-    (scene.camera, scene.ground) = camera(frames, &grids, enough_edges.then_some(stay));
+    let edges_moved = enough_edges.then_some(stay);
+    (scene.camera, scene.ground) = camera(frames, grids, edges_moved);
     scene.novelty = ever.count() as f64 / all.max(1) as f64;
     measure(&mut scene, &moved, info);
     scene.moved = moved;
-    Ok(scene)
+    Ok((scene, edges_stand(edges_moved)))
+}
+
+fn is_of_bytes(info: &SourceInfo) -> bool {
+    matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8)
+}
+
+/// Whether edges are seen and stand: strong ones would show the smallest shift.
+fn edges_stand(edges_moved: Option<f64>) -> bool {
+    edges_moved.is_some_and(|share| share <= 0.03)
 }
 
 /// Every `step`-th pixel both ways, as grey.
@@ -214,9 +244,7 @@ fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (
             }
         }
     }
-    // Strong edges would show the smallest shift.
-    let edges_stand = edges_moved.is_some_and(|share| share <= 0.03);
-    if edges_stand || (2 * said >= n_steps && still == said) {
+    if edges_stand(edges_moved) || (2 * said >= n_steps && still == said) {
         return (Camera::Fixed, Vec::new());
     }
     // Patches that are followed may be the targets' own; the ground is most of the frame.
@@ -295,65 +323,5 @@ impl Scene {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_size_is_that_of_what_holds_half_of_the_area_however_many_flickers_there_are() {
-        let region = |side: f64| Moved { left: 0.0, top: 0.0, right: side, bottom: 2.0 * side, area: side * side };
-        let info = SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width: 320,
-            height: 240,
-            kind: PixelKind::Gray8,
-            n_frames: None,
-            rate_hz: None,
-            true_times: true,
-        };
-        let size = |frames: &[Vec<Moved>]| {
-            let mut scene = Scene::default();
-            measure(&mut scene, frames, &info);
-            scene.size_px
-        };
-        let among = |n_flickers: usize| {
-            let frame = [vec![region(40.0); 2], vec![region(3.0); n_flickers]].concat();
-            size(&[frame.clone(), Vec::new(), frame])
-        };
-        assert_eq!((among(0), among(100)), ([40.0, 80.0], [40.0, 80.0]));
-        // 400 of 9 px² are more than two of 1600 px².
-        assert_eq!((among(400), size(&[])), ([3.0, 6.0], [0.0; 2]));
-    }
-
-    #[test]
-    fn the_edges_of_a_camera_that_moves_are_seen_to_move_though_their_pixels_vary_as_much() {
-        // A roof's edge of 120 counts in noise of two, slanted, that comes by so many pixels a frame.
-        use rand::{RngExt, SeedableRng};
-        let share = |px_a_frame: f64| {
-            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-            let grids: Vec<Image<f32>> = (0..48)
-                .map(|k| {
-                    let mut grid = Image::filled(120, 90, 0f32);
-                    for y in 0..90 {
-                        let edge = 0.2 * y as f64 + 30.0 + px_a_frame * f64::from(k);
-                        for (x, p) in grid.row_mut(y).iter_mut().enumerate() {
-                            let z: f64 = rng.sample(rand_distr::StandardNormal);
-                            *p = (80.0 + 120.0 * (x as f64 - edge).clamp(0.0, 1.0) + 2.0 * z) as f32;
-                        }
-                    }
-                    grid
-                })
-                .collect();
-            let config =
-                BackgroundConfig { start_s: 0.0, min_difference: Some(MIN_COUNTS), ..BackgroundConfig::default() };
-            let mut background = Background::<f32>::new(config).unwrap();
-            background.prime(&grids.iter().collect::<Vec<_>>()).unwrap();
-            let edges = edges(&background, 120, 90, true);
-            assert!(edges.len() > 50);
-            let moved = grids.iter().map(|g| edges.iter().filter(|e| e.has_moved(g)).count()).sum::<usize>();
-            moved as f64 / (edges.len() * grids.len()) as f64
-        };
-        assert!(share(0.0) < 0.03, "{}", share(0.0));
-        assert!(share(0.4) > 0.2, "{}", share(0.4));
-    }
-}
+#[path = "scene/tests.rs"]
+mod tests;

@@ -5,6 +5,9 @@
 //! group may be covered by targets. Limits: gain 0.5 to 1.9; where dark and bright differ by less than 16 deviations the
 //! gain stays 1 (the offset alone is well known). Our own method; cost: one pixel in 64.
 
+use super::model::BackgroundPixel;
+use crate::Image;
+
 /// Light of a frame against the model: v = gain * m + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Light {
@@ -84,9 +87,92 @@ fn median(work: &mut Vec<f32>, values: impl Iterator<Item = f32>) -> Option<f32>
     Some(*work.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
+/// Least change of light that is taken off frames which a background is learnt from, deviations of a pixel: less widens its noise by little.
+const LEAST_CHANGE: f32 = 3.0;
+/// Mean absolute deviation of normal noise over the median absolute difference of two values with it: 0.7979 / (0.6745 · √2).
+const NOISE_OF_PAIRS: f32 = 0.836;
+
+/// The frames in the light of the one that is brighter than half of them, where that changes among them; `None` where it hardly does.
+///
+/// The grid has one pixel in `step` both ways; a change by less than `least`, counts, is none.
+pub(crate) fn in_one_light<T: BackgroundPixel>(frames: &[&Image<T>], step: usize, least: f32) -> Option<Vec<Image<T>>> {
+    let first = frames.first().filter(|_| frames.len() > 1)?;
+    let at = |i: &Image<T>, x: usize, y: usize| i.row(y)[x].to_f32();
+    let places = || {
+        let (w, h) = (first.width(), first.height());
+        (step / 2..h).step_by(step).flat_map(move |y| (step / 2..w).step_by(step).map(move |x| (x, y)))
+    };
+    let mut grid = Grid::default();
+    let mut by_light: Vec<(f32, usize)> = Vec::with_capacity(frames.len());
+    for (k, frame) in frames.iter().enumerate() {
+        by_light.push((median(&mut grid.work, places().map(|(x, y)| at(frame, x, y)))?, k));
+    }
+    by_light.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let k = by_light[frames.len() / 2].1;
+    let (reference, beside) = (frames[k], frames[if k > 0 { k - 1 } else { 1 }]);
+    // Two neighbours: their noise is what is left once their own light is taken off.
+    let differences: Vec<f32> = places().map(|(x, y)| at(beside, x, y) - at(reference, x, y)).collect();
+    let common = median(&mut grid.work, differences.iter().copied())?;
+    let noise = median(&mut grid.work, differences.iter().map(|d| (d - common).abs()))?;
+    let noise = (NOISE_OF_PAIRS * noise).max(T::NOISE_FLOOR);
+    let mut values: Vec<f32> = places().map(|(x, y)| at(reference, x, y)).filter(|v| v.is_finite()).collect();
+    let quartiles = [values.len() / 4, 3 * values.len() / 4].map(|k| {
+        let k = k.min(values.len().saturating_sub(1));
+        if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(k, f32::total_cmp).1 }
+    });
+    let lights: Vec<Light> = frames
+        .iter()
+        .map(|frame| {
+            grid.clear();
+            places().for_each(|(x, y)| {
+                let m = at(reference, x, y);
+                grid.push(m, at(frame, x, y) - m);
+            });
+            grid.light(noise)
+        })
+        .collect();
+    let change = |light: &Light| quartiles.map(|m| line(*light, m).abs()).into_iter().fold(0.0, f32::max);
+    if !lights.iter().any(|l| change(l) > least.max(LEAST_CHANGE * noise)) {
+        return None;
+    }
+    let lit = |(frame, light): (&&Image<T>, &Light)| {
+        let mut out = (*frame).clone();
+        let back = |v: &mut T| *v = T::from_f32((v.to_f32() - light.offset) / light.gain);
+        out.as_mut_slice().iter_mut().for_each(back);
+        out
+    };
+    Some(frames.iter().zip(&lights).map(lit).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_of_a_light_that_falls_are_brought_to_one_and_others_are_left() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let ground: Vec<f32> = (0..128 * 96).map(|i| 40.0 + 150.0 * ((i * 7919 % 128) as f32 / 128.0)).collect();
+        let mut frames = |falls_by: f32| -> Vec<Image<u8>> {
+            (0..9)
+                .map(|k| {
+                    let light = 1.0 - falls_by * k as f32;
+                    let pixels = ground.iter().map(|g| (light * g + 4.0 * rng.random::<f32>()) as u8);
+                    Image::from_vec(128, 96, pixels.collect()).unwrap()
+                })
+                .collect()
+        };
+        let (steady, falling) = (frames(0.0), frames(0.05));
+        assert!(in_one_light(&steady.iter().collect::<Vec<_>>(), 8, 0.0).is_none());
+        let lit = in_one_light(&falling.iter().collect::<Vec<_>>(), 8, 0.0).unwrap();
+        for k in 0..9 {
+            let differences = lit[k].as_slice().iter().zip(falling[4].as_slice()).map(|(a, b)| a.abs_diff(*b));
+            let mean = differences.map(f64::from).sum::<f64>() / (128.0 * 96.0);
+            // Uniform noise of 4 counts in both: 4 / 3, and rounding.
+            assert!(mean < 2.5, "frame {k}: {mean}");
+        }
+        assert!(in_one_light::<u8>(&[], 8, 0.0).is_none() && in_one_light(&[&falling[0]], 8, 0.0).is_none());
+    }
 
     #[test]
     fn gain_and_offset_are_found_though_four_in_ten_pixels_are_covered() {

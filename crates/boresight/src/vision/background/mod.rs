@@ -25,6 +25,7 @@ mod start;
 
 pub use config::BackgroundConfig;
 pub use difference::{DifferenceConfig, FrameDifference};
+pub(crate) use light::in_one_light;
 pub use model::BackgroundPixel;
 pub use morphology::{BitImage, CleanUp};
 pub(crate) use rows::pack;
@@ -110,7 +111,14 @@ impl<T: BackgroundPixel> Background<T> {
 
     /// As [`Background::prime`], from the few frames of the start: their noise is averaged over pixels nearby.
     pub(super) fn start_from(&mut self, frames: &[&Image<T>]) -> Result<()> {
-        self.learn_from(frames, NOISE_REACH)
+        let lit = self.in_one_light(frames);
+        self.learn_from(lit.as_ref().map(|l| l.iter().collect::<Vec<_>>()).as_deref().unwrap_or(frames), NOISE_REACH)
+    }
+
+    /// The frames without what the light does among them, if it does anything: it is no noise of the pixels.
+    fn in_one_light(&self, frames: &[&Image<T>]) -> Option<Vec<Image<T>>> {
+        let alike = frames.windows(2).all(|f| (f[0].width(), f[0].height()) == (f[1].width(), f[1].height()));
+        (self.config.follow_light && alike).then(|| light::in_one_light(frames, GRID_PX, 0.0)).flatten()
     }
 
     /// Time in which the background is learned at first, s; 0 if it knows one.
@@ -224,7 +232,10 @@ impl<T: BackgroundPixel> Background<T> {
             self.samples.push(frame.clone());
         }
         if self.now_s >= start_s && self.n_averaged > 1 {
-            let samples = std::mem::take(&mut self.samples);
+            let mut samples = std::mem::take(&mut self.samples);
+            if let Some(lit) = self.in_one_light(&samples.iter().collect::<Vec<_>>()) {
+                samples = lit;
+            }
             self.learn_median(&samples.iter().collect::<Vec<_>>(), NOISE_REACH);
         }
     }
