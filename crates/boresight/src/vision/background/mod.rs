@@ -10,6 +10,8 @@
 //!    Image Processing 20(6), 2011, here without chance);
 //! 5. the bits are cleaned (`morphology`).
 //!
+//! The frames of the start are brought to one light before their medians are taken (`light`).
+//!
 //! All times are in seconds of real time. A row is updated as seldom as its rate allows (see `model`), with the time that
 //! has passed. Limits: the camera stands still but for a pixel; the first `start-s` seconds learn.
 
