@@ -89,8 +89,8 @@ fn median(work: &mut Vec<f32>, values: impl Iterator<Item = f32>) -> Option<f32>
 
 /// Least change of light that is taken off frames which a background is learnt from, deviations of a pixel: less widens its noise by little.
 const LEAST_CHANGE: f32 = 3.0;
-/// Mean absolute deviation of normal noise over the median absolute difference of two values with it: 0.7979 / (0.6745 · √2).
-const NOISE_OF_PAIRS: f32 = 0.836;
+/// Mean absolute deviation of normal noise over the third quartile of the absolute difference of two values with it: 0.7979 / (1.1503 · √2).
+const NOISE_OF_PAIRS: f32 = 0.4905;
 
 /// The frames in the light of the one that is brighter than half of them, where that changes among them; `None` where it hardly does.
 ///
@@ -108,29 +108,34 @@ pub(crate) fn in_one_light<T: BackgroundPixel>(frames: &[&Image<T>], step: usize
         by_light.push((median(&mut grid.work, places().map(|(x, y)| at(frame, x, y)))?, k));
     }
     by_light.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let k = by_light[frames.len() / 2].1;
-    let (reference, beside) = (frames[k], frames[if k > 0 { k - 1 } else { 1 }]);
-    // Two neighbours: their noise is what is left once their own light is taken off.
-    let differences: Vec<f32> = places().map(|(x, y)| at(beside, x, y) - at(reference, x, y)).collect();
-    let common = median(&mut grid.work, differences.iter().copied())?;
-    let noise = median(&mut grid.work, differences.iter().map(|d| (d - common).abs()))?;
-    let noise = (NOISE_OF_PAIRS * noise).max(T::NOISE_FLOOR);
+    let reference = frames[by_light[frames.len() / 2].1];
     let mut values: Vec<f32> = places().map(|(x, y)| at(reference, x, y)).filter(|v| v.is_finite()).collect();
     let quartiles = [values.len() / 4, 3 * values.len() / 4].map(|k| {
         let k = k.min(values.len().saturating_sub(1));
         if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(k, f32::total_cmp).1 }
     });
-    let lights: Vec<Light> = frames
-        .iter()
-        .map(|frame| {
+    // The noise is what the light leaves of the differences, in three of four frames, so that none that happens to be like the reference says it.
+    let mut lights_of = |noise: f32| -> (Vec<Light>, Vec<f32>) {
+        let of_frame = |frame: &&Image<T>| {
             grid.clear();
             places().for_each(|(x, y)| {
                 let m = at(reference, x, y);
                 grid.push(m, at(frame, x, y) - m);
             });
-            grid.light(noise)
-        })
-        .collect();
+            let light = grid.light(noise);
+            let Grid { pairs, work } = &mut grid;
+            work.clear();
+            work.extend(pairs.iter().map(|p| (p.1 - line(light, p.0)).abs()));
+            let third = 3 * work.len() / 4;
+            let left = if third < work.len() { *work.select_nth_unstable_by(third, f32::total_cmp).1 } else { 0.0 };
+            (light, NOISE_OF_PAIRS * left)
+        };
+        frames.iter().map(of_frame).unzip()
+    };
+    let (_, mut noises) = lights_of(T::NOISE_FLOOR);
+    let (_, noise, _) = noises.select_nth_unstable_by(3 * frames.len() / 4, f32::total_cmp);
+    let noise = noise.max(T::NOISE_FLOOR);
+    let (lights, _) = lights_of(noise);
     let change = |light: &Light| quartiles.map(|m| line(*light, m).abs()).into_iter().fold(0.0, f32::max);
     if !lights.iter().any(|l| change(l) > least.max(LEAST_CHANGE * noise)) {
         return None;
