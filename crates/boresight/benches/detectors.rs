@@ -1,7 +1,7 @@
 //! Whole detectors, a frame: `isolated`, `spot` and movers before a fixed camera, on the frames that their aims name.
 //!
 //! Run: `cargo bench -p boresight --bench detectors`. Fixed seeds; one thread; eight frames in turn. Scenes: the sample clip (320 x 256), 50 and 600 round spots in white noise, and ten textured things before
-//! a textured ground with noise of 2 counts.
+//! a textured ground with even noise of 2 counts either way.
 
 use boresight::sim::{SceneConfig, Seed};
 use boresight::vision::background::BackgroundConfig;

@@ -7,6 +7,8 @@
 //!    in a frame, without shadows and changes of light, is joined to regions;
 //! 3. where it is asked for, which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
 //!
+//! Where the light changes, 1 and 2 are asked once more of the frames brought to one light.
+//!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
 use super::fixed_blocks;
@@ -100,30 +102,45 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     if grids.len() < 4 || !grids.iter().all(same) || grids.iter().any(|g| g.as_slice().is_empty()) {
         return Ok(Scene { n_frames: frames.len(), ..Scene::default() });
     }
-    let (scene, _) = look_at(frames, &grids, info, step)?;
+    let bytes = matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8);
+    let background = primed(&grids, bytes)?;
+    let moved = edges_moved(&background, &grids, bytes);
+    let mut scene = what_moves(background, &grids, info, step)?;
+    (scene.camera, scene.ground) = camera(frames, &grids, moved);
     // A change that would not count as moving is left.
-    let least = if is_of_bytes(info) { MIN_COUNTS } else { 0.0 };
+    let least = if bytes { MIN_COUNTS } else { 0.0 };
     let Some(lit) = in_one_light(&grids.iter().collect::<Vec<_>>(), LIGHT_STEP, least) else { return Ok(scene) };
     // What differs by the light alone neither moves nor shows that the camera does. Before a camera that moves it is other ground that is brighter.
-    let (lit, edges_stand) = look_at(frames, &lit, info, step)?;
-    let lit = Scene { camera: Camera::Fixed, ground: Vec::new(), ..lit };
-    Ok(match (scene.camera, edges_stand) {
-        (Camera::Fixed, _) => Scene { in_one_light: Some(Box::new(lit)), ..scene },
-        (_, true) => lit,
-        _ => scene,
-    })
+    let background = primed(&lit, bytes)?;
+    let stood = scene.camera == Camera::Fixed;
+    if !stood && !edges_stand(edges_moved(&background, &lit, bytes)) {
+        return Ok(scene);
+    }
+    let lit = Scene { camera: Camera::Fixed, ..what_moves(background, &lit, info, step)? };
+    Ok(if stood { Scene { in_one_light: Some(Box::new(lit)), ..scene } } else { lit })
 }
 
-/// As [`look`], by grids of the frames; and whether their edges stand.
-fn look_at(frames: &[Frame], grids: &[Image<f32>], info: &SourceInfo, step: usize) -> Result<(Scene, bool)> {
-    let mut scene = Scene { n_frames: frames.len(), ..Scene::default() };
-    let bytes = is_of_bytes(info);
+/// The background of grids.
+fn primed(grids: &[Image<f32>], bytes: bool) -> Result<Background<f32>> {
     let config =
         BackgroundConfig { start_s: 0.0, min_difference: bytes.then_some(MIN_COUNTS), ..BackgroundConfig::default() };
     let mut background = Background::<f32>::new(config)?;
     background.prime(&grids.iter().collect::<Vec<_>>())?;
-    let edges = edges(&background, grids[0].width(), grids[0].height(), bytes);
-    let (mut moved, mut edges_moved) = (Vec::with_capacity(grids.len()), 0);
+    Ok(background)
+}
+
+/// Share of the background's edge pixels that move, if there are enough.
+fn edges_moved(background: &Background<f32>, grids: &[Image<f32>], bytes: bool) -> Option<f64> {
+    let edges = edges(background, grids[0].width(), grids[0].height(), bytes);
+    let n_moved: usize = grids.iter().map(|g| edges.iter().filter(|e| e.has_moved(g)).count()).sum();
+    let enough = edges.len() * 1000 > grids[0].as_slice().len();
+    enough.then(|| n_moved as f64 / (edges.len() * grids.len()).max(1) as f64)
+}
+
+/// What moves in grids before their background.
+fn what_moves(mut background: Background<f32>, grids: &[Image<f32>], info: &SourceInfo, step: usize) -> Result<Scene> {
+    let mut scene = Scene { n_frames: grids.len(), ..Scene::default() };
+    let mut moved = Vec::with_capacity(grids.len());
     let (mut ever, mut all) = (BitImage::new(grids[0].width(), grids[0].height()), 0);
     // Parts of one thing lie near each other.
     let join = ClusterConfig { distance_px: 4.0, min_area_px: Some(MIN_AREA), ..ClusterConfig::default() };
@@ -131,7 +148,6 @@ fn look_at(frames: &[Frame], grids: &[Image<f32>], info: &SourceInfo, step: usiz
     for g in grids {
         // No time passes: the background stays what it is.
         background.update(g, 0.0)?;
-        edges_moved += edges.iter().filter(|e| e.has_moved(g)).count();
         clusters.begin(g.width());
         all += background.moving().count();
         for y in 0..g.height() {
@@ -148,18 +164,10 @@ fn look_at(frames: &[Frame], grids: &[Image<f32>], info: &SourceInfo, step: usiz
         });
         moved.push(found.collect::<Vec<_>>());
     }
-    let stay = edges_moved as f64 / (edges.len() * grids.len()).max(1) as f64;
-    let enough_edges = edges.len() * 1000 > grids[0].as_slice().len();
-    let edges_moved = enough_edges.then_some(stay);
-    (scene.camera, scene.ground) = camera(frames, grids, edges_moved);
     scene.novelty = ever.count() as f64 / all.max(1) as f64;
     measure(&mut scene, &moved, info);
     scene.moved = moved;
-    Ok((scene, edges_stand(edges_moved)))
-}
-
-fn is_of_bytes(info: &SourceInfo) -> bool {
-    matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8)
+    Ok(scene)
 }
 
 /// Whether edges are seen and stand: strong ones would show the smallest shift.

@@ -4,8 +4,8 @@
 
 use crate::{Image, Pixels};
 
-/// Most pixels of a picture that is made smaller because nothing is said of its size: 1280 x 720, what most screens show at once. Coding
-/// a pixel takes as long as decoding several.
+/// Most pixels of a picture that is made smaller because nothing is said of its size: 1280 x 720, what most screens show at once: of
+/// 1080p in noise coding takes five times what decoding does (docs/speed.md).
 const MOST_PX: usize = 1280 * 720;
 
 /// Side of the blocks, px, with which a frame of that size has at most [`MOST_PX`].
@@ -95,7 +95,10 @@ impl Reduced {
 
 fn blocks<T: Mean>(image: &Image<T>, n: usize, out: &mut Image<T>) {
     let (across, down) = (n.min(image.width()), n.min(image.height()));
-    out.reset((image.width() / n.max(1)).max(1), (image.height() / n.max(1)).max(1), T::default());
+    let (w, h) = ((image.width() / n.max(1)).max(1), (image.height() / n.max(1)).max(1));
+    if (out.width(), out.height()) != (w, h) {
+        out.reset(w, h, T::default());
+    }
     if across == 0 || down == 0 {
         return;
     }
