@@ -17,6 +17,7 @@ pub mod fit;
 pub mod integrate;
 pub(crate) mod isolated;
 pub(crate) mod llr;
+mod middle;
 pub mod noise;
 pub(crate) mod noise_level;
 pub(crate) mod pixel;

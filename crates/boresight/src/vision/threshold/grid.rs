@@ -6,6 +6,7 @@
 //! target fills. Limits: a target must fill less than half of a cell; detail smaller than a cell is not followed.
 
 use crate::Image;
+use crate::vision::middle::middle;
 use crate::vision::pixel::Pixel;
 use crate::vision::whole;
 
@@ -63,12 +64,11 @@ impl BackgroundGrid {
                     let row = image.row(y);
                     // Shift every other row by half a step: no column pattern goes unseen.
                     let start = columns.start + (i % 2) * (step / 2);
-                    for x in (start..columns.end).step_by(step) {
-                        let v = row[x].value_f32();
-                        if v.is_finite() {
-                            self.samples.push(v);
-                        }
-                    }
+                    let sampled = row[start.min(columns.end)..columns.end].iter().step_by(step).map(|v| v.value_f32());
+                    self.samples.extend(sampled);
+                }
+                if T::STEP == 0.0 {
+                    self.samples.retain(|v| v.is_finite());
                 }
                 let (median, deviation) = median_and_deviation(&mut self.samples, T::STEP);
                 self.median[cy * self.nx + cx] = median;
@@ -135,14 +135,6 @@ fn between(x: f64, cell: usize, n: usize) -> (usize, usize, f64) {
     let u = ((x - (cell as f64 - 1.0) / 2.0) / cell as f64).clamp(0.0, (n - 1) as f64);
     let i = (u as usize).min(n - 1);
     (i, (i + 1).min(n - 1), u - i as f64)
-}
-
-/// The mean of the two middle values, or the middle one of an odd number; changes their order.
-fn middle(values: &mut [f32]) -> f32 {
-    let n = values.len();
-    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f32::total_cmp);
-    let lower = if n % 2 == 1 { upper } else { below.iter().copied().max_by(f32::total_cmp).unwrap_or(upper) };
-    0.5 * (lower + upper)
 }
 
 /// Median and 1.4826 x MAD of values; whole-number values (`step` 1) are taken as spread evenly over +- 1/2. Changes their order.

@@ -2,13 +2,13 @@
 
 pub(crate) mod band;
 mod bits;
-mod box_mean;
+mod boxes;
 pub(crate) mod grid;
 pub(crate) mod level;
 pub(crate) mod local;
 pub(crate) mod otsu;
-mod reaching;
 pub(crate) mod spot;
+mod summits;
 pub use band::words;
 pub use bits::band_bits;
 pub use grid::BackgroundGrid;

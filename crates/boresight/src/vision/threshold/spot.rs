@@ -11,15 +11,22 @@
 //! somewhat larger. Pixels without a value (NaN) take their left neighbour's.
 //! Symbols: σ noise of one pixel (counts); p position in the disc (px).
 
-use super::box_mean::BoxMean;
+use super::boxes::Boxes;
 use super::grid::BackgroundGrid;
-use super::reaching::{BLOCK, find_reaching};
+use super::summits::{Rows, find_summits};
 use super::{Side, SpotConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::target_finder::{PixelNoise, TargetFinder, TypedFrame};
 use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
+
+mod disc;
+
+use disc::{Moments, moments, part};
+
+/// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
+const MOST_PULL: f64 = 0.7;
 
 /// A spot.
 #[derive(Clone, Debug)]
@@ -31,14 +38,6 @@ struct Spot {
     pull: f64,
     score: f32,
     peak: (usize, usize),
-}
-
-/// Sums of the positive response over a disc.
-struct Moments {
-    sum: f64,
-    moment: Vector2<f64>,
-    /// Of half the response times the distance, where the disc's edge is soft.
-    edge: f64,
 }
 
 /// A spot of one sign as a detection, before the signs are compared.
@@ -64,15 +63,15 @@ pub struct SpotDetector {
     spans: Vec<(i32, i32)>,
     /// Σ_j (K * p_x)_j², px².
     noise_gain: f64,
-    frame: Image<f32>,
-    smoothed: Image<f32>,
+    /// A float frame without missing values.
+    whole: Image<f32>,
     response: Image<f32>,
-    boxes: BoxMean,
+    boxes: Boxes,
     grid: BackgroundGrid,
     noise: PixelNoise,
     level: Vec<f32>,
-    /// Blocks of the row in which a pixel reaches the level.
-    reaching: Vec<usize>,
+    /// Columns of the row where a pixel may be a peak.
+    summits: Vec<usize>,
     spots: Vec<Spot>,
     keep: Vec<bool>,
     found: Vec<Found>,
@@ -118,14 +117,13 @@ impl SpotDetector {
             disc,
             spans,
             noise_gain,
-            frame: Image::default(),
-            smoothed: Image::default(),
+            whole: Image::default(),
             response: Image::default(),
-            boxes: BoxMean::default(),
+            boxes: Boxes::new(smooth, surround),
             grid: BackgroundGrid::new(cell),
             noise: PixelNoise::default(),
             level: Vec::new(),
-            reaching: Vec::new(),
+            summits: Vec::new(),
             spots: Vec::new(),
             keep: Vec::new(),
             found: Vec::new(),
@@ -152,7 +150,7 @@ impl SpotDetector {
             self.drop_doubles();
             let mut found = std::mem::take(&mut self.found);
             found.extend(self.spots.iter().map(|s| Found {
-                detection: self.detection(s, noise, sign),
+                detection: self.detection(image, s, noise, sign),
                 response: self.response.row(s.peak.1)[s.peak.0],
                 peak: s.peak,
                 sign,
@@ -177,33 +175,21 @@ impl SpotDetector {
     }
 
     fn fill_response<T: Pixel>(&mut self, image: &Image<T>) {
-        let (w, h) = (image.width(), image.height());
-        for work in [&mut self.frame, &mut self.smoothed, &mut self.response] {
-            if (work.width(), work.height()) != (w, h) {
-                work.reset(w, h, 0.0);
-            }
+        if T::STEP > 0.0 {
+            return self.boxes.run(image, &mut self.response);
         }
-        let pixels = self.frame.as_mut_slice().iter_mut().zip(image.as_slice());
-        let run = if T::STEP > 0.0 {
-            pixels.for_each(|(f, p)| *f = p.value_f32());
-            BoxMean::run_whole
-        } else {
-            let mut last = 0.0;
-            for (f, p) in pixels {
-                let v = p.value_f32();
-                if v.is_finite() {
-                    last = v;
-                }
-                *f = last;
-            }
-            BoxMean::run
-        };
-        run(&mut self.boxes, &self.frame, self.smooth, &mut self.response);
-        self.boxes.run(&self.response, self.smooth, &mut self.smoothed);
-        run(&mut self.boxes, &self.frame, self.surround, &mut self.response);
-        for (r, s) in self.response.as_mut_slice().iter_mut().zip(self.smoothed.as_slice()) {
-            *r = s - *r;
+        if (self.whole.width(), self.whole.height()) != (image.width(), image.height()) {
+            self.whole.reset(image.width(), image.height(), 0.0);
         }
+        let mut last = 0.0;
+        for (f, p) in self.whole.as_mut_slice().iter_mut().zip(image.as_slice()) {
+            let v = p.value_f32();
+            if v.is_finite() {
+                last = v;
+            }
+            *f = last;
+        }
+        self.boxes.run(&self.whole, &mut self.response);
     }
 
     fn find_peaks(&mut self) {
@@ -215,22 +201,11 @@ impl SpotDetector {
             let row = self.response.row(y);
             let above = if y > 0 { self.response.row(y - 1) } else { &[] };
             let below = if y + 1 < h { self.response.row(y + 1) } else { &[] };
-            self.reaching.clear();
-            find_reaching(row, &self.level, &mut self.reaching);
-            for block in &self.reaching {
-                for x in (block * BLOCK..(block + 1) * BLOCK).take_while(|x| *x < row.len()) {
-                    let (v, level) = (row[x], self.level[x]);
-                    if !(v >= level && v > 0.0) {
-                        continue;
-                    }
-                    // Most pixels have a larger one beside them.
-                    let is_beside = (x > 0 && row[x - 1] >= v)
-                        || row.get(x + 1).is_some_and(|o| *o > v)
-                        || above.get(x).is_some_and(|o| *o >= v)
-                        || below.get(x).is_some_and(|o| *o > v);
-                    if !is_beside && self.is_peak(x, y, v) {
-                        spots.push(self.centre(x, y, v));
-                    }
+            self.summits.clear();
+            find_summits(Rows { above, row, below, level: &self.level }, &mut self.summits);
+            for &x in &self.summits {
+                if self.is_peak(x, y, row[x]) {
+                    spots.push(self.centre(x, y, row[x]));
                 }
             }
         }
@@ -256,12 +231,13 @@ impl SpotDetector {
         let mut c = Vector2::new(x as f64, y as f64);
         let (mut mass, mut pull) = (0.0, 0.0);
         for _ in 0..30 {
-            let Moments { sum, moment, edge } = self.moments(c);
+            let Moments { sum, moment, edge } = moments(&self.response, self.radius, c);
             if sum <= 0.0 {
                 break;
             }
             (mass, pull) = (sum, edge / sum);
-            let step = moment / sum;
+            // The centroid follows the disc by `pull` of its way (Newton's step): where it stands still is so much further.
+            let step = moment / sum / (1.0 - pull.min(MOST_PULL));
             let next = c + step;
             if !(0.0..=w - 1.0).contains(&next.x) || !(0.0..=h - 1.0).contains(&next.y) {
                 break;
@@ -275,47 +251,6 @@ impl SpotDetector {
         // A response without spread (an empty frame but for the target) is as sure as f32 can say.
         let score = ((f64::from(v) - median) / deviation.max(1e-6)).min(1e9) as f32;
         Spot { position: c, mass, pull, score, peak: (x, y) }
-    }
-
-    /// The sums over the disc around the pixel nearest to `c`, about `c`.
-    fn moments(&self, c: Vector2<f64>) -> Moments {
-        let mut m = Moments { sum: 0.0, moment: Vector2::zeros(), edge: 0.0 };
-        let (cx, cy) = (c.x.round(), c.y.round());
-        let outer = self.radius as f64 + 0.5;
-        let (inner2, outer2) = ((outer - 1.0).powi(2), outer.powi(2));
-        let (w, h) = (self.response.width() as i64, self.response.height() as i64);
-        for &(dy, reach) in &self.spans {
-            let y = cy as i64 + i64::from(dy);
-            if !(0..h).contains(&y) {
-                continue;
-            }
-            let (from, to) = ((cx as i64 - i64::from(reach)).max(0), (cx as i64 + i64::from(reach) + 1).min(w));
-            let Some(row) = self.response.row(y as usize).get(from as usize..to.max(from) as usize) else { continue };
-            let py = cy + f64::from(dy) - c.y;
-            for (i, d) in row.iter().enumerate() {
-                let d = d.max(0.0);
-                if d == 0.0 {
-                    continue;
-                }
-                let px = (from + i as i64) as f64 - c.x;
-                let d = f64::from(d);
-                let r2 = px * px + py * py;
-                if r2 >= outer2 {
-                    continue;
-                }
-                // A soft edge one pixel wide: what enters and leaves as the disc moves does so steadily.
-                let window = if r2 <= inner2 {
-                    1.0
-                } else {
-                    let r = r2.sqrt();
-                    m.edge += 0.5 * d * r;
-                    outer - r
-                };
-                m.sum += window * d;
-                m.moment += Vector2::new(px, py) * (window * d);
-            }
-        }
-        m
     }
 
     /// Of spots closer than size / 2 the strongest stays.
@@ -340,25 +275,29 @@ impl SpotDetector {
         self.spots.retain(|_| keep.next().is_none_or(|k| *k));
     }
 
-    fn detection(&self, spot: &Spot, (variance, gain): (f64, f64), sign: f32) -> Detection {
+    fn detection<T: Pixel>(&self, image: &Image<T>, spot: &Spot, noise: (f64, f64), sign: f32) -> Detection {
         let (cx, cy) = (spot.position.x.round() as i64, spot.position.y.round() as i64);
-        let top = self.at(spot.peak.0 as i64, spot.peak.1 as i64).unwrap_or(0.0);
+        let top = self.response.get(spot.peak.0, spot.peak.1).unwrap_or(0.0);
         // The pixels above half the peak, for the size.
         let (mut area, mut low, mut high) = (0, (cx, cy), (cx, cy));
         let mut peak = f32::NEG_INFINITY;
-        for &(dx, dy) in &self.disc {
-            let (x, y) = (cx + i64::from(dx), cy + i64::from(dy));
-            if self.at(x, y).is_some_and(|v| v >= 0.5 * top) {
-                area += 1;
-                low = (low.0.min(x), low.1.min(y));
-                high = (high.0.max(x), high.1.max(y));
-                peak = peak.max(sign * self.frame.get(x as usize, y as usize).unwrap_or(0.0));
+        for &(dy, reach) in &self.spans {
+            let y = cy + i64::from(dy);
+            let (from, row) = part(&self.response, y, cx - i64::from(reach), cx + i64::from(reach));
+            let (_, pixels) = part(image, y, cx - i64::from(reach), cx + i64::from(reach));
+            for (x, (v, pixel)) in (from..).zip(row.iter().zip(pixels)) {
+                if *v >= 0.5 * top {
+                    area += 1;
+                    low = (low.0.min(x), low.1.min(y));
+                    high = (high.0.max(x), high.1.max(y));
+                    peak = peak.max(sign * pixel.value_f32());
+                }
             }
         }
-        // Rounding and clipping leave a little even without noise.
-        let level = self.frame.get(spot.peak.0, spot.peak.1).unwrap_or(0.0).max(0.0);
-        let variance = (variance + gain * f64::from(level)).max(0.0);
-        let sd2 = variance * self.noise_gain / (spot.mass * (1.0 - spot.pull.min(0.7))).powi(2) + 1e-4;
+        // Rounding and clipping leave a little even without noise. A missing value counts as 0.
+        let level = image.get(spot.peak.0, spot.peak.1).map_or(0.0, Pixel::value).max(0.0);
+        let variance = (noise.0 + noise.1 * level).max(0.0);
+        let sd2 = variance * self.noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2) + 1e-4;
         Detection {
             position: spot.position,
             cov: Matrix2::identity() * sd2,
@@ -392,12 +331,9 @@ fn noise_gain(disc: &[(i32, i32)], radius: usize, smooth: usize, surround: usize
         weight.row_mut(y as usize)[x as usize] = dx as f32 * window as f32;
     }
     // The kernel is symmetric, so filtering the weights is the transposed filter.
-    let mut boxes = BoxMean::default();
-    let (mut a, mut b, mut c) = (Image::default(), Image::default(), Image::default());
-    boxes.run(&weight, smooth, &mut a);
-    boxes.run(&a, smooth, &mut b);
-    boxes.run(&weight, surround, &mut c);
-    b.as_slice().iter().zip(c.as_slice()).map(|(s, m)| f64::from(s - m).powi(2)).sum()
+    let mut seen = Image::default();
+    Boxes::new(smooth, surround).run(&weight, &mut seen);
+    seen.as_slice().iter().map(|v| f64::from(*v).powi(2)).sum()
 }
 
 #[cfg(test)]

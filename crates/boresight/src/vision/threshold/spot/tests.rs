@@ -48,7 +48,7 @@ fn the_response_to_one_pixel_is_the_kernel_and_a_missing_value_takes_its_left_ne
     }
     let holes = Image::from_vec(4, 1, vec![f32::NAN, 3.0, f32::NAN, f32::INFINITY]).unwrap();
     detector.fill_response(&holes);
-    assert_eq!(detector.frame.as_slice(), [0.0, 3.0, 3.0, 3.0]);
+    assert_eq!(detector.whole.as_slice(), [0.0, 3.0, 3.0, 3.0]);
 }
 
 #[test]
@@ -175,29 +175,32 @@ fn a_response_below_the_least_contrast_is_none() {
 fn size_peak_and_variance_are_read_from_the_response() {
     let mut d = SpotDetector::new(&SpotConfig::default());
     d.response = Image::filled(20, 20, 0.0);
-    d.frame = Image::filled(20, 20, 7.0);
+    let mut frame = Image::filled(20, 20, 7.0f32);
     for (x, y, r, v) in
         [(9, 9, 10.0, 20.0), (10, 9, 6.0, 26.0), (11, 9, 5.0, 12.0), (9, 10, 5.0, 3.0), (8, 9, 4.9, 90.0)]
     {
         d.response.row_mut(y)[x] = r;
-        d.frame.row_mut(y)[x] = v;
+        frame.row_mut(y)[x] = v;
     }
     d.noise_gain = 2.0;
     let spot = |pull| Spot { position: Vector2::new(9.4, 9.2), mass: 10.0, pull, score: 4.0, peak: (9, 9) };
-    let bright = d.detection(&spot(0.5), (3.0, 0.1), 1.0);
+    let bright = d.detection(&frame, &spot(0.5), (3.0, 0.1), 1.0);
     // Half the peak or more: (9, 9), (10, 9), (11, 9), (9, 10).
     assert_eq!(bright.extent, Extent { left_px: 8.5, top_px: 8.5, width_px: 3.0, height_px: 2.0 });
     assert_eq!((bright.area_px, bright.peak, bright.sum, bright.score), (4, 26.0, 10.0, 4.0));
     assert_eq!(bright.position, Vector2::new(9.4, 9.2));
-    assert_eq!(d.detection(&spot(0.5), (3.0, 0.1), -1.0).peak, 3.0);
+    assert_eq!(d.detection(&frame, &spot(0.5), (3.0, 0.1), -1.0).peak, 3.0);
     // (3 + 0.1 x 20) x 2 / (10 x 0.5)² + 1e-4.
-    let variance = |spot: &Spot, noise| d.detection(spot, noise, 1.0).cov[(0, 0)];
+    let variance = |spot: &Spot, noise| d.detection(&frame, spot, noise, 1.0).cov[(0, 0)];
     assert!((variance(&spot(0.5), (3.0, 0.1)) - 0.4001).abs() < 1e-12);
     assert!((variance(&spot(0.0), (3.0, 0.0)) - 0.0601).abs() < 1e-12);
     assert!((variance(&spot(0.95), (9.0, 0.0)) - 2.0001).abs() < 1e-12, "a disc is pulled by 0.7 at most");
     assert_eq!(bright.cov, Matrix2::identity() * bright.cov[(0, 0)]);
-    d.frame.row_mut(9)[9] = -20.0;
-    assert!((d.detection(&spot(0.0), (3.0, 0.1), 1.0).cov[(0, 0)] - 0.0601).abs() < 1e-12, "no shot noise below 0");
+    frame.row_mut(9)[9] = -20.0;
+    assert!(
+        (d.detection(&frame, &spot(0.0), (3.0, 0.1), 1.0).cov[(0, 0)] - 0.0601).abs() < 1e-12,
+        "no shot noise below 0"
+    );
 }
 
 #[test]

@@ -1,0 +1,119 @@
+//! Sums of a response over a disc with a soft edge, many pixels side by side.
+//!
+//! Symbols: r distance from the disc's middle, px; the weight of a pixel is 1 up to radius - 1/2, falls to 0 at radius + 1/2 and does so evenly, so that what enters and leaves as
+//! the disc moves does so steadily.
+
+use crate::Image;
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch, f32x8, f64x4};
+use nalgebra::Vector2;
+
+/// Pixels of a row that are summed side by side.
+const LANES: usize = 8;
+
+/// Sums of the positive response over a disc.
+pub(super) struct Moments {
+    pub(super) sum: f64,
+    pub(super) moment: Vector2<f64>,
+    /// Of half the response times the distance, where the disc's edge is soft.
+    pub(super) edge: f64,
+}
+
+/// The pixels of row `y` from column `from` to `to`, both included, as far as they are in the image, and the column of the first.
+#[inline(always)]
+pub(super) fn part<T: Copy>(image: &Image<T>, y: i64, from: i64, to: i64) -> (i64, &[T]) {
+    if !(0..image.height() as i64).contains(&y) {
+        return (from, &[]);
+    }
+    let first = from.max(0);
+    let end = (to + 1).min(image.width() as i64).max(first);
+    (first, image.row(y as usize).get(first as usize..end as usize).unwrap_or(&[]))
+}
+
+/// The sums over the disc around `c`, about `c`.
+pub(super) fn moments(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments {
+    dispatch!(Level::new(), simd => moments_vectors(simd, response, radius, c))
+}
+
+#[inline(always)]
+fn moments_vectors<S: Simd>(simd: S, response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments {
+    let outer = radius as f64 + 0.5;
+    let (width, height) = (response.width(), response.height());
+    // The pixels whose middles lie in the square around the disc.
+    let within = |c: f64, size: usize| {
+        ((c - outer).ceil().max(0.0) as usize, ((c + outer).floor() + 1.0).clamp(0.0, size as f64) as usize)
+    };
+    let ((left, right), (top, bottom)) = (within(c.x, width), within(c.y, height));
+    let splat = |v| f64x4::splat(simd, v);
+    let (zero, one, half, outer) = (splat(0.0), splat(1.0), splat(0.5), splat(outer));
+    let steps = f64x4::from_slice(simd, &[0.0, 1.0, 2.0, 3.0]);
+    let [mut sum, mut x, mut y, mut edge] = [zero; 4];
+    for row in top..bottom {
+        let pixels = response.row(row);
+        let py = splat(row as f64 - c.y);
+        let py2 = py * py;
+        for at in (left..right).step_by(LANES) {
+            // What is read beyond the disc has no weight.
+            let read = match pixels.get(at..at + LANES) {
+                Some(lanes) => f32x8::from_slice(simd, lanes),
+                None => {
+                    let mut lanes = [0.0f32; LANES];
+                    let rest = &pixels[at..];
+                    lanes[..rest.len()].copy_from_slice(rest);
+                    f32x8::from_slice(simd, &lanes)
+                }
+            };
+            let (low, high) = read.max(f32x8::splat(simd, 0.0)).widen();
+            let px = steps + splat(at as f64 - c.x);
+            for (d, px) in [(low, px), (high, px + splat(4.0))] {
+                let r = (px * px + py2).sqrt();
+                let window = (outer - r).max(zero).min(one);
+                // Neither outside nor inside.
+                let soft = window.simd_lt(one).select(d * r, zero);
+                edge += window.simd_gt(zero).select(half * soft, zero);
+                let d = window * d;
+                sum += d;
+                x += d * px;
+                y += d * py;
+            }
+        }
+    }
+    let moment = Vector2::new(x.reduce_sum(), y.reduce_sum());
+    Moments { sum: sum.reduce_sum(), moment, edge: edge.reduce_sum() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sums pixel by pixel.
+    fn plain(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for (y, x) in (0..response.height()).flat_map(|y| (0..response.width()).map(move |x| (y, x))) {
+            let from = Vector2::new(x as f64, y as f64) - c;
+            let within = radius as f64 + 0.5 - from.norm();
+            let d = f64::from(response.row(y)[x].max(0.0));
+            let weight = within.clamp(0.0, 1.0);
+            let edge = if weight > 0.0 && weight < 1.0 { 0.5 * d * from.norm() } else { 0.0 };
+            for (sum, v) in sums.iter_mut().zip([weight * d, weight * d * from.x, weight * d * from.y, edge]) {
+                *sum += v;
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn the_sums_are_those_over_the_whole_image_wherever_the_disc_lies() {
+        let response = Image::from_vec(31, 20, (0..620).map(|i| ((i * 37) % 101) as f32 - 30.0).collect()).unwrap();
+        for radius in [1, 2, 3, 7, 12] {
+            for c in [[15.2, 9.7], [0.0, 0.0], [30.0, 19.0], [29.51, 0.49], [1.5, 18.5]] {
+                let c = Vector2::from(c);
+                let m = moments(&response, radius, c);
+                let of = [m.sum, m.moment.x, m.moment.y, m.edge];
+                for (ours, expected) in of.iter().zip(plain(&response, radius, c)) {
+                    assert!((ours - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{radius} {c} {ours} {expected}");
+                }
+            }
+        }
+    }
+}
