@@ -4,6 +4,7 @@
 
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
+use super::second_look::Second;
 use super::{cells, colour, faint, moving, particles, spots, steadied, summed};
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
@@ -13,13 +14,13 @@ const ASSUMED_SIDE: f64 = 0.05;
 /// What is said where a size is assumed.
 const NOTHING_SEEN: &str = "Nothing of that kind is seen in the frames looked at: the size is assumed.";
 
-/// Writes detector and tracker of that kind; `frames` are the first ones, `looked` those of the second look, if there are any.
+/// Writes detector and tracker of that kind; `frames` are the first ones, `second` those of the second look, if there are any.
 /// # Errors
 /// No colour of a moving thing's own; frames of more than one size or pixel type.
 pub fn configure(
     kind: DetectorKind,
     frames: &[Frame],
-    looked: &[Frame],
+    second: &Second<'_>,
     scene: &Scene,
     interval_s: f64,
     info: &SourceInfo,
@@ -45,7 +46,7 @@ pub fn configure(
             summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Moving => {
-            let explained = scene.explained(if looked.is_empty() { frames } else { looked }, info, n_threads)?;
+            let explained = scene.explained(&second.or(frames), info, n_threads)?;
             moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
         }
         DetectorKind::Steadied => steadied::configure_asked(frames, scene, info, config, reasons)?,
@@ -60,7 +61,7 @@ pub fn configure(
             cells::configure(&seen, info, interval_s, config, reasons);
         }
         DetectorKind::Colour => {
-            let Some(reference) = colour::look(looked, scene) else {
+            let Some(reference) = colour::look(&second.coloured, scene, info) else {
                 return Err(Error::new(
                     ErrorKind::Config,
                     "no moving thing with a colour of its own was seen before a fixed camera",
@@ -126,7 +127,7 @@ mod tests {
         };
         let scene = super::super::scene::look(&frames, &info)?;
         let (mut config, mut reasons) = (Config::default(), Vec::new());
-        configure(kind, &frames, &[], &scene, 0.04, &info, 1, &mut config, &mut reasons)?;
+        configure(kind, &frames, &Second::default(), &scene, 0.04, &info, 1, &mut config, &mut reasons)?;
         Ok((config, reasons))
     }
 

@@ -8,6 +8,7 @@ use super::asked;
 use super::interval::interval_s;
 use super::request::Request;
 use super::scene::{self, Camera, Scene};
+use super::second_look::Second;
 use super::spread::growing;
 use super::whole_tracks::report_whole;
 use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
@@ -64,14 +65,14 @@ impl Choice {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
-    choose_seen(frames, scene::look(frames, info)?, &[], info, base, &Request::default())
+    choose_seen(frames, scene::look(frames, info)?, &Second::default(), info, base, &Request::default())
 }
 
 /// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
 pub(super) fn choose_seen(
     frames: &[Frame],
     scene: Scene,
-    second: &[Frame],
+    second: &Second<'_>,
     info: &SourceInfo,
     base: &Config,
     request: &Request,
@@ -81,7 +82,7 @@ pub(super) fn choose_seen(
 
 /// What moves before a fixed camera as the frames are, or in one light where that hides it; and the share of it that isolated blobs explain.
 fn moving_in_any_light<'s>(
-    frames: &[Frame],
+    frames: &[&Frame],
     scene: &'s Scene,
     info: &SourceInfo,
     n_threads: usize,
@@ -95,9 +96,10 @@ fn moving_in_any_light<'s>(
 }
 
 /// What the frames of the second look show as a whole, if there are any, on the ground of the first ones.
-pub(super) fn looked_again(scene: Scene, second: &[Frame], info: &SourceInfo) -> Result<Scene> {
-    let Some(frame) = second.first() else { return Ok(scene) };
-    let mut seen = scene::look(second, &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
+pub(super) fn looked_again(scene: Scene, second: &Second<'_>, info: &SourceInfo) -> Result<Scene> {
+    let Some(frame) = second.frames.first() else { return Ok(scene) };
+    let mut seen =
+        scene::look(second.frames.iter().copied(), &SourceInfo { kind: frame.pixels.kind(), ..info.clone() })?;
     // The ground is that of the first frames, whose order and gaps motion is told by.
     seen.ground = scene.ground;
     Ok(seen)
@@ -107,7 +109,7 @@ pub(super) fn looked_again(scene: Scene, second: &[Frame], info: &SourceInfo) ->
 pub(super) fn choose_looked(
     frames: &[Frame],
     scene: &Scene,
-    second: &[Frame],
+    second: &Second<'_>,
     info: &SourceInfo,
     base: &Config,
     request: &Request,
@@ -117,8 +119,8 @@ pub(super) fn choose_looked(
     let mut config = base.clone();
     let (mut runner_up, mut gain) = (None, f64::INFINITY);
     let interval_s = interval_s(frames, info);
-    let n_looked = frames.len().max(second.len());
-    let looked = if second.is_empty() { frames } else { second };
+    let n_looked = frames.len().max(second.frames.len());
+    let looked = &second.or(frames)[..];
     let over_s = match (frames.first(), looked.last()) {
         (Some(first), Some(last)) => last.time.seconds_since(first.time),
         _ => 0.0,
@@ -144,7 +146,7 @@ pub(super) fn choose_looked(
     let coloured = base.input.colour != Colour::Gray;
     if let Some(kind) = request.detector {
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
-    } else if let Some(reference) = coloured.then(|| colour::look(second, scene)).flatten() {
+    } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
     } else if scene.camera == Camera::Fixed
         && let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)?

@@ -17,8 +17,8 @@ const SEEN: f64 = 0.4;
 /// Least saturation of a colour that tells a target from its surroundings.
 const LEAST_SATURATION: f64 = 0.1;
 
-/// The colour of a single moving target, if there is one.
-pub fn look(frames: &[Frame], scene: &Scene) -> Option<Reference> {
+/// The colour of a single moving target, if there is one; `frames` may hold every so many-th pixel of the source's.
+pub fn look(frames: &[&Frame], scene: &Scene, info: &SourceInfo) -> Option<Reference> {
     let images: Vec<_> = frames
         .iter()
         .filter_map(|f| match &f.pixels {
@@ -29,8 +29,13 @@ pub fn look(frames: &[Frame], scene: &Scene) -> Option<Reference> {
     if images.is_empty() || scene.camera != Camera::Fixed || scene.regions > MOST_REGIONS {
         return None;
     }
-    let seen = |r: &Reference| r.n_frames as f64 >= SEEN * scene.n_moving as f64;
-    choose_reference(&images).filter(|r| seen(r) && r.hsi.saturation >= LEAST_SATURATION)
+    // Of as many frames as the scene was seen in, or fewer.
+    let n_moving = scene.n_moving as f64 * images.len() as f64 / scene.n_frames.max(1) as f64;
+    let seen = |r: &Reference| r.n_frames as f64 >= SEEN * n_moving;
+    // Of large frames a part of the pixels may have been kept.
+    let every_px = info.width.div_ceil(images[0].width().max(1)) as f64;
+    let reference = choose_reference(&images).filter(|r| seen(r) && r.hsi.saturation >= LEAST_SATURATION)?;
+    Some(Reference { area_px: reference.area_px * every_px * every_px, ..reference })
 }
 
 /// Writes detector and tracker.
@@ -103,7 +108,7 @@ mod tests {
         let frames: Vec<Frame> = (0..12).map(frame).collect();
         let mut scene = Scene::default();
         (scene.camera, scene.n_frames, scene.n_moving) = (Camera::Fixed, 12, 2);
-        let reference = look(&frames, &scene).unwrap();
+        let reference = look(&frames.iter().collect::<Vec<_>>(), &scene, &info).unwrap();
         assert!(reference.n_frames > scene.n_moving, "{reference:?}");
         let (mut config, mut reasons) = (Config::default(), Vec::new());
         configure(&reference, &info, &mut config, &mut reasons);

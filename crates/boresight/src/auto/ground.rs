@@ -81,7 +81,7 @@ fn spreads(residuals: &[(Vector2<f64>, Option<f64>)], (w, h): (usize, usize), ou
 }
 
 /// The ground in each frame; `steps` are the estimator's motions from frame to frame.
-pub fn follow(frames: &[Frame], steps: &[Homography]) -> Vec<Ground> {
+pub fn follow(frames: &[&Frame], steps: &[Homography]) -> Vec<Ground> {
     let (mut plane, mut first_patches, mut first) =
         (PlaneFollower::default(), PlanePatches::default(), Image::default());
     let (mut line, mut now) = (Vec::new(), Image::default());
@@ -169,7 +169,7 @@ mod tests {
     /// How far the ground's origin has gone, px.
     fn gone(n: u64, from: u64, step: Homography) -> f64 {
         let frames = frames(n, from);
-        let ground = follow(&frames, &vec![step; frames.len()]);
+        let ground = follow(&frames.iter().collect::<Vec<_>>(), &vec![step; frames.len()]);
         -ground[frames.len() - 1].of(Vector2::zeros()).x
     }
 

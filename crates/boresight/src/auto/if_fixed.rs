@@ -14,7 +14,7 @@ use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(
-    frames: &[Frame],
+    frames: &[&Frame],
     scene: &Scene,
     info: &SourceInfo,
     n_threads: usize,

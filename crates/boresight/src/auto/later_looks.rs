@@ -12,6 +12,7 @@ use super::choose::{Choice, choose_seen};
 use super::evidence::Evidence;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
+use super::second_look::Second;
 use super::spots::{self, Seen, Side};
 use super::spread::growing;
 use super::{looks, scene};
@@ -31,7 +32,7 @@ pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> R
     let mut most: Option<Choice> = None;
     for start in starts(ahead.len()) {
         let window = &ahead[start..start + PROBE_FRAMES];
-        let later = choose_seen(window, scene::look(window, &info)?, &[], &info, base, request)?;
+        let later = choose_seen(window, scene::look(window, &info)?, &Second::default(), &info, base, request)?;
         if later.gain > most.as_ref().map_or(0.0, |m| m.gain) {
             most = Some(later);
         }
@@ -206,7 +207,7 @@ mod tests {
         let at = |start: usize| {
             let window = &frames[start..start + PROBE_FRAMES];
             let (scene, request) = (scene::look(window, &info).unwrap(), Request::default());
-            choose_seen(window, scene, &[], &info, &Config::default(), &request).unwrap().gain
+            choose_seen(window, scene, &Second::default(), &info, &Config::default(), &request).unwrap().gain
         };
         let [short, long] = [at(48), at(150)];
         assert!(0.0 < short && short < long, "{short} {long}");

@@ -43,18 +43,28 @@ const LEAST_FRAMES: usize = 12;
 /// Whether what moves, if the camera stands, is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<f64>> {
+pub fn look(frames: &[&Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<f64>> {
     if !fits(scene, info) {
         return Ok(None);
     }
     Ok(Some(scene.explained(frames, info, n_threads)?).filter(|e| *e <= MOST_EXPLAINED))
 }
 
-/// Whether what moves, if the camera stands, is large, lasting and new enough.
-fn fits(scene: &Scene, info: &SourceInfo) -> bool {
+/// Whether it is open that such things move: large ones are seen, but not as they should be.
+pub fn is_open(scene: &Scene, info: &SourceInfo) -> bool {
+    are_large(scene, info) && !fits(scene, info)
+}
+
+/// Whether large things move, if the camera stands.
+fn are_large(scene: &Scene, info: &SourceInfo) -> bool {
     let side = scene.size_px[0].max(scene.size_px[1]);
     scene.n_moving as f64 >= SHARE_OF_FRAMES * scene.n_frames as f64
         && side >= LEAST_SIDE * info.width.max(info.height) as f64
+}
+
+/// Whether what moves, if the camera stands, is large, lasting and new enough.
+fn fits(scene: &Scene, info: &SourceInfo) -> bool {
+    are_large(scene, info)
         && scene.size_px[0] <= MOST_SHARE[0] * info.width as f64
         && scene.size_px[1] <= MOST_SHARE[1] * info.height as f64
         && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64

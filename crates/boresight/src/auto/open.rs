@@ -7,13 +7,14 @@
 //! 4. run the detector over the frames read ahead and learn noise and motion from its detections ([`learn()`]);
 //! 5. hand on the frames. Only where a colour was chosen is the file opened anew: grey frames cannot be turned into coloured ones.
 
-use super::choose::{Choice, choose_seen};
+use super::choose::{Choice, choose_looked, choose_seen, looked_again};
 use super::first_scans::{self, PROBE_FRAMES};
 use super::later_looks;
 use super::learn::learn;
+use super::moving;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
-use super::second_look;
+use super::second_look::{self, Read};
 use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::track::Tracking;
 use crate::vision::Detector;
@@ -42,7 +43,7 @@ opaque_debug!(Opened);
 pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
     let input = input.as_ref();
     let on_disk = second_look::can_be_opened_twice(input);
-    let beside = (on_disk && base.input.colour != Colour::Rgb).then(|| second_look::beside(PROBE_FRAMES));
+    let beside = (on_disk && base.input.colour != Colour::Rgb).then(second_look::beside);
     let read = |config: &Config, colours_beside: Option<ColoursBeside>| -> Result<Replay> {
         let options = OpenOptions { colours_beside, ..config.input.open_options() };
         let source = config.input.mend(crate::io::open(input, &options)?)?;
@@ -53,16 +54,14 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
     };
     let mut frames = read(base, beside.clone())?;
-    let second = |frames: &mut Replay, is_wanted: bool| match &beside {
-        Some(beside) if !is_wanted => {
-            beside.end();
-            Vec::new()
+    let anew = || Read::All(second_look::frames(input, base, PROBE_FRAMES));
+    let second = |frames: &mut Replay, wanted: Wanted| match (wanted, &beside) {
+        (Wanted::None, beside) => {
+            beside.iter().for_each(ColoursBeside::end);
+            None
         }
-        Some(beside) => {
-            second_look::from_beside(beside, frames).unwrap_or_else(|| second_look::frames(input, base, PROBE_FRAMES))
-        }
-        None if on_disk && is_wanted => second_look::frames(input, base, PROBE_FRAMES),
-        None => Vec::new(),
+        (Wanted::First, Some(beside)) => Some(second_look::from_beside(beside, frames).unwrap_or_else(anew)),
+        (Wanted::First | Wanted::Anew, _) => on_disk.then(anew),
     };
     let mut choice = choose_from(&mut frames, second, base, request)?;
     if on_disk {
@@ -88,17 +87,29 @@ pub fn read_and_choose(
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, MOST_BYTES);
     let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
-    let second = |_: &mut Replay, is_wanted: bool| {
-        again.filter(|_| is_wanted).map(|source| second_look::spread(source, PROBE_FRAMES)).unwrap_or_default()
+    let mut again = again;
+    let second = |_: &mut Replay, wanted: Wanted| match wanted {
+        Wanted::None => None,
+        _ => again.take().map(|source| Read::All(second_look::spread_over(source, PROBE_FRAMES))),
     };
     let choice = choose_from(&mut frames, second, base, request)?;
     Ok((frames, choice))
 }
 
-/// The choice from frames read ahead; `second` gives those of the second look, which only a fixed camera or a colour asks for: it is told whether they are wanted.
+/// What is wanted of a second look.
+enum Wanted {
+    /// Nothing: it is not taken.
+    None,
+    /// Frames in colour, as they are had for the least.
+    First,
+    /// Frames of a second reading.
+    Anew,
+}
+
+/// The choice from frames read ahead; `second` gives those of the second look, which only a fixed camera or a colour asks for.
 fn choose_from(
     frames: &mut Replay,
-    second: impl FnOnce(&mut Replay, bool) -> Vec<Frame>,
+    mut second: impl FnMut(&mut Replay, Wanted) -> Option<Read>,
     base: &Config,
     request: &Request,
 ) -> Result<Choice> {
@@ -106,12 +117,27 @@ fn choose_from(
     let scene = scene::look(probed(frames.ahead()), &info)?;
     // Who does not know whether it stands looks longer.
     let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
-    let second = second(frames, look_again);
-    let choice = choose_seen(probed(frames.ahead()), scene, &second, &info, base, request)?;
+    let mut read = second(frames, if look_again { Wanted::First } else { Wanted::None });
+    if matches!(read, Some(Read::Coloured(_))) && request.detector.is_none() {
+        let ahead = frames.ahead();
+        let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default();
+        let seen = looked_again(scene.clone(), &looked, &info)?;
+        if seen.camera == Camera::Fixed && !moving::is_open(&seen, &info) {
+            let choice = choose_looked(probed(ahead), &seen, &looked, &info, base, request)?;
+            if choice.is_evident() {
+                return Ok(choice);
+            }
+        }
+        // Too few to say it: more are worth another reading.
+        read = second(frames, Wanted::Anew);
+    }
+    let ahead = frames.ahead();
+    let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default();
+    let choice = choose_seen(probed(ahead), scene, &looked, &info, base, request)?;
     if choice.is_evident() || request.detector.is_some() {
         return Ok(choice);
     }
-    drop(second);
+    drop(read);
     Ok(later_looks::choice(frames, base, request)?.unwrap_or(choice))
 }
 

@@ -95,7 +95,8 @@ struct Moved {
 /// Looks at frames of one size in the order of time.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
+pub fn look<'f>(frames: impl IntoIterator<Item = &'f Frame>, info: &SourceInfo) -> Result<Scene> {
+    let frames: Vec<&Frame> = frames.into_iter().collect();
     let step = info.width.div_ceil(GRID_PX).max(1);
     let grids: Vec<Image<f32>> = frames.iter().map(|f| grid(&f.pixels, step)).collect();
     let same = |g: &Image<f32>| grids.first().is_some_and(|f| (f.width(), f.height()) == (g.width(), g.height()));
@@ -106,7 +107,7 @@ pub fn look(frames: &[Frame], info: &SourceInfo) -> Result<Scene> {
     let background = primed(&grids, bytes)?;
     let moved = edges_moved(&background, &grids, bytes);
     let mut scene = what_moves(background, &grids, info, step)?;
-    (scene.camera, scene.ground) = camera(frames, &grids, moved);
+    (scene.camera, scene.ground) = camera(&frames, &grids, moved);
     // A change that would not count as moving is left.
     let least = if bytes { MIN_COUNTS } else { 0.0 };
     let Some(lit) = in_one_light(&grids.iter().collect::<Vec<_>>(), LIGHT_STEP, least) else { return Ok(scene) };
@@ -232,7 +233,7 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<E
 
 /// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
 /// edges.
-fn camera(frames: &[Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Ground>) {
+fn camera(frames: &[&Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Ground>) {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
     let (mut moved, mut steps) = (Homography::identity(), Vec::with_capacity(frames.len()));
@@ -298,7 +299,7 @@ impl Scene {
     /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
     /// # Errors
     /// Frames of more than one size or pixel type.
-    pub fn explained(&self, frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<f64> {
+    pub fn explained(&self, frames: &[&Frame], info: &SourceInfo, n_threads: usize) -> Result<f64> {
         let moved = &self.moved;
         let moving: Vec<usize> = (0..moved.len()).filter(|&i| !moved[i].is_empty()).collect();
         let isolated = IsolatedConfig {
@@ -312,7 +313,7 @@ impl Scene {
         let Some(first) = frames.first() else { return Ok(0.0) };
         // A second look may have another kind of pixels than the source announced.
         let seen = SourceInfo { kind: first.pixels.kind(), ..info.clone() };
-        let scans = looks::scans(&config, spread(&moving, LOOKS).map(|&i| &frames[i]), &seen, n_threads)?;
+        let scans = looks::scans(&config, spread(&moving, LOOKS).map(|&i| frames[i]), &seen, n_threads)?;
         let (mut n, mut hits) = (0usize, 0usize);
         for (scan, &i) in scans.iter().zip(spread(&moving, LOOKS)) {
             for m in &moved[i] {

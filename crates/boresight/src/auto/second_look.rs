@@ -1,9 +1,13 @@
 //! The second look at a file whose camera stands still: over its first [`SECOND_LOOK_FRAMES`] frames and in colour.
 //!
 //! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither. Small frames are kept in colour while the file
-//! is read ahead ([`ColoursBeside`]); else it is read a second time.
+//! is read ahead ([`ColoursBeside`]). Of large ones (beyond 493 kpx) those held for the first pass are looked at, some 5 s of 1080p, with small ones in colour; only where the camera is
+//! not seen to stand in them, nothing is chosen by them, or too few can be held, is the file read a second time.
 
-use crate::io::{Colour, ColoursBeside, OpenOptions, Replay};
+use super::first_scans::PROBE_FRAMES;
+use super::spread::spread;
+use crate::io::{Colour, ColoursBeside, KeepColours, MOST_BYTES, OpenOptions, Replay};
+use crate::vision::colour::GRID_PX;
 use crate::{Config, Frame, FrameSource, PixelKind};
 use std::ffi::OsStr;
 use std::path::Path;
@@ -12,6 +16,51 @@ use std::path::Path;
 pub const SECOND_LOOK_FRAMES: usize = 400;
 /// Most memory taken by the frames kept of them, bytes.
 const MAX_BYTES: usize = 256 << 20;
+/// Least number of frames held for the first pass that show as much: twice what the first look sees.
+const LEAST_HELD: usize = 2 * PROBE_FRAMES;
+
+/// The frames of a second look; none where it was not taken.
+#[derive(Debug, Default)]
+pub(super) struct Second<'a> {
+    /// In the order of time, spread evenly.
+    pub frames: Vec<&'a Frame>,
+    /// Those that are in colour, or the same.
+    pub coloured: Vec<&'a Frame>,
+}
+
+impl<'a> Second<'a> {
+    /// Frames that are looked at and are in colour, if the file is.
+    pub(super) fn of(frames: &'a [Frame]) -> Self {
+        let all: Vec<&Frame> = frames.iter().collect();
+        Self { frames: all.clone(), coloured: all }
+    }
+
+    /// The frames, or those of the first look where there are none.
+    pub(super) fn or(&self, first: &'a [Frame]) -> Vec<&'a Frame> {
+        if self.frames.is_empty() { first.iter().collect() } else { self.frames.clone() }
+    }
+}
+
+/// What was read for a second look.
+#[derive(Debug)]
+pub(super) enum Read {
+    /// Its frames.
+    All(Vec<Frame>),
+    /// Those in colour, small: the frames are those held.
+    Coloured(Vec<Frame>),
+}
+
+impl Read {
+    /// The frames of the look, of those held if need be.
+    pub(super) fn with<'a>(&'a self, held: &'a [Frame]) -> Second<'a> {
+        match self {
+            Self::All(frames) => Second::of(frames),
+            Self::Coloured(small) => {
+                Second { frames: spread(held, PROBE_FRAMES).collect(), coloured: small.iter().collect() }
+            }
+        }
+    }
+}
 
 /// Whether the input is a file or files, which are the same when they are read again.
 pub(super) fn can_be_opened_twice(input: &OsStr) -> bool {
@@ -46,17 +95,30 @@ impl Spread {
     }
 }
 
-/// Asks the source that is read ahead for the frames of the second look, where these and all frames before them may be held together.
-pub(super) fn beside(n_kept: usize) -> ColoursBeside {
-    ColoursBeside::new(SECOND_LOOK_FRAMES, n_kept, MAX_BYTES / (SECOND_LOOK_FRAMES + 3 * n_kept))
+/// What a source keeps in colour while it is read ahead: of small frames all that is looked at, with all frames before them; of large ones what tells a colour, over as many as are held.
+fn keep(width: usize, height: usize) -> KeepColours {
+    let n_px = width.saturating_mul(height).max(1);
+    if n_px.saturating_mul(SECOND_LOOK_FRAMES + 3 * PROBE_FRAMES) <= MAX_BYTES {
+        return KeepColours { over: SECOND_LOOK_FRAMES, most: PROBE_FRAMES, every_px: 1 };
+    }
+    let over = (MOST_BYTES / n_px).min(SECOND_LOOK_FRAMES);
+    let most = if over < LEAST_HELD { 0 } else { PROBE_FRAMES };
+    KeepColours { over, most, every_px: width.div_ceil(GRID_PX).max(2) }
 }
 
-/// The frames of the second look that a source has kept in colour while it was read ahead; `None` if it did not keep them all.
-pub(super) fn from_beside(colours: &ColoursBeside, frames: &mut Replay) -> Option<Vec<Frame>> {
-    frames.read_on(SECOND_LOOK_FRAMES);
+/// Asks the source that is read ahead for the frames of the second look that are in colour.
+pub(super) fn beside() -> ColoursBeside {
+    ColoursBeside::new(keep)
+}
+
+/// What a source has kept in colour for the second look while it was read ahead; `None` if it did not keep all that was asked for.
+pub(super) fn from_beside(colours: &ColoursBeside, frames: &mut Replay) -> Option<Read> {
+    let info = frames.info();
+    let KeepColours { over, every_px, .. } = keep(info.width, info.height);
+    frames.read_on(over);
     let (until, ended) = frames.end();
-    let kept = colours.take(until);
-    kept.filter(|_| ended || until >= SECOND_LOOK_FRAMES as u64)
+    let kept = colours.take(until).filter(|_| ended || until >= over as u64)?;
+    Some(if every_px > 1 { Read::Coloured(kept) } else { Read::All(kept) })
 }
 
 /// At most `n_kept` frames spread evenly over the beginning, in colour if the file has it; what cannot be read ends them.
@@ -82,7 +144,7 @@ fn kept(input: &OsStr, base: &Config, n_kept: usize, sparing: bool) -> Option<Ve
 }
 
 /// At most `n_kept` frames spread evenly over the beginning of a source.
-pub(super) fn spread(source: &mut dyn FrameSource, n_kept: usize) -> Vec<Frame> {
+pub(super) fn spread_over(source: &mut dyn FrameSource, n_kept: usize) -> Vec<Frame> {
     kept_of(source, n_kept, false).unwrap_or_default()
 }
 
@@ -148,15 +210,25 @@ mod tests {
     #[test]
     fn frames_kept_in_colour_are_those_of_a_second_reading() {
         let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
-        for n_kept in [48, 5] {
-            let colours = beside(n_kept);
-            let options = OpenOptions { colours_beside: Some(colours.clone()), ..OpenOptions::default() };
-            let mut frames = Replay::new(crate::io::open(clip, &options).unwrap(), 3).up_to(1000);
-            let kept = from_beside(&colours, &mut frames).unwrap();
-            assert!(kept.iter().all(|f| f.pixels.kind() == PixelKind::Rgb8) && kept.len() <= n_kept);
-            assert!(kept == self::frames(OsStr::new(clip), &Config::default(), n_kept));
-            assert!(from_beside(&colours, &mut frames).is_none(), "they are taken once");
-        }
+        let colours = beside();
+        let options = OpenOptions { colours_beside: Some(colours.clone()), ..OpenOptions::default() };
+        let mut frames = Replay::new(crate::io::open(clip, &options).unwrap(), 3).up_to(1000);
+        let Some(Read::All(kept)) = from_beside(&colours, &mut frames) else { panic!("all frames are small") };
+        assert!(kept.iter().all(|f| f.pixels.kind() == PixelKind::Rgb8) && kept.len() <= PROBE_FRAMES);
+        assert!(kept == self::frames(OsStr::new(clip), &Config::default(), PROBE_FRAMES));
+        assert!(from_beside(&colours, &mut frames).is_none(), "they are taken once");
+    }
+
+    #[test]
+    fn large_frames_are_looked_at_as_they_are_held_with_small_ones_in_colour() {
+        let of = |w, h| {
+            let KeepColours { over, most, every_px } = keep(w, h);
+            (over, most, every_px)
+        };
+        assert_eq!(of(768, 576), (SECOND_LOOK_FRAMES, PROBE_FRAMES, 1));
+        assert_eq!(of(1280, 720), (291, PROBE_FRAMES, 4));
+        assert_eq!(of(1920, 1080), (129, PROBE_FRAMES, 6));
+        assert_eq!(of(3840, 2160).1, 0, "too few are held");
     }
 
     #[test]

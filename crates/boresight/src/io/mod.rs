@@ -39,7 +39,7 @@ pub use tables::{TRACKS_HEADER, mot_box_of_extent};
 pub use crate::memory_budget::set_memory_budget;
 pub use atomic::{AtomicFile, Output, write_whole};
 pub use atomic_folder::{AtomicFolder, remove_folder};
-pub use colours_beside::ColoursBeside;
+pub use colours_beside::{ColoursBeside, KeepColours, KeepOf};
 #[cfg(feature = "images")]
 pub use folder::ImageFiles;
 pub use natural::natural_order;

@@ -16,6 +16,7 @@ use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::{self, Ground};
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
+use super::second_look::Second;
 use super::sightings::Sightings;
 use super::{PROBE_FRAMES, second_look};
 use crate::camera::{CameraConfig, CameraMotionEstimator};
@@ -96,6 +97,7 @@ fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(Source
         Camera::Moving => Vec::new(),
         Camera::Fixed | Camera::Unknown => second_look::frames(input, base, PROBE_FRAMES),
     };
+    let second = Second::of(&second);
     let camera = seen.camera;
     let seen = looked_again(seen, &second, &info)?;
     let kinds: Vec<_> = std::iter::once(None).chain(DetectorKind::ALL.into_iter().map(Some)).collect();
@@ -211,7 +213,7 @@ fn grounds(runs: &[Vec<Frame>]) -> Vec<Vec<Ground>> {
         let mut motion = CameraMotionEstimator::default();
         let step = |f: &Frame| motion.step(&f.pixels).map_or(Homography::identity(), |s| s.now_from_before);
         let steps: Vec<Homography> = run.iter().map(step).collect();
-        ground::follow(run, &steps)
+        ground::follow(&run.iter().collect::<Vec<_>>(), &steps)
     };
     runs.iter().map(of).collect()
 }

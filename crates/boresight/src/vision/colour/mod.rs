@@ -10,6 +10,7 @@ mod reference;
 
 pub use hsi::{Hsi, distance, grey, grey_image, hsi};
 pub(super) use mask::{ColourMask, needs_colour};
+pub(crate) use reference::GRID_PX;
 pub use reference::{Reference, choose_reference};
 
 use crate::Result;

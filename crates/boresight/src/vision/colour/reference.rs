@@ -34,13 +34,15 @@ const MIN_SATURATION: f64 = 0.1;
 const MIN_PIXELS: usize = 6;
 /// Difference of a channel from the background that counts as moving, counts.
 const MOVED: u8 = 25;
+/// Widest grid that is looked at, px: of wider frames every so many-th pixel.
+pub const GRID_PX: usize = 320;
 
 /// Proposes the colour of a compact moving target from frames spread over the beginning of a video (10 to 60 do; all of
 /// one size, others are left out); `None` if no colour stands out.
 pub fn choose_reference(frames: &[&Image<[u8; 3]>]) -> Option<Reference> {
     let first = frames.first()?;
     let (w, h) = (first.width(), first.height());
-    let step = w.div_ceil(320).max(1);
+    let step = w.div_ceil(GRID_PX).max(1);
     let (gw, gh) = (w.div_ceil(step), h.div_ceil(step));
     let grids: Vec<Vec<[u8; 3]>> =
         frames.iter().filter(|f| (f.width(), f.height()) == (w, h)).map(|f| grid(f, step)).collect();

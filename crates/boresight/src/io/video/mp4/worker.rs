@@ -228,13 +228,13 @@ impl Worker {
         let Some(beside) = &self.colours_beside else { return };
         if !tally.kept_began {
             tally.kept_began = true;
-            beside.begin(self.n_frames, picture.width * picture.height);
+            beside.begin(self.n_frames, (picture.width, picture.height));
         }
         if beside.wants(rank)
-            && let Some(image) = self.rgb(picture, Vec::new())
+            && let Some(image) = self.rgb(picture, std::mem::take(&mut tally.in_colour))
         {
-            let time = self.time(rank, tally);
-            beside.keep(Frame { index: FrameIndex(rank), time, pixels: Pixels::Rgb8(image) });
+            beside.keep(FrameIndex(rank), self.time(rank, tally), &image);
+            tally.in_colour = image.into_vec();
         }
     }
 
@@ -291,6 +291,8 @@ struct Tally {
     reason: Option<String>,
     /// Whether it was said what is kept in colour.
     kept_began: bool,
+    /// Memory for a picture in colour of which a part is kept.
+    in_colour: Vec<[u8; 3]>,
     /// Presentation times by rank, media ticks.
     pts: Vec<i64>,
 }
