@@ -122,13 +122,13 @@ fn choose_from(
         let ahead = frames.ahead();
         let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default();
         let seen = looked_again(scene.clone(), &looked, &info)?;
-        if seen.camera == Camera::Fixed && !moving::is_open(&seen, &info) {
+        if !moving::is_open(&seen, &info) {
             let choice = choose_looked(probed(ahead), &seen, &looked, &info, base, request)?;
             if choice.is_evident() {
                 return Ok(choice);
             }
         }
-        // Too few to say it: more are worth another reading.
+        // Too few to say what moves: more are worth another reading.
         read = second(frames, Wanted::Anew);
     }
     let ahead = frames.ahead();

@@ -1,8 +1,8 @@
 //! The second look at a file whose camera stands still: over its first [`SECOND_LOOK_FRAMES`] frames and in colour.
 //!
 //! The target may come late, and its colour may be what tells it; the first frames, read as the configuration says (grey), show neither. Small frames are kept in colour while the file
-//! is read ahead ([`ColoursBeside`]). Of large ones (beyond 493 kpx) those held for the first pass are looked at, some 5 s of 1080p, with small ones in colour; only where the camera is
-//! not seen to stand in them, nothing is chosen by them, or too few can be held, is the file read a second time.
+//! is read ahead ([`ColoursBeside`]). Of large ones (beyond 493 kpx) those held for the first pass are looked at, some 5 s of 1080p, with small ones in colour; only where large
+//! things move that do not fit what is looked for, nothing is chosen by them, or too few can be held, is the file read a second time.
 
 use super::first_scans::PROBE_FRAMES;
 use super::spread::spread;
