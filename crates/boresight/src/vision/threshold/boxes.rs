@@ -148,8 +148,8 @@ impl<S: Sum> Sums<S> {
             }
             let row = |j: usize| &self.rows[(j % kept) * w..][..w];
             self.second.replace(row(enters), row(leaves));
-            let r = surround / 2;
-            self.wide.replace(src.row((y + 1 + r).min(h - 1)), src.row(y.saturating_sub(r)));
+            let reach = surround / 2;
+            self.wide.replace(src.row((y + 1 + reach).min(h - 1)), src.row(y.saturating_sub(reach)));
         }
     }
 
