@@ -13,7 +13,7 @@ use super::later_looks;
 use super::learn::learn;
 use super::moving;
 use super::request::{DetectorKind, Request};
-use super::scene::{self, Camera};
+use super::scene::{self, Camera, Scene};
 use super::second_look::{self, Read};
 use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::track::Tracking;
@@ -118,17 +118,13 @@ fn choose_from(
     // Who does not know whether it stands looks longer.
     let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
     let mut read = second(frames, if look_again { Wanted::First } else { Wanted::None });
-    if matches!(read, Some(Read::Coloured(_))) && request.detector.is_none() {
-        let ahead = frames.ahead();
-        let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default();
-        let seen = looked_again(scene.clone(), &looked, &info)?;
-        if !moving::is_open(&seen, &info) {
-            let choice = choose_looked(probed(ahead), &seen, &looked, &info, base, request)?;
-            if choice.is_evident() {
-                return Ok(choice);
-            }
+    if let Some(held @ Read::Coloured(_)) = &read {
+        if request.detector.is_none()
+            && let Some(choice) = of_held(held, frames, &scene, base, request)?
+        {
+            return Ok(choice);
         }
-        // Too few to say what moves: more are worth another reading.
+        // Too few to say what moves, or too few for who asks for a detector: more are worth another reading.
         read = second(frames, Wanted::Anew);
     }
     let ahead = frames.ahead();
@@ -141,8 +137,26 @@ fn choose_from(
     Ok(later_looks::choice(frames, base, request)?.unwrap_or(choice))
 }
 
+/// The choice by frames that are held for the first pass, if they say what moves.
+pub(super) fn of_held(
+    read: &Read,
+    frames: &mut Replay,
+    scene: &Scene,
+    base: &Config,
+    request: &Request,
+) -> Result<Option<Choice>> {
+    let info = frames.info().clone();
+    let ahead = frames.ahead();
+    let looked = read.with(ahead);
+    let seen = looked_again(scene.clone(), &looked, &info)?;
+    if moving::is_open(&seen, &info) {
+        return Ok(None);
+    }
+    Ok(Some(choose_looked(probed(ahead), &seen, &looked, &info, base, request)?).filter(Choice::is_evident))
+}
+
 /// The frames that are looked at for the choice.
-fn probed(ahead: &[Frame]) -> &[Frame] {
+pub(super) fn probed(ahead: &[Frame]) -> &[Frame] {
     &ahead[..ahead.len().min(PROBE_FRAMES)]
 }
 

@@ -13,14 +13,16 @@ mod moments;
 use self::moments::Moments;
 use super::choose::{Choice, choose_looked, looked_again};
 use super::evidence::{Evidence, SURE_GAIN};
+use super::first_scans::MOST_SCANS;
 use super::ground::{self, Ground};
+use super::open::{of_held, probed};
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look::Second;
 use super::sightings::Sightings;
 use super::{PROBE_FRAMES, second_look};
 use crate::camera::{CameraConfig, CameraMotionEstimator};
-use crate::io::{Colour, MOST_BYTES, Replay, frames_ahead};
+use crate::io::{Colour, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::report::{ContactSheet, SheetMark, SheetPicture, SheetRow};
 use crate::vision::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
@@ -87,25 +89,39 @@ pub fn preview(input: impl AsRef<OsStr>, base: &Config, request: &Request, comma
 
 /// The source's facts, the candidates, and whether the camera stands.
 fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(SourceInfo, Vec<Candidate>, Camera)> {
-    let source = base.input.mend(crate::io::open(input, &base.input.open_options())?)?;
-    let n = frames_ahead(source.info(), PROBE_FRAMES, MOST_BYTES).min(PROBE_FRAMES);
-    let mut first = Replay::new(source, n);
+    let beside = (base.input.colour != Colour::Rgb).then(second_look::beside);
+    let options = OpenOptions { colours_beside: beside.clone(), ..base.input.open_options() };
+    let source = base.input.mend(crate::io::open(input, &options)?)?;
+    let n = frames_ahead(source.info(), MOST_SCANS, MOST_BYTES);
+    let mut first = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
     let info = first.info().clone();
-    let frames = first.ahead();
-    let seen = scene::look(frames, &info)?;
-    let second = match seen.camera {
-        Camera::Moving => Vec::new(),
-        Camera::Fixed | Camera::Unknown => second_look::frames(input, base, PROBE_FRAMES),
+    let seen = scene::look(probed(first.ahead()), &info)?;
+    let camera = seen.camera;
+    // As for a run: frames held say it, or those of another reading; for a detector that is asked for always the latter.
+    let beside = beside.filter(|_| camera != Camera::Moving);
+    let kept = beside.and_then(|beside| second_look::from_beside(&beside, &mut first));
+    let alone = Request { threads: NonZeroUsize::new(1), ..*request };
+    let chosen = match &kept {
+        Some(held @ second_look::Read::Coloured(_)) => of_held(held, &mut first, &seen, base, &alone)?,
+        _ => None,
+    };
+    let second = match kept {
+        Some(second_look::Read::All(frames)) => frames,
+        _ if camera == Camera::Moving => Vec::new(),
+        _ => second_look::frames(input, base, PROBE_FRAMES),
     };
     let second = Second::of(&second);
-    let camera = seen.camera;
+    let frames = probed(first.ahead());
     let seen = looked_again(seen, &second, &info)?;
-    let kinds: Vec<_> = std::iter::once(None).chain(DetectorKind::ALL.into_iter().map(Some)).collect();
-    let alone = Request { threads: NonZeroUsize::new(1), ..*request };
-    let candidates = side_by_side(request.n_threads(), &kinds, |kind| {
+    let of_all = chosen.is_none().then_some(None);
+    let kinds: Vec<_> = of_all.into_iter().chain(DetectorKind::ALL.into_iter().map(Some)).collect();
+    let mut candidates = side_by_side(request.n_threads(), &kinds, |kind| {
         let asked = Request { detector: *kind, ..alone };
         Candidate { options: *kind, choice: choose_looked(frames, &seen, &second, &info, base, &asked) }
     });
+    if let Some(chosen) = chosen {
+        candidates.insert(0, Candidate { options: None, choice: Ok(chosen) });
+    }
     Ok((info.clone(), candidates, camera))
 }
 
