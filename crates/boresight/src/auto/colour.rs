@@ -81,6 +81,40 @@ mod tests {
     }
 
     #[test]
+    fn every_so_many_th_pixel_tells_the_same_colour_and_size() {
+        let info = SourceInfo {
+            label: "ball".to_string(),
+            reader: "test".to_string(),
+            width: 640,
+            height: 360,
+            kind: PixelKind::Gray8,
+            n_frames: Some(12),
+            rate_hz: None,
+            true_times: false,
+        };
+        let frames = |every: usize| -> Vec<Frame> {
+            let pixel = |x: usize, y: usize, k: usize| {
+                let is_ball = (x as f64 - 60.0 - 40.0 * k as f64).hypot(y as f64 - 180.0) < 24.0;
+                if is_ball { [200, 40, 60] } else { [128; 3] }
+            };
+            let frame = |k: usize| {
+                let rows = (0..360).step_by(every).flat_map(|y| (0..640).step_by(every).map(move |x| (x, y)));
+                let pixels = rows.map(|(x, y)| pixel(x, y, k)).collect();
+                let image = Image::from_vec(640 / every, 360 / every, pixels).unwrap();
+                let (index, time) = (FrameIndex(k as u64), Timestamp::from_ns(k as i64 * 40_000_000));
+                Frame { index, time, pixels: Pixels::Rgb8(image) }
+            };
+            (0..12).map(frame).collect()
+        };
+        let mut scene = Scene::default();
+        // The scene was seen in four times as many frames.
+        (scene.camera, scene.n_frames, scene.n_moving) = (Camera::Fixed, 48, 48);
+        let [all, some] = [1, 2].map(|every| look(&frames(every).iter().collect::<Vec<_>>(), &scene, &info).unwrap());
+        assert_eq!((all.rgb, all.n_frames, all.area_px), (some.rgb, some.n_frames, some.area_px));
+        assert!((all.area_px.sqrt() - 24.0 * std::f64::consts::PI.sqrt()).abs() < 3.0, "{all:?}");
+    }
+
+    #[test]
     fn a_colour_that_is_seen_in_more_frames_than_move_is_not_said_to_be_in_three_of_two() {
         // A ball as bright as the wall behind it: in grey it moves in no frame, its colour does in each.
         let info = SourceInfo {

@@ -116,6 +116,8 @@ fn on_their_way(scans: &[Scan], places: &[usize], found: &[Scan]) -> Vec<Scan> {
 #[cfg(test)]
 mod tests {
     use super::super::in_memory::InMemory;
+    use super::super::open::of_held;
+    use super::super::second_look::Read;
     use super::*;
     use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
@@ -193,6 +195,21 @@ mod tests {
         let near = |d: &crate::Detection| (d.position - nalgebra::Vector2::new(70.0, 50.0)).norm() < 3.0;
         assert!(scan.detections.iter().any(near), "{:?}: {:?}", later.reasons, scan.detections);
         assert!(chosen(200).is_none(), "there is nothing in any of them");
+    }
+
+    #[test]
+    fn frames_held_choose_where_they_show_what_moves_and_else_say_nothing() {
+        let chosen = |height: f64| {
+            let (frames, info) = with_spot(|_| height, 100);
+            let scene = scene::look(&frames[..PROBE_FRAMES], &info).unwrap();
+            let mut replay = Replay::new(Box::new(InMemory(frames.into_iter(), info)), 100);
+            let small = Read::Coloured(Vec::new());
+            of_held(&small, &mut replay, &scene, &Config::default(), &Request::default()).unwrap()
+        };
+        // Every third of 100 frames of 25 Hz, to the last, where the first look ends at 1.9 s.
+        let reasons = chosen(-60.0).unwrap().reasons;
+        assert!(reasons[0].contains("from 48 frames of the first 4.0 s"), "{reasons:?}");
+        assert!(chosen(0.0).is_none(), "more are worth another reading");
     }
 
     #[test]
