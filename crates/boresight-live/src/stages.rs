@@ -148,6 +148,7 @@ impl Stages {
         match &self.config.detector.threshold {
             ThresholdConfig::Cfar(cfar) => Some(cfar.rate(pixels)),
             ThresholdConfig::Integrate(integrate) => Some(integrate.false_alarms_per_frame),
+            ThresholdConfig::Bernoulli(bernoulli) => Some(bernoulli.false_alarms_per_frame),
             _ => None,
         }
     }

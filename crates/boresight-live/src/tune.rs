@@ -21,9 +21,10 @@ const fn dial(key: &'static str, least: f64, most: f64) -> Dial {
 }
 
 /// All of them; a configuration has those of its own detector and tracker.
-const DIALS: [Dial; 12] = [
+const DIALS: [Dial; 13] = [
     dial("detector.threshold.cfar.false-alarms-per-frame", 1e-4, 100.0),
     dial("detector.threshold.integrate.false-alarms-per-frame", 1e-6, 1.0),
+    dial("detector.threshold.bernoulli.false-alarms-per-frame", 1e-6, 1.0),
     dial("detector.threshold.isolated.min-score", 1.0, 30.0),
     dial("detector.threshold.spot.k", 1.0, 30.0),
     dial("detector.threshold.local.k", 1.0, 30.0),
@@ -45,7 +46,7 @@ fn number(tree: &toml::Table, key: &str) -> Option<f64> {
 }
 
 /// Detectors that find targets without joining pixels to regions.
-const WITHOUT_REGIONS: [&str; 4] = ["isolated", "spot", "cfar", "integrate"];
+const WITHOUT_REGIONS: [&str; 5] = ["isolated", "spot", "cfar", "integrate", "bernoulli"];
 
 /// The parameters of this configuration that can be changed, with their values; `detects`: whether there is a detector at all.
 pub fn dials(toml: &str, detects: bool) -> Vec<(Dial, f64)> {

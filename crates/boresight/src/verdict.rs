@@ -282,6 +282,9 @@ fn more_sensitive(config: &Config) -> Option<String> {
         ThresholdConfig::Integrate(c) => {
             format!("--set detector.threshold.integrate.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
         }
+        ThresholdConfig::Bernoulli(c) => {
+            format!("--set detector.threshold.bernoulli.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
+        }
         ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
             "--detector isolated".to_string()
         }

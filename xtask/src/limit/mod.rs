@@ -11,6 +11,7 @@ mod real;
 mod scene_j;
 mod scenes;
 mod spot_frames;
+mod turning;
 mod white;
 
 use anyhow::Result;
@@ -18,7 +19,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only the parts whose name holds this: alarms, detection, crossing, real, scene, cost, positions, camera. The page is then printed, not written.
+    /// Only the parts whose name holds this: alarms, detection, crossing, turning, real, scene, cost, positions, camera. The page is then printed, not written.
     #[arg(default_value = "")]
     only: String,
     /// Windows of eight spots for each point of the curves.
@@ -76,6 +77,11 @@ pub fn run(args: &Args) -> Result<()> {
         white::table_of_alarms(64, args.frames, p)
     })?;
     part("crossing", include_str!("crossing.txt").trim(), &mut |p| crossing::table(args.runs, p))?;
+    part("turning", include_str!("turning.txt").trim(), &mut |p| {
+        turning::table((args.runs / 20).max(1), p)?;
+        p.push('\n');
+        turning::table_of_alarms(args.frames / 10, p)
+    })?;
     part("scene", include_str!("scene_j.txt").trim(), &mut |p| scene_j::table(p))?;
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);
     part("real", include_str!("real.txt").trim(), &mut |p| real::table(&data, &args.sets, p))?;

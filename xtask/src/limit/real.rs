@@ -16,7 +16,7 @@ pub fn table(data: &Path, sets: &[String], page: &mut String) -> Result<()> {
         page,
         "| clip | detector | held % | false tracks a minute | ids | median error px | ms a frame |\n| --- | --- | --- | --- | --- | --- | --- |"
     )?;
-    for detector in [None, Some(DetectorKind::Cfar), Some(DetectorKind::Integrate)] {
+    for detector in [None, Some(DetectorKind::Cfar), Some(DetectorKind::Integrate), Some(DetectorKind::Bernoulli)] {
         let (mut held, mut false_tracks, mut minutes, mut n) = (0.0, 0usize, 0.0, 0);
         let name = detector.map_or("as chosen", DetectorKind::name);
         for clip in clips(data)? {

@@ -5,6 +5,7 @@
 
 use super::scenes::random;
 use anyhow::Result;
+use boresight::vision::bernoulli::BernoulliConfig;
 use boresight::vision::integrate::{IntegrateConfig, StillBackground};
 use boresight::vision::probability::Level;
 use boresight::vision::threshold::ThresholdConfig;
@@ -38,7 +39,6 @@ pub fn table(page: &mut String) -> Result<()> {
     writeln!(page, "| method | told | within 3 px in scans 11 to 50, % |\n| --- | --- | --- |")?;
     let level = |mean| Level { mean, sd: 50.0 };
     let table = LlrTable::new(level(60.0), level(50.0), 256);
-    let near = |x: f64, y: f64, k: u64| (x - 9.0 - k as f64).hypot(y - 9.0 - k as f64) <= 3.0;
     let mut hits = 0;
     for run in 0..RUNS {
         let (mut grid, mut scores) = (TrackBeforeDetect::new(2, 0.02), ScoreImage::default());
@@ -54,6 +54,19 @@ pub fn table(page: &mut String) -> Result<()> {
         "| likelihood-ratio grid, one target | both distributions, size, that there is a target | {:.1} |",
         100.0 * hits as f64 / all
     )?;
+    for rate in [0.01, 1.0] {
+        let carried = ThresholdConfig::Bernoulli(BernoulliConfig {
+            false_alarms_per_frame: rate,
+            sigma_px: SIGMA,
+            background: StillBackground::Spatial,
+            ..BernoulliConfig::default()
+        });
+        let [found, later] = found(&carried, None)?;
+        writeln!(
+            page,
+            "| density carried from frame to frame | a width; {rate} false alarms a frame | {found:.1}; {later:.1} in scans 31 to 50 |"
+        )?;
+    }
     for frames in [8u32, 16] {
         let sums = IntegrateConfig {
             frames,
@@ -64,36 +77,50 @@ pub fn table(page: &mut String) -> Result<()> {
             background: StillBackground::Spatial,
             ..IntegrateConfig::default()
         };
-        let info = SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width: SIDE,
-            height: SIDE,
-            kind: PixelKind::Gray8,
-            n_frames: None,
-            rate_hz: None,
-            true_times: true,
-        };
-        let tracker = Config::from_toml(TRACKER, "configs/below-noise.toml")?.tracker;
-        let mut hits = 0;
-        for run in 0..RUNS {
-            let config =
-                DetectorConfig { threshold: ThresholdConfig::Integrate(sums.clone()), ..DetectorConfig::default() };
-            let (mut detector, mut tracker, mut scan) =
-                (build(&config, &info)?, track::build(&tracker)?, Scan::default());
-            for k in 0..SCANS {
-                let time = Timestamp::from_secs_f64(0.04 * k as f64);
-                let frame = Frame { index: FrameIndex(k), time, pixels: Pixels::Gray8(picture(k, run)) };
-                detector.detect(&frame, &mut scan)?;
-                let found = tracker.step(&scan)?.iter().any(|s| near(s.kinematics.mean[0], s.kinematics.mean[2], k));
-                hits += u64::from(k >= 10 && found);
-            }
-        }
-        writeln!(
-            page,
-            "| sums of {frames} frames, tracked | a width; 0.01 false alarms a frame | {:.1} |",
-            100.0 * hits as f64 / all
-        )?;
+        let [found, _] = found(&ThresholdConfig::Integrate(sums), Some(TRACKER))?;
+        writeln!(page, "| sums of {frames} frames, tracked | a width; 0.01 false alarms a frame | {found:.1} |")?;
     }
     Ok(())
+}
+
+/// Share of scans 11 to 50, and of 31 to 50, with a track, or a detection where there is no tracker, near the target, %.
+fn found(threshold: &ThresholdConfig, tracker: Option<&str>) -> Result<[f64; 2]> {
+    let info = SourceInfo {
+        label: String::new(),
+        reader: String::new(),
+        width: SIDE,
+        height: SIDE,
+        kind: PixelKind::Gray8,
+        n_frames: None,
+        rate_hz: None,
+        true_times: true,
+    };
+    let config = DetectorConfig { threshold: threshold.clone(), ..DetectorConfig::default() };
+    let tracker = tracker.map(|text| Config::from_toml(text, "configs/below-noise.toml")).transpose()?;
+    let mut hits = [0u64; 2];
+    for run in 0..RUNS {
+        let (mut detector, mut scan) = (build(&config, &info)?, Scan::default());
+        let mut tracker = tracker.as_ref().map(|c| track::build(&c.tracker)).transpose()?;
+        for k in 0..SCANS {
+            let time = Timestamp::from_secs_f64(0.04 * k as f64);
+            let frame = Frame { index: FrameIndex(k), time, pixels: Pixels::Gray8(picture(k, run)) };
+            detector.detect(&frame, &mut scan)?;
+            let found = match &mut tracker {
+                Some(tracker) => {
+                    tracker.step(&scan)?.iter().any(|s| near(s.kinematics.mean[0], s.kinematics.mean[2], k))
+                }
+                None => scan.detections.iter().any(|d| near(d.position.x, d.position.y, k)),
+            };
+            for (hits, from) in hits.iter_mut().zip([10, 30]) {
+                *hits += u64::from(k >= from && found);
+            }
+        }
+    }
+    let share = |hits: u64, from: u64| 100.0 * hits as f64 / (RUNS * (SCANS - from)) as f64;
+    Ok([share(hits[0], 10), share(hits[1], 30)])
+}
+
+/// Whether a place is within 3 px of the target in scan `k`.
+fn near(x: f64, y: f64, k: u64) -> bool {
+    (x - 9.0 - k as f64).hypot(y - 9.0 - k as f64) <= 3.0
 }

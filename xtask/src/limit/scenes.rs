@@ -65,8 +65,13 @@ pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// The detector for these scenes.
+/// The detector that sums, for these scenes.
 pub fn detector(size: [usize; 2], config: IntegrateConfig) -> Result<Box<dyn Detector>> {
+    detector_of(size, ThresholdConfig::Integrate(config))
+}
+
+/// A detector for these scenes.
+pub fn detector_of(size: [usize; 2], threshold: ThresholdConfig) -> Result<Box<dyn Detector>> {
     let info = SourceInfo {
         label: "simulated".into(),
         reader: String::new(),
@@ -77,7 +82,7 @@ pub fn detector(size: [usize; 2], config: IntegrateConfig) -> Result<Box<dyn Det
         rate_hz: Some(RATE_HZ),
         true_times: true,
     };
-    let config = DetectorConfig { threshold: ThresholdConfig::Integrate(config), ..DetectorConfig::default() };
+    let config = DetectorConfig { threshold, ..DetectorConfig::default() };
     Ok(build(&config, &info)?)
 }
 

@@ -39,7 +39,7 @@ pub struct Args {
     /// Configuration file; without it everything is chosen by looking at the first seconds. `NAME=FILE` holds for the source of that name alone. Can be repeated.
     #[arg(short, long, value_name = "FILE")]
     config: Vec<String>,
-    /// Detector, instead of the one chosen, with the tracker that fits it: isolated, cfar, integrate, moving, steadied, spot, local.
+    /// Detector, instead of the one chosen, with the tracker that fits it: isolated, cfar, integrate, bernoulli, moving, steadied, spot, local.
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     detector: Option<DetectorKind>,
     /// Change one key of the configuration, chosen or given: `tracker.coast-s=1`. Can be repeated.

@@ -19,7 +19,7 @@ pub struct InputArgs {
     /// Configuration file; without it everything is chosen by looking at the first frames.
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Detector, instead of the one chosen, with the tracker and the rates that fit it: isolated, cfar (small and faint), integrate (below the noise of a frame), moving (fixed camera), steadied (moving camera), spot (particles), local (cells), colour.
+    /// Detector, instead of the one chosen, with the tracker and the rates that fit it: isolated, cfar (small and faint), integrate (below the noise of a frame), bernoulli (the same, turning), moving (fixed camera), steadied (moving camera), spot (particles), local (cells), colour.
     #[arg(long, value_name = "NAME")]
     pub detector: Option<auto::DetectorKind>,
     /// Candidate, by the number that `boresight preview INPUT` gives it, instead of the one chosen: 1 is the choice without options.

@@ -17,12 +17,17 @@ fn the_page_shows_every_candidate_with_the_command_that_runs_it() {
     run_ok(["preview", named.to_str().unwrap(), "-q", "--threads", "1", "-o", b.to_str().unwrap()]);
     let page = text(&a);
     assert!(page == text(&b), "the page depends on the threads");
-    for word in ["isolated", "cfar", "integrate", "moving", "steadied", "spot", "local", "colour"] {
+    for word in ["isolated", "cfar", "integrate", "bernoulli", "moving", "steadied", "spot", "local", "colour"] {
         // The choice itself stands for its detector.
         let chosen = page.contains(&format!("chosen: {word}"));
         assert!(chosen || page.contains(&format!("one.mp4' --detector {word}</code>")), "{word}");
     }
-    assert!(page.contains(">1 the choice without options<") && page.contains(">9 colour<"), "their numbers");
+    assert!(
+        page.contains(">1 the choice without options<")
+            && page.contains(">9 colour<")
+            && page.contains(">10 bernoulli<"),
+        "their numbers"
+    );
     assert!(page.contains("it'\\''s one.mp4'</code>"), "the command without options");
     assert_eq!(page.matches("data:image/png;base64,").count(), 12);
     let shown = page.matches("<div class=\"sheet\">").count();
@@ -45,7 +50,7 @@ fn a_candidate_asked_for_by_its_number_is_the_one_of_that_row() {
     assert!(third == run_with(&["--detector", "cfar"], "cfar") && third.1 != first.1, "3 is cfar");
     let given = dir.path().join("1/config.toml");
     for (wrong, why) in [
-        (&["--candidate", "10"][..], "3 cfar"),
+        (&["--candidate", "11"][..], "3 cfar"),
         (&["--candidate", "2", "--detector", "cfar"], "cannot be used with"),
         (&["--candidate", "1", "--config", given.to_str().unwrap()], "--candidate 1"),
     ] {

@@ -5,7 +5,7 @@
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
 use super::second_look::Second;
-use super::{cells, colour, faint, moving, particles, spots, steadied, summed};
+use super::{carried, cells, colour, faint, moving, particles, spots, steadied, summed};
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
@@ -44,6 +44,10 @@ pub fn configure(
         DetectorKind::Integrate => {
             spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
             summed::configure(scene, interval_s, config, reasons);
+        }
+        DetectorKind::Bernoulli => {
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
+            carried::configure(scene, interval_s, info, config, reasons);
         }
         DetectorKind::Moving => {
             let explained = scene.explained(&second.or(frames), info, n_threads)?;
@@ -140,6 +144,7 @@ mod tests {
                     ThresholdConfig::Isolated(_) => DetectorKind::Isolated,
                     ThresholdConfig::Cfar(_) => DetectorKind::Cfar,
                     ThresholdConfig::Integrate(_) => DetectorKind::Integrate,
+                    ThresholdConfig::Bernoulli(_) => DetectorKind::Bernoulli,
                     ThresholdConfig::Moving(_) => DetectorKind::Moving,
                     ThresholdConfig::Steadied(_) => DetectorKind::Steadied,
                     ThresholdConfig::Spot(_) => DetectorKind::Spot,

@@ -314,6 +314,7 @@ fn is_of_points(threshold: &ThresholdConfig) -> bool {
             | ThresholdConfig::Spot(_)
             | ThresholdConfig::Cfar(_)
             | ThresholdConfig::Integrate(_)
+            | ThresholdConfig::Bernoulli(_)
     )
 }
 

@@ -6,6 +6,7 @@
 
 mod adaptation;
 mod asked;
+mod carried;
 mod cells;
 mod chains;
 mod choose;

@@ -13,6 +13,8 @@ pub enum DetectorKind {
     Cfar,
     /// Small moving targets that no single frame shows.
     Integrate,
+    /// Small targets that no single frame shows and that turn.
+    Bernoulli,
     /// What moves before a fixed camera.
     Moving,
     /// What moves before a moving camera.
@@ -27,7 +29,7 @@ pub enum DetectorKind {
 
 impl DetectorKind {
     /// All of them, in the order in which they are listed.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Isolated,
         Self::Cfar,
         Self::Integrate,
@@ -36,6 +38,7 @@ impl DetectorKind {
         Self::Spot,
         Self::Local,
         Self::Colour,
+        Self::Bernoulli,
     ];
 
     /// Its number among the candidates that a preview shows; 1 is the choice without options.
@@ -65,6 +68,7 @@ impl DetectorKind {
             Self::Isolated => "isolated",
             Self::Cfar => "cfar",
             Self::Integrate => "integrate",
+            Self::Bernoulli => "bernoulli",
             Self::Moving => "moving",
             Self::Steadied => "steadied",
             Self::Spot => "spot",
@@ -79,6 +83,7 @@ impl DetectorKind {
             Self::Isolated => "targets of any size that stand clear of their surroundings",
             Self::Cfar => "small and faint targets at a stated rate of false alarms",
             Self::Integrate => "small moving targets that no single frame shows",
+            Self::Bernoulli => "small targets that no single frame shows and that turn",
             Self::Moving => "what moves before a fixed camera",
             Self::Steadied => "what moves before a moving camera",
             Self::Spot => "many small spots: particles, seeds, stars",

@@ -208,7 +208,7 @@ impl DetectorConfig {
             ThresholdConfig::Isolated(_) => [&joining[..], &[weight, shot_noise]].concat(),
             ThresholdConfig::Spot(_) => [&joining[..], &areas, &[method, weight]].concat(),
             ThresholdConfig::Cfar(_) => [&joining[..], &areas, &[method, weight, noise]].concat(),
-            ThresholdConfig::Integrate(_) => {
+            ThresholdConfig::Integrate(_) | ThresholdConfig::Bernoulli(_) => {
                 let noise = ("detector.noise", self.noise != usual.noise);
                 [&joining[..], &areas, &[method, weight, fit, noise]].concat()
             }

@@ -3,6 +3,7 @@
 
 use super::Detector;
 use super::background::{Background, FrameDifference};
+use super::bernoulli::BernoulliDetector;
 use super::cfar::CfarDetector;
 use super::colour::{ColourMask, grey_image, needs_colour};
 use super::config::DetectorConfig;
@@ -53,6 +54,7 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
         ThresholdConfig::Spot(c) => Box::new(SpotDetector::new(c)),
         ThresholdConfig::Cfar(c) => Box::new(CfarDetector::new(c)),
         ThresholdConfig::Integrate(c) => Box::new(IntegrateDetector::new(c)),
+        ThresholdConfig::Bernoulli(c) => Box::new(BernoulliDetector::new(c)),
     })
 }
 
@@ -111,7 +113,7 @@ impl<T: Pixel> Typed<T> {
             filter => Some((SpatialFilter::new(filter)?, Image::default())),
         };
         // Sums of frames have no frame to fit to.
-        let is_summed = matches!(config.threshold, ThresholdConfig::Integrate(_));
+        let is_summed = matches!(config.threshold, ThresholdConfig::Integrate(_) | ThresholdConfig::Bernoulli(_));
         let fitter = config.centroid.fit.clone().filter(|_| !is_summed).map(Fitter::new);
         Ok(Self { filter, finder: finder(config)?, fitter })
     }

@@ -6,6 +6,7 @@
 
 mod at_once;
 pub mod background;
+pub mod bernoulli;
 pub(crate) mod centroid;
 pub mod cfar;
 pub(crate) mod cluster;
@@ -17,6 +18,7 @@ pub mod fit;
 pub mod integrate;
 pub(crate) mod isolated;
 pub(crate) mod llr;
+mod matched;
 mod middle;
 pub mod noise;
 pub(crate) mod noise_level;

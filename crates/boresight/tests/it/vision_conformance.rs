@@ -2,6 +2,7 @@
 //! inside the frame, covariances that can be inverted, the same answer twice.
 
 use boresight::vision::FollowConfig;
+use boresight::vision::bernoulli::BernoulliConfig;
 use boresight::vision::cfar::CfarConfig;
 use boresight::vision::colour::ColourMatchConfig;
 use boresight::vision::fit::{FitConfig, FitWidth};
@@ -32,6 +33,16 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
             ..Default::default()
         })
     };
+    // Few velocities.
+    let bernoulli = |polarity, background| {
+        ThresholdConfig::Bernoulli(BernoulliConfig {
+            max_speed_px_per_s: 30.0,
+            acceleration_density_px2_per_s3: 1000.0,
+            polarity,
+            background,
+            ..Default::default()
+        })
+    };
     let all = vec![
         ThresholdConfig::Band(BandConfig { low: 100.0, high: 60_000.0 }),
         ThresholdConfig::Level(LevelConfig { level: 99.5, side: Side::Bright, exclusive: false }),
@@ -49,6 +60,9 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
         integrate(Polarity::Bright, StillBackground::Temporal),
         integrate(Polarity::Both, StillBackground::Both),
         integrate(Polarity::Dark, StillBackground::Spatial),
+        bernoulli(Polarity::Bright, StillBackground::Temporal),
+        bernoulli(Polarity::Both, StillBackground::Spatial),
+        bernoulli(Polarity::Dark, StillBackground::Both),
         ThresholdConfig::Moving(Default::default()),
         ThresholdConfig::Difference(Default::default()),
         ThresholdConfig::Steadied(Default::default()),
@@ -64,6 +78,7 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
             | ThresholdConfig::Isolated(_)
             | ThresholdConfig::Cfar(_)
             | ThresholdConfig::Integrate(_)
+            | ThresholdConfig::Bernoulli(_)
             | ThresholdConfig::Moving(_)
             | ThresholdConfig::Difference(_)
             | ThresholdConfig::Steadied(_)
@@ -206,7 +221,10 @@ fn every_threshold_takes_every_frame() {
         // Nine frames are shorter than three lags, and none of them covers the one before.
         let of_ground = matches!(config.threshold, ThresholdConfig::Steadied(_));
         let finds = if of_noise {
-            finds_a_moving_spot(&config)
+            finds_a_moving_spot(&config, 0, 1.0)
+        } else if let ThresholdConfig::Bernoulli(c) = &config.threshold {
+            // No frame alone decides.
+            finds_a_moving_spot(&config, 12, if c.polarity == Polarity::Dark { -1.0 } else { 1.0 })
         } else if of_ground {
             finds_a_patch_over_moving_ground(&config)
         } else {
@@ -216,8 +234,8 @@ fn every_threshold_takes_every_frame() {
     }
 }
 
-/// Whether every report on frames of a spot that moves 1 px a frame has a detection there.
-fn finds_a_moving_spot(config: &DetectorConfig) -> bool {
+/// Whether every report on frames of a spot that moves 1 px a frame, from a frame on, has a detection there.
+fn finds_a_moving_spot(config: &DetectorConfig, from: u64, sign: f64) -> bool {
     let mut detector = build(config, &source(96, 64, PixelKind::Gray8)).unwrap();
     let (mut scan, mut reports) = (Scan::default(), 0);
     for k in 0..24u64 {
@@ -225,13 +243,13 @@ fn finds_a_moving_spot(config: &DetectorConfig) -> bool {
         let value = |i: usize| {
             let (x, y) = ((i % 96) as f64, (i / 96) as f64);
             let noise = (i as u64 + 31 * k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 61;
-            let spot = 100.0 * (-((x - x0).powi(2) + (y - y0).powi(2)) / 3.4).exp();
-            (50.0 + noise as f64 + spot) as u8
+            let spot = sign * 100.0 * (-((x - x0).powi(2) + (y - y0).powi(2)) / 3.4).exp();
+            (120.0 + noise as f64 + spot) as u8
         };
         let image = Image::from_vec(96, 64, (0..96 * 64).map(value).collect()).unwrap();
         let time = Timestamp::from_ns(k as i64 * 40_000_000);
         detector.detect(&Frame { index: FrameIndex(k), time, pixels: Pixels::Gray8(image) }, &mut scan).unwrap();
-        if scan.blind {
+        if scan.blind || k < from {
             continue;
         }
         reports += 1;

@@ -283,6 +283,11 @@ fn row(
         row.refusal = Some(format!("It sums {} frames and more in a row: single moments do not show it.", c.frames));
         return row;
     }
+    if matches!(choice.config.detector.threshold, ThresholdConfig::Bernoulli(_)) {
+        row.refusal =
+            Some("It carries what may be there from frame to frame: single moments do not show it.".to_string());
+        return row;
+    }
     match detect(&choice.config.detector, runs, info) {
         Ok(scans) => found(&mut row, runs, &scans, ground, (info.width * info.height).max(1) as f64),
         Err(e) => row.refusal = Some(e.to_string().lines().next().unwrap_or_default().to_string()),

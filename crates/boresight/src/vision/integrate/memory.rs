@@ -13,6 +13,7 @@
 
 use super::config::StillBackground;
 use crate::Image;
+use crate::vision::matched::{MAD, add_scaled, filter, finite, half_surround, kernel, median, subtract_surround};
 use crate::vision::pixel::Pixel;
 
 /// Side of a cell of the noise map, px: some 10 independent places of a spot of σ = 1.3 px in each frame.
@@ -23,12 +24,6 @@ pub(super) const PER_UNIT: f32 = 64.0;
 const FADE: f32 = 0.875;
 /// Part of the median noise that every cell, and every frame, has at least.
 const SHARED: f32 = 0.5;
-/// Half width of the square of `spatial`, in σ: a target takes 4π / 16² = 5 % of its own energy out with its surroundings.
-const SURROUND: f64 = 8.0;
-/// Radius of the spot's kernel in σ: 3·10⁻⁴ of the energy is beyond.
-const KERNEL: f64 = 4.0;
-/// Deviation over the median of |r| of normal noise.
-const MAD: f32 = 1.4826;
 /// Every which pixel of a cell, and of the frame, its noise is read from: odd, out of step with rows.
 const SAMPLED: usize = 5;
 
@@ -63,17 +58,14 @@ pub(super) struct Memory {
 impl Memory {
     /// Makes room for `n` frames of spots of `sigma_px`.
     pub(super) fn new<T: Pixel>(width: usize, height: usize, n: usize, sigma_px: f64, of: StillBackground) -> Self {
-        let radius = (KERNEL * sigma_px).ceil() as i64;
-        let raw: Vec<f64> = (-radius..=radius).map(|i| (-0.5 * (i as f64 / sigma_px).powi(2)).exp()).collect();
-        let energy = raw.iter().map(|v| v * v).sum::<f64>().sqrt();
         let stride = width.next_multiple_of(CELL);
         let pixels = stride * height;
         Self {
             width,
             height,
             stride,
-            kernel: raw.iter().map(|v| (v / energy) as f32).collect(),
-            surround: (of != StillBackground::Temporal).then_some((SURROUND * sigma_px).ceil() as usize),
+            kernel: kernel(sigma_px),
+            surround: (of != StillBackground::Temporal).then_some(half_surround(sigma_px)),
             temporal: of != StillBackground::Spatial,
             rounding: T::STEP / 12f32.sqrt(),
             frames: vec![vec![0.0; pixels]; n],
@@ -117,14 +109,7 @@ impl Memory {
     /// Takes a frame in.
     pub(super) fn push<T: Pixel>(&mut self, image: &Image<T>, time_s: f64) {
         let (w, place) = (self.width, self.next);
-        for y in 0..self.height {
-            let mut last = 0.0;
-            for (o, v) in self.raw[y * w..][..w].iter_mut().zip(image.row(y)) {
-                let v = v.value_f32();
-                last = if v.is_finite() { v } else { last };
-                *o = last;
-            }
-        }
+        finite(image, &mut self.raw);
         if let Some(half) = self.surround {
             subtract_surround(&mut self.raw, w, half, &mut self.means, &mut self.sums);
         }
@@ -228,82 +213,9 @@ pub(super) struct Phi {
     pub(super) unit: f32,
 }
 
-/// The middle value; 0 of none.
-fn median(values: &mut [f32]) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let mid = values.len() / 2;
-    *values.select_nth_unstable_by(mid, f32::total_cmp).1
-}
-
-/// Correlates with the spot in x and y; beyond the image there is nothing. `out` has rows of `stride`.
-fn filter(raw: &[f32], w: usize, h: usize, kernel: &[f32], row: &mut [f32], stride: usize, out: &mut [f32]) {
-    let r = kernel.len() / 2;
-    for y in 0..h {
-        let row = &mut row[..w];
-        row.fill(0.0);
-        for (k, &weight) in kernel.iter().enumerate() {
-            if let Some(at) = (y + k).checked_sub(r).filter(|at| *at < h) {
-                add_scaled(&raw[at * w..][..w], weight, row);
-            }
-        }
-        let out = &mut out[y * stride..][..w];
-        out.fill(0.0);
-        for (k, &weight) in kernel.iter().enumerate() {
-            // out[x] += weight row[x + k - r]
-            let (from, to) = (k.saturating_sub(r).min(w), r.saturating_sub(k).min(w));
-            let n = w - from.max(to);
-            add_scaled(&row[from..][..n], weight, &mut out[to..][..n]);
-        }
-    }
-}
-
-/// Takes the mean over a square of half width `half` out of an image of width `w`, in place; at the border over what of it lies inside.
-/// `means` holds an image, `sums` a row and one more.
-fn subtract_surround(image: &mut [f32], w: usize, half: usize, means: &mut [f32], sums: &mut [f64]) {
-    for (row, means) in image.chunks_exact(w).zip(means.chunks_exact_mut(w)) {
-        sums[0] = 0.0;
-        for (i, v) in row.iter().enumerate() {
-            sums[i + 1] = sums[i] + f64::from(*v);
-        }
-        for (i, mean) in means.iter_mut().enumerate() {
-            let (from, to) = (i.saturating_sub(half), (i + half + 1).min(w));
-            *mean = ((sums[to] - sums[from]) / (to - from) as f64) as f32;
-        }
-    }
-    let h = image.len() / w;
-    let sums = &mut sums[..w];
-    sums.fill(0.0);
-    let add = |y: usize, sign: f64, sums: &mut [f64]| {
-        sums.iter_mut().zip(&means[y * w..][..w]).for_each(|(s, m)| *s += sign * f64::from(*m));
-    };
-    (0..half.min(h)).for_each(|y| add(y, 1.0, sums));
-    for y in 0..h {
-        if y + half < h {
-            add(y + half, 1.0, sums);
-        }
-        if y > half {
-            add(y - half - 1, -1.0, sums);
-        }
-        let n = ((y + half + 1).min(h) - y.saturating_sub(half)) as f64;
-        for (v, s) in image[y * w..][..w].iter_mut().zip(sums.iter()) {
-            *v -= (s / n) as f32;
-        }
-    }
-}
-
 widest! {
     fn scale(values: &mut [f32], by: f32) {
         values.iter_mut().for_each(|v| *v *= by);
-    }
-}
-
-widest! {
-    fn add_scaled(from: &[f32], by: f32, to: &mut [f32]) {
-        for (t, &f) in to.iter_mut().zip(from) {
-            *t += by * f;
-        }
     }
 }
 

@@ -15,6 +15,7 @@ pub use grid::BackgroundGrid;
 pub use otsu::otsu_level;
 
 use super::background::{BackgroundConfig, DifferenceConfig};
+use super::bernoulli::BernoulliConfig;
 use super::cfar::CfarConfig;
 use super::colour::ColourMatchConfig;
 use super::integrate::config::IntegrateConfig;
@@ -54,6 +55,8 @@ pub enum ThresholdConfig {
     Cfar(CfarConfig),
     /// Small moving targets that no single frame shows: frames are summed along every straight path; no clusters.
     Integrate(IntegrateConfig),
+    /// Small targets that no single frame shows and that turn: a density over places and velocities is carried from frame to frame; no clusters.
+    Bernoulli(BernoulliConfig),
 }
 
 impl Default for ThresholdConfig {
@@ -184,6 +187,7 @@ impl ThresholdConfig {
             Self::Spot(_) => "spot",
             Self::Cfar(_) => "cfar",
             Self::Integrate(_) => "integrate",
+            Self::Bernoulli(_) => "bernoulli",
         }
     }
 
@@ -223,6 +227,7 @@ impl ThresholdConfig {
             Self::Spot(c) => c.validate(&format!("{at}.spot"))?,
             Self::Cfar(c) => c.validate(&format!("{at}.cfar"))?,
             Self::Integrate(c) => c.validate(&format!("{at}.integrate"))?,
+            Self::Bernoulli(c) => c.validate(&format!("{at}.bernoulli"))?,
             Self::Local(c) => {
                 if !(c.k > 0.0 && c.k.is_finite()) {
                     return Err(wrong(

@@ -1,0 +1,363 @@
+//! The detector: whitened frames, the density of the whole frame, targets that stand out of it and are followed by themselves.
+//!
+//! How: the density's mean over velocities and strengths is summed in boxes about as wide as the spot; where the number of cells over that sum, the expected number of false
+//! alarms, is at most what is asked for, the highest first, a target begins: it takes its surroundings of the density with it, and there the
+//! frame's own is brought back to what noise is expected to have. From then on its light is taken out of the frame for all others, and the frame's density gains nothing where it is.
+//! Its odds begin as one over the expected number of false alarms. Two targets that are at one place now and a straight time ago are one.
+//! Limits: [`MOST_TARGETS`] a side; ground that stands out and moves as targets do; a camera that moves by more than the velocities looked for.
+//! Source of the parts: their files; taking out what is found: CLEAN, J. A. Högbom, A&AS 15, 417 (1974).
+
+use super::config::BernoulliConfig;
+use super::density::{Density, Motion};
+use super::likelihood::{Levels, STRENGTHS};
+use super::null::Null;
+use super::target::{LEAST_ODDS, Target};
+use super::whitened::Whitened;
+use crate::vision::config::DetectorConfig;
+use crate::vision::pixel::Pixel;
+use crate::vision::polarity::{Polarity, Side};
+use crate::vision::target_finder::{TargetFinder, TypedFrame};
+use crate::{DetectedVelocity, Detection, Error, ErrorKind, Extent, Result};
+use nalgebra::Vector2;
+
+/// Most targets of a side.
+const MOST_TARGETS: usize = 64;
+/// Most places, velocities and strengths of a frame: 4 bytes each, 512 MB.
+const MOST_CELLS: usize = 1 << 27;
+/// Straight times after which a gap leaves nothing that is of use.
+const GAP: f64 = 2.0;
+/// Half side of a target's window, in half sides of the box.
+const WINDOW: i64 = 5;
+/// Width at half height of a Gaussian in units of its deviation.
+const FWHM: f64 = 2.354_82;
+
+/// One sign of contrast.
+#[derive(Debug)]
+struct OneSide {
+    sign: f32,
+    /// Whether its targets are reported; else it is there for the null, whose targets are followed as well: what they leave around them is none of noise.
+    is_wanted: bool,
+    levels: Levels,
+    /// Of this side's boxes.
+    null: Null,
+    density: Density,
+    targets: Vec<Target>,
+    /// Deviations with the targets' light taken out.
+    left: Vec<f32>,
+    ratios: [Vec<f32>; STRENGTHS.len()],
+    boxes: Vec<f32>,
+    row: Vec<f32>,
+    /// A row of deviations as one target sees them.
+    seen: Vec<f32>,
+}
+
+/// What is built once frames have a size.
+#[derive(Debug)]
+struct Search {
+    frame: (usize, usize),
+    whitened: Whitened,
+    motion: Motion,
+    sides: [OneSide; 2],
+}
+
+/// Finds targets by the density that it carries from frame to frame.
+#[derive(Debug)]
+pub(in crate::vision) struct BernoulliDetector {
+    config: BernoulliConfig,
+    search: Option<Search>,
+    blind: bool,
+}
+
+impl BernoulliDetector {
+    /// Builds the detector for a checked configuration.
+    pub(in crate::vision) fn new(config: &BernoulliConfig) -> Self {
+        Self { config: config.clone(), search: None, blind: true }
+    }
+
+    fn lay_out<T: Pixel>(&mut self, frame: (usize, usize)) -> Result<()> {
+        if self.search.as_ref().is_some_and(|s| s.frame == frame) {
+            return Ok(());
+        }
+        let whitened = Whitened::new::<T>(frame.0, frame.1, &self.config);
+        let motion = Motion::new(&self.config, whitened.step());
+        let ((w, h), nv) = (whitened.size(), motion.count());
+        let per_place = (nv.saturating_mul(nv)).saturating_mul(2 * STRENGTHS.len());
+        if (w * h).saturating_mul(per_place) > MOST_CELLS {
+            let what = format!("{w} x {h} places with {nv} x {nv} velocities are more than {MOST_CELLS} cells");
+            return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(
+                "lower max-speed-px-per-s, or raise acceleration-density-px2-per-s3 or sigma-px, or look at a part of the frame",
+            ));
+        }
+        let needed = ((w * h) as f64 / self.config.false_alarms_per_frame).ln();
+        let half = box_of(self.config.sigma_px, whitened.step());
+        let build = |side| OneSide {
+            sign: if side == Side::Bright { 1.0 } else { -1.0 },
+            is_wanted: self.config.polarity.has(side),
+            null: Null::new(w, h, half),
+            levels: Levels::new(self.config.least_snr, needed),
+            // One cell of so much is enough for a target.
+            density: Density::new(
+                w,
+                h,
+                [0, 0],
+                nv,
+                1.0,
+                (needed.exp() * 2.0 * (STRENGTHS.len() * nv * nv) as f64) as f32,
+            ),
+            targets: Vec::with_capacity(MOST_TARGETS),
+            left: vec![0.0; w * h],
+            ratios: [vec![0.0; w * h], vec![0.0; w * h]],
+            boxes: vec![0.0; w * h],
+            row: vec![0.0; w * h],
+            seen: Vec::new(),
+        };
+        self.search = Some(Search { frame, sides: [build(Side::Bright), build(Side::Dark)], whitened, motion });
+        Ok(())
+    }
+}
+
+impl OneSide {
+    /// One frame on.
+    fn step(&mut self, config: &BernoulliConfig, motion: &Motion, whitened: &Whitened, dt_s: f64) {
+        let (size, step) = (whitened.size(), whitened.step() as f64);
+        let width = config.sigma_px / step;
+        for (l, z) in self.left.iter_mut().zip(whitened.z()) {
+            *l = self.sign * z;
+        }
+        for t in &self.targets {
+            add_light(&mut self.left, size, t.expected(dt_s), -t.existence() * t.snr, width);
+        }
+        let kept = kept(config, dt_s);
+        self.levels.learn(&self.left, 1.0, kept);
+        for (strength, ratios) in self.ratios.iter_mut().enumerate() {
+            self.levels.ratios(strength, &self.left, 1.0, ratios);
+            for t in &self.targets {
+                for_near(size, t.expected(dt_s), 3.0 * width, |i, _| ratios[i] = ratios[i].min(1.0));
+            }
+        }
+        self.density.step(motion, &self.ratios, 1.0 - motion.survival(), 1.0, [0, 0]);
+        let fading = dt_s / config.straight_s();
+        let (levels, left, seen) = (&self.levels, &self.left, &mut self.seen);
+        self.targets.retain_mut(|t| {
+            let (at, light) = (t.expected(dt_s), t.existence() * t.snr);
+            let own = |x: i64, y: i64| {
+                let i = y as usize * size.0 + x as usize;
+                let d = Vector2::new(x as f64, y as f64) - at;
+                left[i] + (light * (-0.25 * d.norm_squared() / (width * width)).exp()) as f32
+            };
+            let is_there = t.step(motion, dt_s, |strength, [x0, y], row| {
+                row.fill(0.0);
+                if !(0..size.1 as i64).contains(&y) {
+                    return;
+                }
+                let n = row.len() as i64;
+                let (begin, end) = ((-x0).clamp(0, n) as usize, (size.0 as i64 - x0).clamp(0, n) as usize);
+                seen.clear();
+                seen.extend((begin..end).map(|i| own(x0 + i as i64, y)));
+                levels.ratios(strength, seen, 1.0, &mut row[begin..end]);
+            });
+            let at = t.moments.place;
+            let (x, y) = (at.x.round() as i64, at.y.round() as i64);
+            let inside = (0..size.0 as i64).contains(&x) && (0..size.1 as i64).contains(&y);
+            if inside {
+                t.snr += fading.min(1.0) * (f64::from(own(x, y)) - t.snr);
+                t.snr = t.snr.max(0.0);
+            }
+            is_there && inside
+        });
+        self.join_twins(config.straight_s(), width);
+        let half = box_of(config.sigma_px, whitened.step());
+        sum_boxes(&self.density.marginal, size.0, half, &mut self.row, &mut self.boxes);
+        self.null.look(&self.boxes, kept);
+        let sure = (size.0 as f64 * size.1 as f64 / config.false_alarms_per_frame).ln();
+        for t in &self.targets {
+            // The blocks that its spot reaches.
+            let reach = 2.0 * width;
+            for (dx, dy) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+                let (x, y) = (t.moments.place.x + dx * reach, t.moments.place.y + dy * reach);
+                self.null.mark(
+                    (x.max(0.0) as usize).min(size.0 - 1),
+                    (y.max(0.0) as usize).min(size.1 - 1),
+                    2.0 * sure,
+                );
+            }
+        }
+    }
+
+    /// Of two targets that are at one place now and were a straight time ago, the less sure one goes.
+    fn join_twins(&mut self, straight_s: f64, width: f64) {
+        self.targets.sort_by(|a, b| b.odds.total_cmp(&a.odds));
+        let mut i = 0;
+        while i < self.targets.len() {
+            let is_twin = self.targets[..i].iter().any(|o| {
+                let t = &self.targets[i];
+                let (dp, dv) = (t.moments.place - o.moments.place, t.moments.velocity - o.moments.velocity);
+                dp.norm() < 1.5 * width && (dp - dv * straight_s).norm() < 1.5 * width
+            });
+            if is_twin {
+                self.targets.remove(i);
+            } else {
+                i += 1;
+            }
+        }
+    }
+
+    /// Begins the targets that stand out of the frame's density more than those of `null` do.
+    fn begin(&mut self, config: &BernoulliConfig, motion: &Motion, whitened: &Whitened, null: &Null) {
+        let (w, h) = whitened.size();
+        let half = box_of(config.sigma_px, whitened.step());
+        let both = config.polarity == Polarity::Both;
+        while self.targets.len() < MOST_TARGETS {
+            let best = self.boxes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+            let Some((i, &sum)) = best else { break };
+            let expected = null.number(f64::from(sum));
+            if expected > config.false_alarms_per_frame {
+                break;
+            }
+            let is_ghost = both && null.has_been_surer(i % w, i / w, f64::from(sum).ln());
+            let (x, y) = ((i % w) as i64, (i / w) as i64);
+            let odds = 1.0 / expected;
+            let snr = f64::from(self.left[i].max(0.0)).max(config.least_snr);
+            let target = Target::new(&self.density, motion, [x, y], WINDOW * half as i64, odds, snr);
+            if let Some(target) = target {
+                self.density.flatten(target.window((w, h)), 1.0);
+                self.targets.extend((!is_ghost).then_some(target));
+            }
+            // The same place is not looked at again in this frame.
+            for_near((w, h), Vector2::new(x as f64, y as f64), (WINDOW * half as i64) as f64, |i, _| {
+                self.boxes[i] = 0.0
+            });
+        }
+    }
+}
+
+/// What is left of what was learnt before.
+fn kept(config: &BernoulliConfig, dt_s: f64) -> f64 {
+    (-dt_s / (super::whitened::MEMORY * config.straight_s())).exp()
+}
+
+/// Half side of the box that the density is summed in, cells: 1.5 σ.
+fn box_of(sigma_px: f64, step: usize) -> usize {
+    ((1.5 * sigma_px / step as f64).round() as usize).max(1)
+}
+
+/// Calls `of` with the number of each cell within a radius of a place, and its offset.
+fn for_near(size: (usize, usize), at: Vector2<f64>, radius: f64, mut of: impl FnMut(usize, Vector2<f64>)) {
+    let span = |c: f64, n: usize| {
+        let inside = |v: f64| v.clamp(0.0, n as f64) as usize;
+        inside((c - radius).ceil())..inside((c + radius).floor() + 1.0)
+    };
+    for y in span(at.y, size.1) {
+        for x in span(at.x, size.0) {
+            let d = Vector2::new(x as f64, y as f64) - at;
+            if d.norm() <= radius {
+                of(y * size.0 + x, d);
+            }
+        }
+    }
+}
+
+/// Adds a spot's light to the deviations: matched to itself it is √2 wider.
+fn add_light(z: &mut [f32], size: (usize, usize), at: Vector2<f64>, snr: f64, width: f64) {
+    let scale = 0.25 / (width * width);
+    for_near(size, at, 6.0 * width, |i, d| z[i] += (snr * (-scale * d.norm_squared()).exp()) as f32);
+}
+
+/// Sums over squares of half side `half`; outside there is nothing.
+fn sum_boxes(from: &[f32], w: usize, half: usize, rows: &mut [f32], to: &mut [f32]) {
+    for (from, to) in from.chunks_exact(w).zip(rows.chunks_exact_mut(w)) {
+        for (x, t) in to.iter_mut().enumerate() {
+            *t = from[x.saturating_sub(half)..(x + half + 1).min(w)].iter().sum();
+        }
+    }
+    let h = from.len() / w;
+    for (y, to) in to.chunks_exact_mut(w).enumerate() {
+        to.fill(0.0);
+        for row in rows.chunks_exact(w).take((y + half + 1).min(h)).skip(y.saturating_sub(half)) {
+            to.iter_mut().zip(row).for_each(|(t, r)| *t += r);
+        }
+    }
+}
+
+impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn find(&mut self, frame: &TypedFrame<T>, _: &DetectorConfig, out: &mut Vec<Detection>) -> Result<()> {
+        self.blind = true;
+        let size = (frame.image.width(), frame.image.height());
+        if size.0 == 0 || size.1 == 0 {
+            return Ok(());
+        }
+        self.lay_out::<T>(size)?;
+        let Some(Search { whitened, motion, sides, .. }) = &mut self.search else { return Ok(()) };
+        let straight_s = self.config.straight_s();
+        let mut dt_s = frame.dt_s.max(0.0);
+        if frame.dt_s < 0.0 || dt_s > GAP * straight_s.max(dt_s.min(0.1)) {
+            // Nothing of what was there is where it was; the background is what it was.
+            if frame.dt_s < 0.0 {
+                whitened.clear();
+            }
+            dt_s = 0.0;
+            sides.iter_mut().for_each(|s| {
+                s.density.fill(1.0);
+                s.targets.clear();
+            });
+        }
+        motion.advance(dt_s);
+        if !whitened.take(frame.image, dt_s) {
+            return Ok(());
+        }
+        self.blind = false;
+        let step = whitened.step() as f64;
+        let middle = (whitened.step() / 2) as f64;
+        let sigma = self.config.sigma_px;
+        let frames = straight_s / dt_s.max(1e-9).min(straight_s);
+        let first = out.len();
+        for side in sides.iter_mut() {
+            side.step(&self.config, motion, whitened, dt_s);
+        }
+        let kept = kept(&self.config, dt_s);
+        let [bright, dark] = sides;
+        bright.null.learn(dark.null.past(), kept);
+        dark.null.learn(bright.null.past(), kept);
+        bright.begin(&self.config, motion, whitened, &dark.null);
+        dark.begin(&self.config, motion, whitened, &bright.null);
+        for side in [bright, dark].into_iter().filter(|s| s.is_wanted) {
+            for t in side.targets.iter().filter(|t| t.odds >= LEAST_ODDS) {
+                let at = t.moments.place * step + Vector2::repeat(middle);
+                let [cov, velocity_cov, cross] = t.covariances(frames, step);
+                // A matched frame shows a spot of height A as A times the root of its energy, √π σ.
+                let height = f64::from(side.sign) * t.snr * f64::from(whitened.noise_counts())
+                    / (std::f64::consts::PI.sqrt() * sigma);
+                let width = FWHM * sigma;
+                out.push(
+                    Detection::at(at, cov)
+                        .with_extent(Extent::around(at, width, width))
+                        .with_area_px((std::f64::consts::FRAC_PI_4 * width * width).round().max(1.0) as u32)
+                        .with_peak(height as f32)
+                        .with_sum(height * std::f64::consts::TAU * sigma * sigma)
+                        .with_score(t.odds.log10() as f32)
+                        .with_velocity(Some(DetectedVelocity {
+                            mean: t.moments.velocity * step,
+                            cov: velocity_cov,
+                            with_position: cross,
+                        })),
+                );
+            }
+        }
+        let (w, h) = (size.0 as f64, size.1 as f64);
+        out.retain(|d| (-0.5..w - 0.5).contains(&d.position.x) && (-0.5..h - 0.5).contains(&d.position.y));
+        out[first..]
+            .sort_unstable_by(|a, b| a.position.y.total_cmp(&b.position.y).then(a.position.x.total_cmp(&b.position.x)));
+        Ok(())
+    }
+
+    fn is_blind(&self) -> bool {
+        self.blind
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+//! Likelihood ratios of a target of each strength against noise, so that noise alone has the mean 1.
+//!
+//! How: a target of the strength a (deviations) makes z ~ N(a, 1) where noise makes N(0, 1): ln l = a z − a²/2, at most [`Levels::most`], so that no frame alone
+//! decides. Two strengths, the least looked for and twice that: one between or beyond loses at most a twelfth of its information. Each ratio is
+//! divided by its mean over the negative frames so far (l of −z: no target is in them, noise and what is left of the background are): under that null the ratio has the mean 1,
+//! whatever the tails, and so have products along any path. That is what bounds the number of false alarms (`density`).
+//! Source: ratio and martingale: A. Wald, *Sequential Analysis*, 1947. Limits: ground whose bright side differs from its dark one is not in the null.
+
+/// Strengths, as multiples of the least.
+pub(super) const STRENGTHS: [f64; 2] = [1.0, 2.0];
+/// Frames in which a target as bright as can be is sure.
+const FEWEST_FRAMES: f64 = 4.0;
+/// Frames that white noise's own mean counts for.
+const PRIOR: f64 = 4.0;
+
+/// The ratios' scale.
+#[derive(Clone, Debug)]
+pub(super) struct Levels {
+    snr: [f32; STRENGTHS.len()],
+    /// Most of ln l in one frame.
+    most: f32,
+    /// Mean ratio of the negative frames, and in how many.
+    null: [f64; STRENGTHS.len()],
+    weight: f64,
+}
+
+impl Levels {
+    /// For a least strength, and the odds (natural logarithm) that a target needs.
+    pub(super) fn new(least_snr: f64, needed: f64) -> Self {
+        Self {
+            snr: STRENGTHS.map(|s| (s * least_snr) as f32),
+            most: (needed / FEWEST_FRAMES).max(1.0) as f32,
+            null: [1.0; STRENGTHS.len()],
+            weight: PRIOR,
+        }
+    }
+
+    /// Learns the null from a frame; `kept` is what is left of the older ones.
+    pub(super) fn learn(&mut self, z: &[f32], sign: f32, kept: f64) {
+        self.weight = kept * self.weight + 1.0;
+        for (a, null) in self.snr.iter().zip(&mut self.null) {
+            let (most, half) = (self.most, 0.5 * a * a);
+            let sum: f64 = z.iter().map(|z| f64::from((-sign * a * z - half).min(most).exp())).sum();
+            *null += (sum / z.len().max(1) as f64 - *null) / self.weight;
+        }
+    }
+
+    /// Ratios of a row of z, for the strength of a number.
+    pub(super) fn ratios(&self, strength: usize, z: &[f32], sign: f32, out: &mut [f32]) {
+        let a = self.snr[strength];
+        let offset = 0.5 * a * a + self.null[strength].max(1e-30).ln() as f32;
+        let most = self.most - self.null[strength].max(1e-30).ln() as f32;
+        for (o, z) in out.iter_mut().zip(z) {
+            *o = (sign * a * z - offset).min(most).exp();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn noise_of_heavy_tails_has_the_mean_ratio_one() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut levels = Levels::new(1.0, 24.0);
+        let mut means = [0.0; 2];
+        let n = 200;
+        for k in 0..2 * n {
+            // Laplace noise of twice the deviation.
+            let z: Vec<f32> = (0..4096)
+                .map(|_| {
+                    let u: f32 = rng.random::<f32>() - 0.5;
+                    -1.4 * u.signum() * (1.0 - 2.0 * u.abs()).max(1e-7).ln()
+                })
+                .collect();
+            levels.learn(&z, 1.0, 1.0);
+            if k >= n {
+                let mut l = vec![0.0; z.len()];
+                for (s, mean) in means.iter_mut().enumerate() {
+                    levels.ratios(s, &z, 1.0, &mut l);
+                    *mean += l.iter().map(|v| f64::from(*v)).sum::<f64>() / (z.len() * n) as f64;
+                }
+            }
+        }
+        assert!(means.iter().all(|m| (0.9..1.1).contains(m)), "{means:?}");
+    }
+}

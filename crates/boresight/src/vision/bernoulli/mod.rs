@@ -1,0 +1,16 @@
+//! Small targets that no single frame shows and that turn: their density over places, velocities and strengths, carried from frame to frame.
+//!
+//! A frame becomes deviations of the noise on a grid (`whitened`), those become likelihood ratios (`likelihood`), a density of what may be there
+//! is carried over the whole frame (`density`); what stands out of it is a target with a small density of its own (`target`), whose light is taken out of the frame for
+//! all others (`detector`). Figures and limits: `docs/limit.md`.
+
+pub(crate) mod config;
+mod density;
+mod detector;
+mod likelihood;
+mod null;
+mod target;
+mod whitened;
+
+pub use config::BernoulliConfig;
+pub(super) use detector::BernoulliDetector;
