@@ -1,7 +1,7 @@
 //! The detector: whitened frames, the density of the whole frame, targets that stand out of it and are followed by themselves.
 //!
-//! How: the density's mean over velocities and strengths is summed in boxes about as wide as the spot; where the number of cells over that sum, the expected number of false
-//! alarms, is at most what is asked for, the highest first, a target begins: it takes its surroundings of the density with it, and there the
+//! How: the density's mean over velocities and strengths is summed in boxes about as wide as the spot; where the expected number of places of noise with such a sum (`null`) is at most what is
+//! asked for, the highest first, a target begins: it takes its surroundings of the density with it, and there the
 //! frame's own is brought back to what noise is expected to have. From then on its light is taken out of the frame for all others, and the frame's density gains nothing where it is.
 //! Its odds begin as one over the expected number of false alarms. Two targets that are at one place now and a straight time ago are one.
 //! Limits: [`MOST_TARGETS`] a side; ground that stands out and moves as targets do; a camera that moves by more than the velocities looked for.
@@ -24,8 +24,10 @@ use nalgebra::Vector2;
 const MOST_TARGETS: usize = 64;
 /// Most places, velocities and strengths of a frame: 4 bytes each, 512 MB.
 const MOST_CELLS: usize = 1 << 27;
-/// Straight times after which a gap leaves nothing that is of use.
-const GAP: f64 = 2.0;
+/// Straight times, and usual intervals between frames, after which a gap leaves nothing that is of use.
+const GAP: [f64; 2] = [2.0, 4.0];
+/// Weight of the newest interval in the usual one.
+const NEWEST: f64 = 0.1;
 /// Half side of a target's window, in half sides of the box.
 const WINDOW: i64 = 5;
 /// Width at half height of a Gaussian in units of its deviation.
@@ -42,6 +44,8 @@ struct OneSide {
     null: Null,
     density: Density,
     targets: Vec<Target>,
+    /// Windows of targets that have gone, for those that come.
+    spare: Vec<Target>,
     /// Deviations with the targets' light taken out.
     left: Vec<f32>,
     ratios: [Vec<f32>; STRENGTHS.len()],
@@ -65,13 +69,15 @@ struct Search {
 pub(in crate::vision) struct BernoulliDetector {
     config: BernoulliConfig,
     search: Option<Search>,
+    /// Interval between frames, s.
+    usual_s: f64,
     blind: bool,
 }
 
 impl BernoulliDetector {
     /// Builds the detector for a checked configuration.
     pub(in crate::vision) fn new(config: &BernoulliConfig) -> Self {
-        Self { config: config.clone(), search: None, blind: true }
+        Self { config: config.clone(), search: None, usual_s: 0.0, blind: true }
     }
 
     fn lay_out<T: Pixel>(&mut self, frame: (usize, usize)) -> Result<()> {
@@ -102,9 +108,10 @@ impl BernoulliDetector {
                 [0, 0],
                 nv,
                 1.0,
-                (needed.exp() * 2.0 * (STRENGTHS.len() * nv * nv) as f64) as f32,
+                (needed.max(0.0).exp() * 2.0 * (STRENGTHS.len() * nv * nv) as f64) as f32,
             ),
             targets: Vec::with_capacity(MOST_TARGETS),
+            spare: Vec::with_capacity(MOST_TARGETS + 1),
             left: vec![0.0; w * h],
             ratios: [vec![0.0; w * h], vec![0.0; w * h]],
             boxes: vec![0.0; w * h],
@@ -128,9 +135,9 @@ impl OneSide {
             add_light(&mut self.left, size, t.expected(dt_s), -t.existence() * t.snr, width);
         }
         let kept = kept(config, dt_s);
-        self.levels.learn(&self.left, 1.0, kept);
+        self.levels.learn(&self.left, kept);
         for (strength, ratios) in self.ratios.iter_mut().enumerate() {
-            self.levels.ratios(strength, &self.left, 1.0, ratios);
+            self.levels.ratios(strength, &self.left, ratios);
             for t in &self.targets {
                 for_near(size, t.expected(dt_s), 3.0 * width, |i, _| ratios[i] = ratios[i].min(1.0));
             }
@@ -138,7 +145,7 @@ impl OneSide {
         self.density.step(motion, &self.ratios, 1.0 - motion.survival(), 1.0, [0, 0]);
         let fading = dt_s / config.straight_s();
         let (levels, left, seen) = (&self.levels, &self.left, &mut self.seen);
-        self.targets.retain_mut(|t| {
+        let is_left = |t: &mut Target| {
             let (at, light) = (t.expected(dt_s), t.existence() * t.snr);
             let own = |x: i64, y: i64| {
                 let i = y as usize * size.0 + x as usize;
@@ -154,7 +161,7 @@ impl OneSide {
                 let (begin, end) = ((-x0).clamp(0, n) as usize, (size.0 as i64 - x0).clamp(0, n) as usize);
                 seen.clear();
                 seen.extend((begin..end).map(|i| own(x0 + i as i64, y)));
-                levels.ratios(strength, seen, 1.0, &mut row[begin..end]);
+                levels.ratios(strength, seen, &mut row[begin..end]);
             });
             let at = t.moments.place;
             let (x, y) = (at.x.round() as i64, at.y.round() as i64);
@@ -164,7 +171,8 @@ impl OneSide {
                 t.snr = t.snr.max(0.0);
             }
             is_there && inside
-        });
+        };
+        give_up(&mut self.targets, &mut self.spare, is_left);
         self.join_twins(config.straight_s(), width);
         let half = box_of(config.sigma_px, whitened.step());
         sum_boxes(&self.density.marginal, size.0, half, &mut self.row, &mut self.boxes);
@@ -186,8 +194,12 @@ impl OneSide {
 
     /// Of two targets that are at one place now and were a straight time ago, the less sure one goes.
     fn join_twins(&mut self, straight_s: f64, width: f64) {
-        self.targets.sort_by(|a, b| b.odds.total_cmp(&a.odds));
-        let mut i = 0;
+        let by_odds = |a: &Target, b: &Target| {
+            let (pa, pb) = (a.moments.place, b.moments.place);
+            b.odds.total_cmp(&a.odds).then(pa.y.total_cmp(&pb.y)).then(pa.x.total_cmp(&pb.x))
+        };
+        self.targets.sort_unstable_by(by_odds);
+        let mut i = 1;
         while i < self.targets.len() {
             let is_twin = self.targets[..i].iter().any(|o| {
                 let t = &self.targets[i];
@@ -195,7 +207,7 @@ impl OneSide {
                 dp.norm() < 1.5 * width && (dp - dv * straight_s).norm() < 1.5 * width
             });
             if is_twin {
-                self.targets.remove(i);
+                self.spare.push(self.targets.remove(i));
             } else {
                 i += 1;
             }
@@ -218,15 +230,28 @@ impl OneSide {
             let (x, y) = ((i % w) as i64, (i / w) as i64);
             let odds = 1.0 / expected;
             let snr = f64::from(self.left[i].max(0.0)).max(config.least_snr);
-            let target = Target::new(&self.density, motion, [x, y], WINDOW * half as i64, odds, snr);
-            if let Some(target) = target {
+            let mut target = self.spare.pop().unwrap_or_else(|| Target::empty(motion, WINDOW * half as i64));
+            let begins = target.begin(&self.density, motion, [x, y], odds, snr);
+            if begins {
                 self.density.flatten(target.window((w, h)), 1.0);
-                self.targets.extend((!is_ghost).then_some(target));
             }
+            (if begins && !is_ghost { &mut self.targets } else { &mut self.spare }).push(target);
             // The same place is not looked at again in this frame.
             for_near((w, h), Vector2::new(x as f64, y as f64), (WINDOW * half as i64) as f64, |i, _| {
                 self.boxes[i] = 0.0
             });
+        }
+    }
+}
+
+/// Keeps those that are left, in another order, and the windows of the others.
+fn give_up(targets: &mut Vec<Target>, spare: &mut Vec<Target>, mut is_left: impl FnMut(&mut Target) -> bool) {
+    let mut i = 0;
+    while i < targets.len() {
+        if is_left(&mut targets[i]) {
+            i += 1;
+        } else {
+            spare.push(targets.swap_remove(i));
         }
     }
 }
@@ -294,7 +319,12 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         let Some(Search { whitened, motion, sides, .. }) = &mut self.search else { return Ok(()) };
         let straight_s = self.config.straight_s();
         let mut dt_s = frame.dt_s.max(0.0);
-        if frame.dt_s < 0.0 || dt_s > GAP * straight_s.max(dt_s.min(0.1)) {
+        let usual_s = if self.usual_s > 0.0 { self.usual_s } else { dt_s };
+        let is_gap = dt_s > GAP[0] * straight_s && dt_s > GAP[1] * usual_s;
+        if !is_gap {
+            self.usual_s = usual_s + NEWEST * (dt_s - usual_s);
+        }
+        if frame.dt_s < 0.0 || is_gap {
             // Nothing of what was there is where it was; the background is what it was.
             if frame.dt_s < 0.0 {
                 whitened.clear();
@@ -302,7 +332,7 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
             dt_s = 0.0;
             sides.iter_mut().for_each(|s| {
                 s.density.fill(1.0);
-                s.targets.clear();
+                s.spare.append(&mut s.targets);
             });
         }
         motion.advance(dt_s);

@@ -36,22 +36,22 @@ impl Levels {
     }
 
     /// Learns the null from a frame; `kept` is what is left of the older ones.
-    pub(super) fn learn(&mut self, z: &[f32], sign: f32, kept: f64) {
+    pub(super) fn learn(&mut self, z: &[f32], kept: f64) {
         self.weight = kept * self.weight + 1.0;
         for (a, null) in self.snr.iter().zip(&mut self.null) {
             let (most, half) = (self.most, 0.5 * a * a);
-            let sum: f64 = z.iter().map(|z| f64::from((-sign * a * z - half).min(most).exp())).sum();
+            let sum: f64 = z.iter().map(|z| f64::from((-a * z - half).min(most).exp())).sum();
             *null += (sum / z.len().max(1) as f64 - *null) / self.weight;
         }
     }
 
     /// Ratios of a row of z, for the strength of a number.
-    pub(super) fn ratios(&self, strength: usize, z: &[f32], sign: f32, out: &mut [f32]) {
+    pub(super) fn ratios(&self, strength: usize, z: &[f32], out: &mut [f32]) {
         let a = self.snr[strength];
         let offset = 0.5 * a * a + self.null[strength].max(1e-30).ln() as f32;
         let most = self.most - self.null[strength].max(1e-30).ln() as f32;
         for (o, z) in out.iter_mut().zip(z) {
-            *o = (sign * a * z - offset).min(most).exp();
+            *o = (a * z - offset).min(most).exp();
         }
     }
 }
@@ -76,11 +76,11 @@ mod tests {
                     -1.4 * u.signum() * (1.0 - 2.0 * u.abs()).max(1e-7).ln()
                 })
                 .collect();
-            levels.learn(&z, 1.0, 1.0);
+            levels.learn(&z, 1.0);
             if k >= n {
                 let mut l = vec![0.0; z.len()];
                 for (s, mean) in means.iter_mut().enumerate() {
-                    levels.ratios(s, &z, 1.0, &mut l);
+                    levels.ratios(s, &z, &mut l);
                     *mean += l.iter().map(|v| f64::from(*v)).sum::<f64>() / (z.len() * n) as f64;
                 }
             }

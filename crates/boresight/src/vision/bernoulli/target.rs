@@ -31,23 +31,28 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// Takes the surroundings of a place out of the frame's density.
-    pub(super) fn new(frame: &Density, motion: &Motion, at: [i64; 2], half: i64, odds: f64, snr: f64) -> Option<Self> {
+    /// One that nothing is known of, with a window of that half side, cells.
+    pub(super) fn empty(motion: &Motion, half: i64) -> Self {
         let side = (2 * half + 1) as usize;
-        let origin = [at[0] - half, at[1] - half];
-        let mut density = Density::new(side, side, origin, motion.count(), 0.0, f32::MAX);
-        density.copy_from(frame);
         let empty = || vec![0.0; side * side];
-        let mut target = Self {
-            density,
-            odds: odds.min(MOST_ODDS),
+        Self {
+            density: Density::new(side, side, [0, 0], motion.count(), 0.0, f32::MAX),
+            odds: 0.0,
             moments: Moments::default(),
-            snr,
+            snr: 0.0,
             half,
             ratios: [empty(), empty()],
             row: vec![0.0; side],
-        };
-        target.normalise(motion).then_some(target)
+        }
+    }
+
+    /// Takes the surroundings of a place over from the frame's density; false if nothing is there.
+    pub(super) fn begin(&mut self, frame: &Density, motion: &Motion, at: [i64; 2], odds: f64, snr: f64) -> bool {
+        self.density.origin = [at[0] - self.half, at[1] - self.half];
+        self.density.fill(0.0);
+        self.density.copy_from(frame);
+        (self.odds, self.snr) = (odds.min(MOST_ODDS), snr);
+        self.normalise(motion)
     }
 
     /// The window on the grid: left, top, right, bottom, as far as it lies within `size`.

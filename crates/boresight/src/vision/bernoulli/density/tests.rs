@@ -1,3 +1,5 @@
+//! The recursion against its definition written out, its mean under noise, its moments.
+
 use super::*;
 use crate::vision::bernoulli::BernoulliConfig;
 use rand::{RngExt, SeedableRng};

@@ -1,3 +1,5 @@
+//! Spots in noise: found, given up, crossing, after a gap; noise alone; what is refused.
+
 use crate::vision::bernoulli::BernoulliConfig;
 use crate::vision::integrate::StillBackground;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
@@ -76,6 +78,18 @@ fn a_spot_that_no_frame_shows_is_found_while_it_turns_and_given_up_when_it_is_go
         // What is left is that it is reported somewhat after it went.
         assert!(others <= 20 && (110..125).contains(&last), "{others} others, last at {last}");
     }
+}
+
+#[test]
+fn times_are_seconds_and_not_frames() {
+    let slow = BernoulliConfig { max_speed_px_per_s: 0.8, acceleration_density_px2_per_s3: 0.01, ..config() };
+    let mut detector = detector(BernoulliConfig { mean_life_s: 500.0, ..slow });
+    let (mut rng, mut scan) = (ChaCha8Rng::seed_from_u64(15), Scan::default());
+    let place = |k: u64| [20.0 + 1.2 * k as f64, 30.0 + 0.6 * k as f64];
+    for k in 0..50u64 {
+        detector.detect(&frame(k, 2.0 * k as f64, &[(place(k), 1.5)], &mut rng), &mut scan).unwrap();
+    }
+    assert!(nearest(&scan, place(49)) < 3.0, "{:?}", scan.detections);
 }
 
 #[test]
