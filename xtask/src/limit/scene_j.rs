@@ -10,7 +10,7 @@ use boresight::vision::integrate::{IntegrateConfig, StillBackground};
 use boresight::vision::probability::Level;
 use boresight::vision::threshold::ThresholdConfig;
 use boresight::vision::{DetectorConfig, LlrTable, ScoreImage, TrackBeforeDetect, build};
-use boresight::{Config, Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp, track};
+use boresight::{Config, Frame, FrameIndex, Image, PixelKind, Pixels, Scan, Timestamp, track};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use std::fmt::Write as _;
@@ -85,16 +85,7 @@ pub fn table(page: &mut String) -> Result<()> {
 
 /// Share of scans 11 to 50, and of 31 to 50, with a track, or a detection where there is no tracker, near the target, %.
 fn found(threshold: &ThresholdConfig, tracker: Option<&str>) -> Result<[f64; 2]> {
-    let info = SourceInfo {
-        label: String::new(),
-        reader: String::new(),
-        width: SIDE,
-        height: SIDE,
-        kind: PixelKind::Gray8,
-        n_frames: None,
-        rate_hz: None,
-        true_times: true,
-    };
+    let info = super::scenes::info([SIDE; 2], PixelKind::Gray8);
     let config = DetectorConfig { threshold: threshold.clone(), ..DetectorConfig::default() };
     let tracker = tracker.map(|text| Config::from_toml(text, "configs/below-noise.toml")).transpose()?;
     let mut hits = [0u64; 2];

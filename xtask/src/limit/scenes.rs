@@ -65,6 +65,20 @@ pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
+/// What a source of such frames says of itself.
+pub fn info(size: [usize; 2], kind: PixelKind) -> SourceInfo {
+    SourceInfo {
+        label: "simulated".into(),
+        reader: String::new(),
+        width: size[0],
+        height: size[1],
+        kind,
+        n_frames: None,
+        rate_hz: Some(RATE_HZ),
+        true_times: true,
+    }
+}
+
 /// The detector that sums, for these scenes.
 pub fn detector(size: [usize; 2], config: IntegrateConfig) -> Result<Box<dyn Detector>> {
     detector_of(size, ThresholdConfig::Integrate(config))
@@ -72,16 +86,7 @@ pub fn detector(size: [usize; 2], config: IntegrateConfig) -> Result<Box<dyn Det
 
 /// A detector for these scenes.
 pub fn detector_of(size: [usize; 2], threshold: ThresholdConfig) -> Result<Box<dyn Detector>> {
-    let info = SourceInfo {
-        label: "simulated".into(),
-        reader: String::new(),
-        width: size[0],
-        height: size[1],
-        kind: PixelKind::Gray16,
-        n_frames: None,
-        rate_hz: Some(RATE_HZ),
-        true_times: true,
-    };
+    let info = info(size, PixelKind::Gray16);
     let config = DetectorConfig { threshold, ..DetectorConfig::default() };
     Ok(build(&config, &info)?)
 }

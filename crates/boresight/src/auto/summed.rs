@@ -8,7 +8,7 @@ use super::scene::{Camera, Scene};
 use crate::Config;
 use crate::track::InitiationConfig;
 use crate::vision::integrate::{IntegrateConfig, StillBackground};
-use crate::vision::threshold::ThresholdConfig;
+use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::vision::{ClusterConfig, DetectorConfig};
 
 /// Length of a sum, s.
@@ -20,10 +20,7 @@ const MISSED: f64 = 3.0;
 
 /// Writes the detector, and what the tracker needs to wait from report to report; `config` is that for isolated targets.
 pub fn configure(scene: &Scene, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
-    let polarity = match &config.detector.threshold {
-        ThresholdConfig::Isolated(c) => c.polarity,
-        _ => Default::default(),
-    };
+    let polarity = polarity(config);
     let frames = ((DURATION_S / interval_s.max(1e-6)).clamp(8.0, 64.0) as u32).next_power_of_two().min(64);
     let background = if scene.camera == Camera::Fixed { StillBackground::Temporal } else { StillBackground::Both };
     let max_speed_px_per_s = (SPEED / interval_s.max(1e-6)).min(1e5);
@@ -34,15 +31,25 @@ pub fn configure(scene: &Scene, interval_s: f64, config: &mut Config, reasons: &
          (detector.threshold.integrate); targets are reported every {report_s:.2} s.",
         sums.false_alarms_per_frame,
     ));
-    config.detector = DetectorConfig {
-        threshold: ThresholdConfig::Integrate(sums),
-        cluster: ClusterConfig::default(),
-        camera: config.detector.camera,
-        ..DetectorConfig::default()
-    };
+    write(ThresholdConfig::Integrate(sums), max_speed_px_per_s, config);
+    config.tracker.coast_s = config.tracker.coast_s.max(MISSED * report_s);
+}
+
+/// The sign that isolated targets have.
+pub(super) fn polarity(config: &Config) -> Polarity {
+    match &config.detector.threshold {
+        ThresholdConfig::Isolated(c) => c.polarity,
+        _ => Polarity::default(),
+    }
+}
+
+/// Writes a detector below the noise of a frame in the place of that for isolated targets: it judges scores by itself, and says velocities.
+pub(super) fn write(threshold: ThresholdConfig, max_speed_px_per_s: f64, config: &mut Config) {
+    let camera = config.detector.camera;
+    config.detector =
+        DetectorConfig { threshold, cluster: ClusterConfig::default(), camera, ..DetectorConfig::default() };
     let t = &mut config.tracker;
     t.min_initiation_score = 0.0;
-    t.coast_s = t.coast_s.max(MISSED * report_s);
     t.max_speed_px_per_s = t.max_speed_px_per_s.max(max_speed_px_per_s);
     t.initiation = InitiationConfig::default();
 }

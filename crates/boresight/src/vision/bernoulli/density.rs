@@ -4,13 +4,13 @@
 //! C. A. Barlow & T. L. Corwin, *Bayesian Multiple Target Tracking*, 1999, ch. 7; grids of velocities as our own.
 //! Step: a velocity component goes to each neighbour with the probability p/2 (at the ends it stays), places move by the velocity, what is there stays
 //! with the probability s and comes anew with 1 − s, all is multiplied by the ratio of the place (`likelihood`):
-//! f ← l (s · moved(mixed f) + (1 − s)). Beyond the border, and where all begins, f = 1. Under noise alone l has the mean 1 and so has f, always: by Markov's inequality
-//! the expected number of boxes that do not overlap and hold a sum of at least c is at most (number of cells) / c, whatever the correlations. That is the threshold.
+//! f ← l (s · moved(mixed f) + (1 − s)). Beyond the border, and where all begins, f = 1. Under noise alone l has the mean 1 and so has f, always: of frames that are independent, by Markov's inequality
+//! the expected number of boxes that do not overlap and hold a sum of at least c is then at most (number of cells) / c, however neighbours depend on each other. `null` begins with it.
 //! Velocities lie dv = 2 σ / T apart, T the straight time: half of that for T is σ, and paths change over between them. A random walk of the density q has p = q dt / dv². A velocity's plane moves by whole cells: what
 //! v t leaves beside them is the same for all its cells and known, so nothing is blurred by it.
 //! Departures: f is no probability but odds against noise for each cell (the exact Bernoulli recursion divides by the odds that all of it is one target: `target`
 //! does, where one is). Numbers are kept in 16 bits with 8 of fraction: random steps of 0.2 % a frame.
-//! Limits: memory 4 bytes a cell, velocity and strength. Symbols: f odds; l ratio; s survival.
+//! Limits: memory 4 bytes a place, velocity and strength. Symbols: f odds; l ratio; s survival.
 
 use super::likelihood::STRENGTHS;
 use nalgebra::{Matrix2, Vector2};
@@ -19,6 +19,11 @@ use nalgebra::{Matrix2, Vector2};
 const APART: f64 = 2.0;
 /// Most that a component changes in one mixing.
 const MOST_MIXED: f64 = 0.5;
+
+/// Distance of neighbouring velocities, px/s.
+pub(super) fn apart(config: &super::BernoulliConfig) -> f64 {
+    APART * config.sigma_px / config.straight_s()
+}
 
 /// Velocities, and how they move and mix in the step to this frame.
 #[derive(Clone, Debug)]
@@ -40,10 +45,10 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// For a width, straight time, largest speed, density of acceleration and life; `step` px make a cell.
+    /// `step` px make a cell.
     pub(super) fn new(config: &super::BernoulliConfig, step: usize) -> Self {
         let cell = step as f64;
-        let apart = APART * config.sigma_px / config.straight_s();
+        let apart = apart(config);
         let n = (config.max_speed_px_per_s / apart).ceil().min(1e6) as i64;
         let velocities: Vec<f64> = (-n..=n).map(|i| i as f64 * apart / cell).collect();
         let count = velocities.len();
@@ -82,6 +87,12 @@ impl Motion {
         self.passes = ((p / MOST_MIXED).ceil() as usize).max(1);
         self.mixed = (p / self.passes as f64) as f32;
         self.survival = (-dt_s / self.life_s).exp() as f32;
+    }
+
+    /// Variance of a component within its step, (cells/s)².
+    pub(super) fn within_step(&self) -> f64 {
+        let step = self.velocities.windows(2).next().map_or(0.0, |v| v[1] - v[0]);
+        step * step / 12.0
     }
 
     /// Probability that what was there still is.
@@ -186,12 +197,12 @@ impl Density {
                 }
             }
             for y in 0..hi {
-                mix_rows(&from[y as usize * block..][..block], nv * w, motion.mixed, &mut self.mixed);
+                mix(&from[y as usize * block..][..block], nv * w, motion.mixed, &mut self.mixed);
                 for _ in 1..motion.passes {
-                    mix_again(&self.mixed, nv * w, motion.mixed, &mut self.other);
+                    mix(&self.mixed, nv * w, motion.mixed, &mut self.other);
                     std::mem::swap(&mut self.mixed, &mut self.other);
                     for (from, to) in self.mixed.chunks_exact(nv * w).zip(self.other.chunks_exact_mut(nv * w)) {
-                        mix_again(from, w, motion.mixed, to);
+                        mix(from, w, motion.mixed, to);
                     }
                     std::mem::swap(&mut self.mixed, &mut self.other);
                 }
@@ -237,19 +248,6 @@ impl Density {
         self.f.iter_mut().for_each(|v| *v = narrow(by * wide(*v)));
     }
 
-    /// Rows of a rectangle of the window: strength, vy, vx, y, and its values.
-    fn rows(&self, [x0, y0, x1, y1]: [usize; 4]) -> impl Iterator<Item = ([usize; 4], &[u16])> {
-        let (nv, w, h) = (self.nv, self.w, self.h);
-        (0..STRENGTHS.len()).flat_map(move |s| {
-            (y0..y1).flat_map(move |y| {
-                (0..nv * nv).map(move |v| {
-                    let row = &self.f[((s * h + y) * nv * nv + v) * w..][..w];
-                    ([s, v / nv, v % nv, y], &row[x0..x1])
-                })
-            })
-        })
-    }
-
     /// Copies a rectangle of another window over; what it lacks stays.
     pub(super) fn copy_from(&mut self, other: &Self) {
         let (dx, dy) = (other.origin[0] - self.origin[0], other.origin[1] - self.origin[1]);
@@ -286,10 +284,11 @@ impl Density {
         }
     }
 
-    /// Sum, mean and covariance of a rectangle of the window; places are those of the grid.
-    pub(super) fn moments(&self, motion: &Motion, rectangle: [usize; 4]) -> Moments {
+    /// Sum, mean and covariance; places are those of the grid.
+    pub(super) fn moments(&self, motion: &Motion) -> Moments {
         let (mut total, mut first, mut second) = (0.0, [0.0; 4], [[0.0; 4]; 4]);
-        for ([_, vy, vx, y], row) in self.rows(rectangle) {
+        for (i, row) in self.f.chunks_exact(self.w).enumerate() {
+            let (vx, vy, y) = (i % self.nv, i / self.nv % self.nv, i / (self.nv * self.nv) % self.h);
             let (mut s0, mut s1, mut s2) = (0.0f32, 0.0f32, 0.0f32);
             for (i, v) in row.iter().enumerate() {
                 let (v, x) = (wide(*v), i as f32);
@@ -301,7 +300,7 @@ impl Density {
                 continue;
             }
             let (s0, s1, s2) = (f64::from(s0), f64::from(s1), f64::from(s2));
-            let left = rectangle[0] as f64 + motion.beside[vx];
+            let left = motion.beside[vx];
             let of = [0.0, y as f64 + motion.beside[vy], motion.velocities[vx], motion.velocities[vy]];
             total += s0;
             let sum_x = s1 + left * s0;
@@ -331,31 +330,35 @@ impl Density {
     }
 }
 
-widest! {
-    /// Each plane of `stride` values with its two neighbours.
-    fn mix_rows(from: &[u16], stride: usize, p: f32, to: &mut [f32]) {
-        let n = from.len() / stride;
-        for v in 0..n {
-            let (below, above) = (v.saturating_sub(1), (v + 1).min(n - 1));
-            let [below, here, above] = [below, v, above].map(|i| &from[i * stride..][..stride]);
-            let to = &mut to[v * stride..][..stride];
-            for (((t, b), m), a) in to.iter_mut().zip(below).zip(here).zip(above) {
-                *t = (1.0 - p) * wide(*m) + 0.5 * p * (wide(*b) + wide(*a));
-            }
-        }
+/// A number of the density, in 16 bits or wide.
+trait Odds: Copy {
+    fn of(self) -> f32;
+}
+
+impl Odds for u16 {
+    #[inline(always)]
+    fn of(self) -> f32 {
+        wide(self)
+    }
+}
+
+impl Odds for f32 {
+    #[inline(always)]
+    fn of(self) -> f32 {
+        self
     }
 }
 
 widest! {
-    /// The same of numbers that are wide.
-    fn mix_again(from: &[f32], stride: usize, p: f32, to: &mut [f32]) {
+    /// Each plane of `stride` values with its two neighbours.
+    fn mix<T: Odds>(from: &[T], stride: usize, p: f32, to: &mut [f32]) {
         let n = from.len() / stride;
         for v in 0..n {
             let (below, above) = (v.saturating_sub(1), (v + 1).min(n - 1));
             let [below, here, above] = [below, v, above].map(|i| &from[i * stride..][..stride]);
             let to = &mut to[v * stride..][..stride];
             for (((t, b), m), a) in to.iter_mut().zip(below).zip(here).zip(above) {
-                *t = (1.0 - p) * m + 0.5 * p * (b + a);
+                *t = (1.0 - p) * m.of() + 0.5 * p * (b.of() + a.of());
             }
         }
     }

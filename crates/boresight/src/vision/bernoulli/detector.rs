@@ -10,6 +10,7 @@
 use super::config::BernoulliConfig;
 use super::density::{Density, Motion};
 use super::likelihood::{Levels, STRENGTHS};
+use super::memory::fits;
 use super::null::Null;
 use super::target::{LEAST_ODDS, Target};
 use super::whitened::Whitened;
@@ -22,12 +23,10 @@ use nalgebra::Vector2;
 
 /// Most targets of a side.
 const MOST_TARGETS: usize = 64;
-/// Most places, velocities and strengths of a frame: 4 bytes each, 512 MB.
-const MOST_CELLS: usize = 1 << 27;
-/// Straight times, and usual intervals between frames, after which a gap leaves nothing that is of use.
-const GAP: [f64; 2] = [2.0, 4.0];
-/// Weight of the newest interval in the usual one.
-const NEWEST: f64 = 0.1;
+/// Straight times after which nothing that was there is of use: its velocity is another.
+const GAP: f64 = 2.0;
+/// Such gaps in a row, with nothing else before, by which frames are too far apart for what is asked.
+const ONLY_GAPS: u32 = 3;
 /// Half side of a target's window, in half sides of the box.
 const WINDOW: i64 = 5;
 /// Width at half height of a Gaussian in units of its deviation.
@@ -51,8 +50,6 @@ struct OneSide {
     ratios: [Vec<f32>; STRENGTHS.len()],
     boxes: Vec<f32>,
     row: Vec<f32>,
-    /// A row of deviations as one target sees them.
-    seen: Vec<f32>,
 }
 
 /// What is built once frames have a size.
@@ -69,31 +66,31 @@ struct Search {
 pub(in crate::vision) struct BernoulliDetector {
     config: BernoulliConfig,
     search: Option<Search>,
-    /// Interval between frames, s.
-    usual_s: f64,
+    /// Gaps before the first frames that were no gap; `None` from then on.
+    only_gaps: Option<u32>,
     blind: bool,
 }
 
 impl BernoulliDetector {
     /// Builds the detector for a checked configuration.
     pub(in crate::vision) fn new(config: &BernoulliConfig) -> Self {
-        Self { config: config.clone(), search: None, usual_s: 0.0, blind: true }
+        Self { config: config.clone(), search: None, only_gaps: Some(0), blind: true }
     }
 
     fn lay_out<T: Pixel>(&mut self, frame: (usize, usize)) -> Result<()> {
         if self.search.as_ref().is_some_and(|s| s.frame == frame) {
             return Ok(());
         }
+        if !fits(&self.config, frame) {
+            let speed = self.config.max_speed_px_per_s;
+            let what =
+                format!("{} x {} px with velocities of up to {speed} px/s take more than 512 MB", frame.0, frame.1);
+            let hint = "lower max-speed-px-per-s, or raise acceleration-density-px2-per-s3 or sigma-px, or look at a part of the frame";
+            return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(hint));
+        }
         let whitened = Whitened::new::<T>(frame.0, frame.1, &self.config);
         let motion = Motion::new(&self.config, whitened.step());
         let ((w, h), nv) = (whitened.size(), motion.count());
-        let per_place = (nv.saturating_mul(nv)).saturating_mul(2 * STRENGTHS.len());
-        if (w * h).saturating_mul(per_place) > MOST_CELLS {
-            let what = format!("{w} x {h} places with {nv} x {nv} velocities are more than {MOST_CELLS} cells");
-            return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(
-                "lower max-speed-px-per-s, or raise acceleration-density-px2-per-s3 or sigma-px, or look at a part of the frame",
-            ));
-        }
         let needed = ((w * h) as f64 / self.config.false_alarms_per_frame).ln();
         let half = box_of(self.config.sigma_px, whitened.step());
         let build = |side| OneSide {
@@ -116,7 +113,6 @@ impl BernoulliDetector {
             ratios: [vec![0.0; w * h], vec![0.0; w * h]],
             boxes: vec![0.0; w * h],
             row: vec![0.0; w * h],
-            seen: Vec::new(),
         };
         self.search = Some(Search { frame, sides: [build(Side::Bright), build(Side::Dark)], whitened, motion });
         Ok(())
@@ -144,28 +140,19 @@ impl OneSide {
         }
         self.density.step(motion, &self.ratios, 1.0 - motion.survival(), 1.0, [0, 0]);
         let fading = dt_s / config.straight_s();
-        let (levels, left, seen) = (&self.levels, &self.left, &mut self.seen);
+        let (levels, left) = (&self.levels, &self.left);
+        let contains = |x: i64, y: i64| (0..size.0 as i64).contains(&x) && (0..size.1 as i64).contains(&y);
         let is_left = |t: &mut Target| {
             let (at, light) = (t.expected(dt_s), t.existence() * t.snr);
             let own = |x: i64, y: i64| {
-                let i = y as usize * size.0 + x as usize;
                 let d = Vector2::new(x as f64, y as f64) - at;
-                left[i] + (light * (-0.25 * d.norm_squared() / (width * width)).exp()) as f32
+                let light = light * (-0.25 * d.norm_squared() / (width * width)).exp();
+                if contains(x, y) { left[y as usize * size.0 + x as usize] + light as f32 } else { f32::NEG_INFINITY }
             };
-            let is_there = t.step(motion, dt_s, |strength, [x0, y], row| {
-                row.fill(0.0);
-                if !(0..size.1 as i64).contains(&y) {
-                    return;
-                }
-                let n = row.len() as i64;
-                let (begin, end) = ((-x0).clamp(0, n) as usize, (size.0 as i64 - x0).clamp(0, n) as usize);
-                seen.clear();
-                seen.extend((begin..end).map(|i| own(x0 + i as i64, y)));
-                levels.ratios(strength, seen, &mut row[begin..end]);
-            });
+            let is_there = t.step(motion, levels, dt_s, own);
             let at = t.moments.place;
             let (x, y) = (at.x.round() as i64, at.y.round() as i64);
-            let inside = (0..size.0 as i64).contains(&x) && (0..size.1 as i64).contains(&y);
+            let inside = contains(x, y);
             if inside {
                 t.snr += fading.min(1.0) * (f64::from(own(x, y)) - t.snr);
                 t.snr = t.snr.max(0.0);
@@ -288,7 +275,7 @@ fn add_light(z: &mut [f32], size: (usize, usize), at: Vector2<f64>, snr: f64, wi
     for_near(size, at, 6.0 * width, |i, d| z[i] += (snr * (-scale * d.norm_squared()).exp()) as f32);
 }
 
-/// Sums over squares of half side `half`; outside there is nothing.
+/// Sums over squares of half side `half`; outside there is nothing. Each anew: a running sum would lose small odds beside those of a target.
 fn sum_boxes(from: &[f32], w: usize, half: usize, rows: &mut [f32], to: &mut [f32]) {
     for (from, to) in from.chunks_exact(w).zip(rows.chunks_exact_mut(w)) {
         for (x, t) in to.iter_mut().enumerate() {
@@ -319,14 +306,24 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         let Some(Search { whitened, motion, sides, .. }) = &mut self.search else { return Ok(()) };
         let straight_s = self.config.straight_s();
         let mut dt_s = frame.dt_s.max(0.0);
-        let usual_s = if self.usual_s > 0.0 { self.usual_s } else { dt_s };
-        let is_gap = dt_s > GAP[0] * straight_s && dt_s > GAP[1] * usual_s;
-        if !is_gap {
-            self.usual_s = usual_s + NEWEST * (dt_s - usual_s);
+        let is_gap = dt_s > GAP * straight_s;
+        if is_gap && let Some(gaps) = &mut self.only_gaps {
+            *gaps += 1;
+            if *gaps >= ONLY_GAPS {
+                let what = format!(
+                    "frames are {dt_s:.3} s apart, and a path is straight for {straight_s:.3} s: nothing can be carried from one to the next"
+                );
+                let density = 3.0 * (self.config.sigma_px / dt_s).powi(2) / dt_s;
+                let hint =
+                    format!("lower acceleration-density-px2-per-s3: {density:.2e} is straight from frame to frame");
+                return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(hint));
+            }
+        } else if dt_s > 0.0 {
+            self.only_gaps = None;
         }
-        if frame.dt_s < 0.0 || is_gap {
-            // Nothing of what was there is where it was; the background is what it was.
-            if frame.dt_s < 0.0 {
+        if frame.dt_s <= 0.0 || is_gap {
+            // Nothing of what was there is where it was; the background is what it was, unless time stood still or ran back.
+            if frame.dt_s <= 0.0 {
                 whitened.clear();
             }
             dt_s = 0.0;
@@ -343,7 +340,8 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         let step = whitened.step() as f64;
         let middle = (whitened.step() / 2) as f64;
         let sigma = self.config.sigma_px;
-        let frames = straight_s / dt_s.max(1e-9).min(straight_s);
+        // After a gap there is one.
+        let frames = if dt_s > 0.0 { straight_s / dt_s } else { 1.0 };
         let first = out.len();
         for side in sides.iter_mut() {
             side.step(&self.config, motion, whitened, dt_s);
@@ -357,7 +355,7 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         for side in [bright, dark].into_iter().filter(|s| s.is_wanted) {
             for t in side.targets.iter().filter(|t| t.odds >= LEAST_ODDS) {
                 let at = t.moments.place * step + Vector2::repeat(middle);
-                let [cov, velocity_cov, cross] = t.covariances(frames, step);
+                let [cov, velocity_cov, cross] = t.covariances(motion, frames, step);
                 // A matched frame shows a spot of height A as A times the root of its energy, √π σ.
                 let height = f64::from(side.sign) * t.snr * f64::from(whitened.noise_counts())
                     / (std::f64::consts::PI.sqrt() * sigma);

@@ -8,9 +8,11 @@ pub(crate) mod config;
 mod density;
 mod detector;
 mod likelihood;
+mod memory;
 mod null;
 mod target;
 mod whitened;
 
 pub use config::BernoulliConfig;
 pub(super) use detector::BernoulliDetector;
+pub(crate) use memory::speed_that_fits;

@@ -7,6 +7,7 @@
 //! tracker that sums over as many is as sure as the density if each report is given n / 4 times the density's covariance.
 
 use super::density::{Density, Moments, Motion};
+use super::likelihood::{Levels, STRENGTHS};
 use nalgebra::{Matrix2, Vector2};
 
 /// Most odds: a target that is gone is given up within some frames.
@@ -26,8 +27,9 @@ pub(super) struct Target {
     pub(super) snr: f64,
     /// Half side of the window, cells.
     half: i64,
-    ratios: [Vec<f32>; super::likelihood::STRENGTHS.len()],
-    row: Vec<f32>,
+    /// Deviations in the window, and their ratios.
+    z: Vec<f32>,
+    ratios: [Vec<f32>; STRENGTHS.len()],
 }
 
 impl Target {
@@ -41,8 +43,8 @@ impl Target {
             moments: Moments::default(),
             snr: 0.0,
             half,
+            z: empty(),
             ratios: [empty(), empty()],
-            row: vec![0.0; side],
         }
     }
 
@@ -75,8 +77,7 @@ impl Target {
 
     /// Divides by the sum; false if nothing is left.
     fn normalise(&mut self, motion: &Motion) -> bool {
-        let whole = [0, 0, self.density.w, self.density.h];
-        let m = self.density.moments(motion, whole);
+        let m = self.density.moments(motion);
         if !(m.total > 0.0 && m.total.is_finite()) {
             return false;
         }
@@ -85,22 +86,17 @@ impl Target {
         true
     }
 
-    /// One frame on; false if it is given up. `ratios` writes a row of ratios of a strength for the cells from (x, y) on of the grid that lie inside, and 0 else.
-    pub(super) fn step(
-        &mut self,
-        motion: &Motion,
-        dt_s: f64,
-        mut ratios: impl FnMut(usize, [i64; 2], &mut [f32]),
-    ) -> bool {
+    /// One frame on; false if it is given up. `z` is the frame's deviation at a cell of the grid, −∞ outside of it: nothing is there.
+    pub(super) fn step(&mut self, motion: &Motion, levels: &Levels, dt_s: f64, z: impl Fn(i64, i64) -> f32) -> bool {
         let expected = self.expected(dt_s);
-        let origin = [expected.x.round() as i64 - self.half, expected.y.round() as i64 - self.half];
-        let moved = [origin[0] - self.density.origin[0], origin[1] - self.density.origin[1]];
-        self.density.origin = origin;
-        for (strength, of) in self.ratios.iter_mut().enumerate() {
-            for (y, row) in of.chunks_exact_mut(self.density.w).enumerate() {
-                ratios(strength, [origin[0], origin[1] + y as i64], &mut self.row);
-                row.copy_from_slice(&self.row);
-            }
+        let [x, y] = [expected.x.round() as i64 - self.half, expected.y.round() as i64 - self.half];
+        let moved = [x - self.density.origin[0], y - self.density.origin[1]];
+        self.density.origin = [x, y];
+        for (row, of) in (y..).zip(self.z.chunks_exact_mut(self.density.w)) {
+            (x..).zip(of).for_each(|(x, of)| *of = z(x, row));
+        }
+        for (strength, ratios) in self.ratios.iter_mut().enumerate() {
+            levels.ratios(strength, &self.z, ratios);
         }
         // The density was normalised: its sum after the step, but for survival, is L.
         self.density.step(motion, &self.ratios, 0.0, 0.0, moved);
@@ -114,11 +110,12 @@ impl Target {
     }
 
     /// Covariances for a tracker, of place, velocity and both, px and s: `frames` make a straight time, `step` px a cell.
-    pub(super) fn covariances(&self, frames: f64, step: f64) -> [Matrix2<f64>; 3] {
+    pub(super) fn covariances(&self, motion: &Motion, frames: f64, step: f64) -> [Matrix2<f64>; 3] {
         let as_independent = (0.25 * frames).max(1.0);
-        // What a cell hides of the place within it.
-        let within = Matrix2::identity() / 12.0;
+        // What a cell hides of the place within it, and a step of what lies between two velocities.
+        let cov = self.moments.cov + Matrix2::identity() / 12.0;
+        let velocity_cov = self.moments.velocity_cov + Matrix2::identity() * motion.within_step();
         let by = step * step;
-        [(self.moments.cov + within) * (by * as_independent), self.moments.velocity_cov * by, self.moments.cross * by]
+        [cov * (by * as_independent), velocity_cov * by, self.moments.cross * by]
     }
 }

@@ -81,6 +81,36 @@ fn a_spot_that_no_frame_shows_is_found_while_it_turns_and_given_up_when_it_is_go
 }
 
 #[test]
+fn frames_too_far_apart_are_refused_and_say_why() {
+    let (mut rng, mut scan) = (ChaCha8Rng::seed_from_u64(16), Scan::default());
+    // An hour: mixing velocities step by step for so long would never end.
+    let mut detector = detector(config());
+    let said = (0..4u64).map(|k| detector.detect(&frame(k, 3600.0 * k as f64, &[], &mut rng), &mut scan));
+    let e = said.filter_map(Result::err).next().unwrap().to_string();
+    assert!(e.contains("3600.000 s apart") && e.contains("acceleration-density-px2-per-s3"), "{e}");
+    // One that was well before goes on after any number of gaps.
+    let mut detector = self::detector(config());
+    for k in 0..20u64 {
+        let gaps = k.saturating_sub(10);
+        detector.detect(&frame(k, 0.04 * k as f64 + 5.0 * gaps as f64, &[], &mut rng), &mut scan).unwrap();
+    }
+}
+
+#[test]
+fn light_that_rises_all_over_begins_no_target() {
+    let mut detector = detector(config());
+    let (mut rng, mut scan) = (ChaCha8Rng::seed_from_u64(17), Scan::default());
+    for k in 0..80u64 {
+        let mut frame = frame(k, 0.04 * k as f64, &[], &mut rng);
+        if let (Pixels::Gray16(image), 40..) = (&mut frame.pixels, k) {
+            (0..SIZE[1]).for_each(|y| image.row_mut(y).iter_mut().for_each(|v| *v += 100));
+        }
+        detector.detect(&frame, &mut scan).unwrap();
+        assert!(scan.detections.len() <= 1, "frame {k}: {}", scan.detections.len());
+    }
+}
+
+#[test]
 fn times_are_seconds_and_not_frames() {
     let slow = BernoulliConfig { max_speed_px_per_s: 0.8, acceleration_density_px2_per_s3: 0.01, ..config() };
     let mut detector = detector(BernoulliConfig { mean_life_s: 500.0, ..slow });
@@ -143,5 +173,5 @@ fn after_a_gap_it_begins_anew_and_what_does_not_fit_memory_is_refused() {
     assert!(nearest(&scan, [49.5, 30.0]) < 2.0, "{:?}", scan.detections);
     let fast = BernoulliConfig { max_speed_px_per_s: 1e5, background: StillBackground::Spatial, ..config() };
     let e = self::detector(fast).detect(&frame(0, 0.0, &[], &mut rng), &mut scan).unwrap_err().to_string();
-    assert!(e.contains("velocities") && e.contains("hint") && e.contains("max-speed-px-per-s"), "{e}");
+    assert!(e.contains("512 MB") && e.contains("hint") && e.contains("max-speed-px-per-s"), "{e}");
 }
