@@ -41,9 +41,10 @@ def track(
         config: a `Config`, a preset's name, a path of a TOML file, TOML text, or a dictionary of keys; without it everything is chosen
             by looking at the first frames.
         detector: one of the library's by its word, where it is not to be chosen: `isolated`, `cfar`, `integrate`, `bernoulli`,
-            `moving`, `steadied`, `spot`, `local`, `colour`. Or your own `f(pixels) -> detections` in its place, a detector or a measurement:
-            positions N x 2 (px), boxes N x 4 (left, top, right, bottom), a dictionary with `positions`, `covariances` (N x 2 x 2, px²),
-            `boxes`, `scores`, `classes`, or `supervision.Detections`. Without `config` it runs over all frames before the first is tracked.
+            `moving`, `steadied`, `spot`, `local`, `colour`. Or your own `f(pixels) -> detections` in its place, a detector or a
+            measurement: positions N x 2 (px), boxes N x 4 (left, top, right, bottom), a dictionary with `positions`, `covariances`
+            (N x 2 x 2, px²), `boxes`, `scores`, `classes`, or `supervision.Detections`. Without `config` it runs over all frames
+            before the first is tracked.
         filter, associator: short for `tracker__filter` and `tracker__associator`; `boresight config --list filters` lists them.
         false_tracks_per_hour: how many are allowed; fewer take longer to confirm.
         annotate: also write the video with boxes, ids and ellipses drawn in, H.264 in MP4.
