@@ -63,14 +63,12 @@ impl Bar {
 #[derive(Debug, Default)]
 pub struct Bars {
     columns: usize,
-    /// For small clusters.
-    least: Vec<f32>,
-    ground: Vec<f32>,
     /// No peak needs less.
     floor: f64,
     /// The largest ring, counted from 1, within whose inside the cell is the highest.
     leads: Vec<u8>,
     scratch: [Vec<f32>; 2],
+    /// Grounds, and spreads.
     lowest: [Lowest; 2],
 }
 
@@ -106,10 +104,33 @@ impl Bars {
     /// What a cluster whose box's longer side is of that class needs to be a target or become one, if it has grown from the peak of a cell; a peak that is not the highest of
     /// its cell leads to small ones only. `None` if it cannot.
     pub fn need(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, class: SideClass) -> Option<Need> {
+        let [grounds, quiet] = &self.lowest;
+        let next = (f64::from(grounds.least[cell]), bar.over_near(grounds.third[cell], quiet.third[cell]));
+        self.need_of(cells, bar, cell, highest, class, next)
+    }
+
+    /// The same for one that is to score more than a cluster of its peak has: beside it the lowest ground and the lowest spread count, since nothing but a better score is lost by
+    /// going on for too long.
+    pub fn need_more(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, class: SideClass) -> Option<Need> {
+        let [grounds, quiet] = &self.lowest;
+        let next = (f64::from(grounds.least[cell]), bar.over_near(grounds.least[cell], quiet.least[cell]));
+        self.need_of(cells, bar, cell, highest, class, next)
+    }
+
+    /// As [`Self::need`], with the ground and the bar of the cells next to the peak's.
+    fn need_of(
+        &self,
+        cells: &Cells,
+        bar: &Bar,
+        cell: usize,
+        highest: bool,
+        class: SideClass,
+        (ground, mean): (f64, f32),
+    ) -> Option<Need> {
         let leads = if highest { usize::from(self.leads[cell]) } else { 1 };
         let mut need = Need { mean: f64::INFINITY, ground: f64::INFINITY };
         let first = class.0.unwrap_or_else(|| {
-            need = Need { mean: f64::from(self.least[cell]), ground: f64::from(self.ground[cell]) };
+            need = Need { mean: f64::from(mean), ground };
             // The first ring is made of those cells.
             1
         });
@@ -141,11 +162,6 @@ impl Bars {
         let lowest = grounds.least.iter().copied().fold(f32::INFINITY, f32::min);
         // f32 holds means to less than a millionth of themselves.
         self.floor = f64::from(lowest) - 1e-6 * f64::from(lowest.abs()) + bar.min_score * bar.unit;
-        self.ground.clear();
-        self.ground.extend_from_slice(&grounds.least);
-        self.least.clear();
-        let each = grounds.third.iter().zip(&quiet.third);
-        self.least.extend(each.map(|(ground, spread)| bar.over_near(*ground, *spread)));
     }
 
     /// Finds how far around each cell none is higher: a quarter of the least box of a ring, at least one cell.

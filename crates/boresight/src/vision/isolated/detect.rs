@@ -22,7 +22,7 @@ use super::config::IsolatedConfig;
 use super::grow::{Growth, Step};
 use super::levels;
 use super::measure::detection;
-use super::nested::{Candidate, Nested};
+use super::nested::{Candidate, Clearest, Nested};
 use super::peaks::{self, Peak};
 use super::rims::Rims;
 use super::ring::{Cluster, Ring};
@@ -39,6 +39,13 @@ const MIN_FILL: f64 = 0.15;
 
 /// Sides that differ by so much are not called elongated, px: a speck of 1 x 3 is none.
 const SIDE_GRACE: f64 = 2.0;
+
+/// Pixels up to which a cluster is grown to the end of its level: a cell's, whose bar is an estimate that the ring of a small cluster may prove too high.
+const SMALL: u32 = 64;
+
+/// Share of its score that a cluster which is to beat another must surely reach by the bars of its cells: their spread holds the slope of the ground, a third of it where the sky's is as steep as the noise
+/// is high, which a ring's plane takes out.
+const SURE: f64 = 0.7;
 
 /// Finds isolated blobs; keeps its memory between frames.
 #[derive(Debug)]
@@ -141,13 +148,15 @@ impl IsolatedDetector {
     fn grow<T: Pixel>(&mut self, image: &Image<T>, config: &DetectorConfig, bar: &Bar, peak: &Peak) {
         let Some(pixel) = image.row(peak.y as usize).get(peak.x as usize) else { return };
         let mut class = SideClass::of(1);
-        let wanted = |class| self.bars.need(&self.cells, bar, peak.cell, peak.highest, class);
-        let Some(mut need) = wanted(class) else { return };
+        let Some(mut need) = self.bars.need(&self.cells, bar, peak.cell, peak.highest, class) else { return };
         let (min_area, max_area) = config.cluster.area_limits();
         self.growth.start(peak.x, peak.y, self.steps.of(*pixel), self.steps.above(need.ground));
         let mut noted = false;
+        // What is wanted of the next clusters; once the clearest one so far has its shape, more than that one's score.
+        let (mut bar, mut small) = (*bar, SMALL);
+        let mut clearest: Option<Clearest> = None;
         loop {
-            let step = self.growth.step(image, &self.steps, need.mean);
+            let step = self.growth.step(image, &self.steps, small, need.mean);
             if step == Step::End {
                 return;
             }
@@ -156,6 +165,7 @@ impl IsolatedDetector {
             if step == Step::Same {
                 if let Some(last) = self.candidates.last_mut().filter(|_| noted) {
                     last.until = level;
+                    clearest = Some(Clearest::of(clearest, last));
                 }
                 continue;
             }
@@ -169,15 +179,25 @@ impl IsolatedDetector {
                     && let Some(score) = ground.score(mean, bar.unit).filter(|s| *s >= bar.min_score)
                 {
                     let background = ground.level;
-                    self.candidates.push(Candidate { blob, level, until: level, background, peak: highest, score });
+                    let next = Candidate { blob, level, until: level, background, peak: highest, score };
+                    self.candidates.push(next);
+                    clearest = Some(Clearest::of(clearest, &next));
                     noted = true;
                 }
             }
             let (w, h) = blob.sides();
             let grown = SideClass::of(w.max(h));
-            if grown != class {
-                let Some(more) = wanted(grown) else { return };
-                (class, need) = (grown, more);
+            let to_beat = clearest.filter(|c| SURE * c.score > bar.min_score && c.has_its_shape(level));
+            if let Some(clearest) = to_beat {
+                (bar.min_score, small) = (SURE * clearest.score, 0);
+            }
+            if grown != class || to_beat.is_some() {
+                let wanted = match small {
+                    SMALL => self.bars.need(&self.cells, &bar, peak.cell, peak.highest, grown),
+                    _ => self.bars.need_more(&self.cells, &bar, peak.cell, peak.highest, grown),
+                };
+                let Some(wanted) = wanted else { return };
+                (class, need) = (grown, wanted);
             }
             if !(level > need.ground && (noted || mean >= need.mean)) {
                 return;

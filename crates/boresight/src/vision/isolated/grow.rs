@@ -20,8 +20,8 @@ const LEVEL: u32 = (1 << LEVEL_BITS) - 1;
 /// Marks of a cache line.
 const LINE: usize = 16;
 
-/// Pixels up to which a cluster is grown to the end of its level: a cell's, whose bar is an estimate that the ring of a small cluster may prove too high.
-const SMALL: u32 = 64;
+/// Rows above and below a peak that its growth is sure to read, or nearly.
+const AHEAD: u32 = 3;
 
 /// No pixel.
 const NONE: u32 = u32::MAX;
@@ -81,7 +81,8 @@ impl Growth {
             self.marks.clear();
             self.marks.resize(height * self.stride as usize, 0);
             (self.own, self.first) = (0, 0);
-            let around = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
+            // Of the neighbours of one level the last goes on first: along the row, whose marks lie side by side.
+            let around = [(-1, -1), (-1, 0), (-1, 1), (1, -1), (1, 0), (1, 1), (0, -1), (0, 1)];
             let stride = self.stride as isize;
             self.beside = around.map(|(down, along): (isize, isize)| {
                 ((down * stride + along) as u32, (down * width as isize + along) as usize)
@@ -118,6 +119,7 @@ impl Growth {
         (self.top, self.deepest) = (usize::from(reached), usize::from(reached));
         self.waiting.clear();
         let at = y * self.stride + x;
+        self.fetch(at);
         let mark = self.marks[at as usize];
         if mark >= self.first && (mark & LEVEL) as usize >= usize::from(reached) {
             self.met = usize::from(reached);
@@ -127,6 +129,13 @@ impl Growth {
         }
     }
 
+    /// Reads the marks of the rows around a peak at once: its growth would wait for memory row by row, since what it reads next depends on what it has read.
+    fn fetch(&self, at: u32) {
+        let rows = (0..=2 * AHEAD).map(|k| at.wrapping_add(k * self.stride).wrapping_sub(AHEAD * self.stride));
+        let seen = rows.map(|row| self.marks.get(row as usize).copied().unwrap_or(0)).fold(0, |a, b| a | b);
+        std::hint::black_box(seen);
+    }
+
     /// Ends this peak's growth.
     fn end(&mut self) -> Step {
         self.reached = 0;
@@ -134,8 +143,8 @@ impl Growth {
         Step::End
     }
 
-    /// Takes in the pixels of the next level, the highest first, as long as the cluster is small or its mean not below `least_mean`.
-    pub fn step<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, least_mean: f64) -> Step {
+    /// Takes in the pixels of the next level, the highest first, as long as the cluster has no more than `small` pixels or its mean is not below `least_mean`.
+    pub fn step<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, small: u32, least_mean: f64) -> Step {
         let level = usize::from(self.reached);
         if level < self.floor || level <= self.met {
             return self.end();
@@ -150,11 +159,17 @@ impl Growth {
             self.stack.push(at);
             head = before;
         }
-        if self.take_in(image, steps, level, least_mean) { Step::Grown } else { self.end() }
+        if self.take_in(image, steps, level, (small, least_mean)) { Step::Grown } else { self.end() }
     }
 
     /// Takes in the pixels on the stack and those that they lead to at this level; false if the cluster cannot be a target from there on.
-    fn take_in<T: Pixel>(&mut self, image: &Image<T>, steps: &Steps, level: usize, least_mean: f64) -> bool {
+    fn take_in<T: Pixel>(
+        &mut self,
+        image: &Image<T>,
+        steps: &Steps,
+        level: usize,
+        (small, least_mean): (u32, f64),
+    ) -> bool {
         let (stack, waiting, heads, marks) =
             (&mut self.stack, &mut self.waiting, self.heads.as_mut_slice(), self.marks.as_mut_slice());
         let (pixels, width, stride, beside) = (image.as_slice(), self.width, self.stride.max(1), self.beside);
@@ -175,7 +190,7 @@ impl Growth {
             let value = steps.signed(pixels[pixel]);
             sum += value;
             // What is still to come of this level is lower than all that was there before it, so the mean only falls.
-            if blob.area > SMALL && sum < least_mean * f64::from(blob.area) {
+            if blob.area > small && sum < least_mean * f64::from(blob.area) {
                 whole = false;
                 break;
             }
@@ -253,7 +268,7 @@ mod tests {
                 growth.frame(40, 30, 1, 20);
             }
             growth.start(20, 12, 1, 1);
-            let step = growth.step(&image, &steps, f64::NEG_INFINITY);
+            let step = growth.step(&image, &steps, 0, f64::NEG_INFINITY);
             if step == Step::Grown {
                 let (blob, mean, peak) = growth.cluster().unwrap();
                 assert_eq!((blob.bounds(), blob.area, mean, peak), ([20, 12, 23, 14], 12, 90.0, 90.0));

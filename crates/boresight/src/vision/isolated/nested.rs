@@ -20,6 +20,40 @@ impl Candidate {
     fn level_near(&self, value: f64) -> f64 {
         value.clamp(self.until, self.level)
     }
+
+    /// Half way between its ground and its peak.
+    fn half(&self) -> f64 {
+        self.background + 0.5 * (self.peak - self.background)
+    }
+
+    /// How far from such a half way it is the cluster.
+    fn off(&self, half: f64) -> f64 {
+        (self.level_near(half) - half).abs()
+    }
+}
+
+/// The clearest cluster of one peak so far, each of the next ones holding those before it.
+#[derive(Clone, Copy, Debug)]
+pub struct Clearest {
+    pub score: f64,
+    half: f64,
+    /// How far from half its height the nearest of them is.
+    off: f64,
+}
+
+impl Clearest {
+    /// Of those of `before`, if there were any, and the next one, or the last one again where its levels go on.
+    pub fn of(before: Option<Self>, next: &Candidate) -> Self {
+        match before {
+            Some(best) if best.score >= next.score => Self { off: best.off.min(next.off(best.half)), ..best },
+            _ => Self { score: next.score, half: next.half(), off: next.off(next.half()) },
+        }
+    }
+
+    /// Whether no cluster below that level is nearer to half its height, so that only one which stands clearer could still count.
+    pub fn has_its_shape(&self, level: f64) -> bool {
+        level <= self.half - self.off
+    }
 }
 
 /// Sorts out which candidates are one thing; keeps its memory.
@@ -50,15 +84,14 @@ impl Nested {
             if taken[i] {
                 continue;
             }
-            let half = best.background + 0.5 * (best.peak - best.background);
-            let off = |c: &Candidate| (c.level_near(half) - half).abs();
+            let half = best.half();
             let mut shape = best;
             // Those before it were better, and did not take it.
             for j in near.of(&best.blob).iter().map(|&j| j as usize).filter(|&j| j >= i) {
                 let other = &candidates[j];
                 if !taken[j] && best.blob.overlaps(&other.blob) {
                     taken[j] = true;
-                    if off(other) < off(shape) && other.blob.holds(&best.blob) {
+                    if other.off(half) < shape.off(half) && other.blob.holds(&best.blob) {
                         shape = other;
                     }
                 }
