@@ -19,7 +19,7 @@ pub(super) const AGREE_EVEN: f64 = 1.5;
 /// So many times as far from a similarity that agrees with its middle a bent image is looked for.
 pub(super) const BEND: f64 = 4.0;
 /// Share of all weight that the winner needs.
-const MAJORITY: f64 = 0.4;
+pub(super) const MAJORITY: f64 = 0.4;
 /// A shift with this share of the weight needs no hypotheses of turn and zoom beside it: the fit finds them.
 const CLEAR: f64 = 0.9;
 /// Matches that a similarity needs: its four numbers and as many again.

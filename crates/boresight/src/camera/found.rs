@@ -2,7 +2,8 @@
 //!
 //! Source: [`super::fit`]. Units: reduced px.
 
-use super::fit::{Expected, Match, fit};
+use super::fit::{Expected, MAJORITY, Match, fit};
+use super::plane::MOST_MATCHES;
 use super::scales::of_similarity;
 use crate::{Homography, MotionCov, Similarity};
 use nalgebra::Vector2;
@@ -19,6 +20,8 @@ pub(super) struct Found {
     pub may_be_a_thing: bool,
     /// Patches of the reduced frame that were found.
     pub n_coarse: usize,
+    /// How far from the motion those patches lie that are to keep together if it is a ground's, reduced px.
+    pub apart_px: f64,
 }
 
 /// The consensus of the matches about a predicted motion. What is left of a prediction that is no similarity is one: it is found among the predicted places.
@@ -42,6 +45,7 @@ pub(super) fn coarse(
             covers: true,
             may_be_a_thing: false,
             n_coarse: 0,
+            apart_px: apart(matches, &now_from_key, MAJORITY),
         });
     }
     let none = Similarity::identity();
@@ -58,5 +62,20 @@ pub(super) fn coarse(
         covers: true,
         may_be_a_thing: false,
         n_coarse: 0,
+        apart_px: apart(matches, &now_from_key, MAJORITY),
     })
+}
+
+/// The distance from a motion within which that share of the weight lies, reduced px.
+pub(super) fn apart(matches: &[Match], now_from_key: &Homography, share: f64) -> f64 {
+    let mut all = [(0.0, 0.0); MOST_MATCHES];
+    let all = &mut all[..matches.len().min(MOST_MATCHES)];
+    all.iter_mut().zip(matches).for_each(|(a, m)| *a = ((now_from_key.apply(m.from) - m.to).norm(), m.weight));
+    all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut left = share * all.iter().map(|a| a.1).sum::<f64>();
+    let reached = |a: &&(f64, f64)| {
+        left -= a.1;
+        left <= 0.0
+    };
+    all.iter().find(reached).map_or(0.0, |a| a.0)
 }
