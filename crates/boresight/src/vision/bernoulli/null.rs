@@ -11,7 +11,7 @@
 //! What moves slowly is for a while in its own background and leaves a ghost of the other sign: where the other sign has been surer within the memory nothing is counted and nothing is free, nor does a
 //! target begin there where both signs are looked for.
 //! Source: H. Kesten, Acta Math. 131, 207 (1973); excursions: L. de Haan, S. Resnick, H. Rootzén & C. de Vries, Stoch. Proc. Appl. 32, 213 (1989); arrivals apart from one another: A. Davison & R. Smith,
-//! J. R. Stat. Soc. B 52, 393 (1990). Limits: ground whose bright side differs from its dark one is not in the null; targets that cross a block in less than a frame are counted anew.
+//! J. R. Stat. Soc. B 52, 393 (1990). Limits: noise that is correlated from frame to frame (`docs/limit.md`); ground whose bright side differs from its dark one is not in the null; targets that cross a block in less than a frame are counted anew.
 
 /// Nats below a height from which on it is no longer held: one in twenty, as a target is given up at odds of one to twenty.
 const DROP: f32 = 3.0;
@@ -169,6 +169,11 @@ impl Null {
         self.level = f64::from(APART) * first as f64;
         // One more than was seen: what was not seen yet is not impossible (Laplace's rule).
         self.rate = blocks * (begin.max(0.0) + 1.0) / exposed;
+    }
+
+    /// Whether that sum is above all heights that the index is taken over.
+    pub(super) fn is_above(&self, sum: f64) -> bool {
+        sum.max(f64::MIN_POSITIVE).ln() > self.level + f64::from(DROP)
     }
 
     /// The highest of each block within the memory.
