@@ -9,14 +9,20 @@ use boresight::{Frame, FrameIndex, Image, PixelKind, Pixels, Scan, Timestamp};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use std::collections::VecDeque;
 use std::fmt::Write as _;
+
+/// Frames of a second, for which the tracker of these scenes coasts.
+const SECOND: usize = 25;
 
 /// Noise of a deviation of 1 before it becomes counts.
 #[derive(Clone, Copy)]
 enum Noise {
     White,
-    /// Blurred by a Gaussian of a pixel, half of it the same as in the frame before.
+    /// Blurred by a Gaussian of a pixel.
     Coloured,
+    /// The same, correlated by a half with the frame before: what the density takes for independent is not.
+    ColouredInTime,
     /// Of 0.7 counts, 8 bits.
     FewCounts,
     /// Laplace's: tails of exp(-|z|).
@@ -45,8 +51,10 @@ impl Source {
                 }
             })
             .collect();
-        if matches!(self.noise, Noise::Coloured) {
+        if matches!(self.noise, Noise::Coloured | Noise::ColouredInTime) {
             blur(&mut z, side);
+        }
+        if matches!(self.noise, Noise::ColouredInTime) {
             // Correlated with the frame before by a half, of the same deviation.
             let old = 0.75f32.sqrt();
             z.iter_mut().zip(&self.last).for_each(|(z, last)| *z = old * *z + 0.5 * last);
@@ -80,16 +88,17 @@ fn blur(z: &mut Vec<f32>, side: usize) {
     }
 }
 
-/// Each row has frames of its own; a report is new where none was within 6 px in the frame before.
+/// Each row has frames of its own; a report is new where none was within 6 px in the frame before, apart where none was in the second before.
 pub fn table(n_frames: u64, page: &mut String) -> Result<()> {
     writeln!(
         page,
-        "| noise | frames of px | new false targets a frame asked | frames seen | expected | found |\n| --- | --- | --- | --- | --- | --- |"
+        "| noise | frames of px | new false targets a frame asked | frames seen | expected | found | a second apart |\n| --- | --- | --- | --- | --- | --- | --- |"
     )?;
     let all = [
         ("white", Noise::White, 256, n_frames),
         ("white", Noise::White, 128, 4 * n_frames),
         ("coloured", Noise::Coloured, 128, 4 * n_frames),
+        ("coloured in time", Noise::ColouredInTime, 128, 4 * n_frames),
         ("0.7 counts, 8 bit", Noise::FewCounts, 128, 4 * n_frames),
         ("heavy tails", Noise::HeavyTailed, 128, 4 * n_frames),
     ];
@@ -101,16 +110,24 @@ pub fn table(n_frames: u64, page: &mut String) -> Result<()> {
             let kind = if matches!(noise, Noise::FewCounts) { PixelKind::Gray8 } else { PixelKind::Gray16 };
             let mut detector = build(&config, &info([side; 2], kind))?;
             let mut source = Source { noise, side, rng: random(7 + i as u64), last: vec![0.0; side * side] };
-            let (mut begun, mut before, mut scan) = (0usize, Vec::<[f64; 2]>::new(), Scan::default());
+            let (mut begun, mut before, mut scan) = ([0usize; 2], VecDeque::<Vec<[f64; 2]>>::new(), Scan::default());
             for k in 0..n_frames {
                 detector.detect(&source.frame(k), &mut scan)?;
                 let now: Vec<[f64; 2]> = scan.detections.iter().map(|d| [d.position.x, d.position.y]).collect();
-                let is_new = |d: &&[f64; 2]| !before.iter().any(|b| (b[0] - d[0]).hypot(b[1] - d[1]) < 6.0);
-                begun += now.iter().filter(is_new).count();
-                before = now;
+                let near = |d: &[f64; 2], b: &[f64; 2]| (b[0] - d[0]).hypot(b[1] - d[1]) < 6.0;
+                for (begun, frames) in begun.iter_mut().zip([1, SECOND]) {
+                    let is_new = |d: &&[f64; 2]| !before.iter().take(frames).flatten().any(|b| near(d, b));
+                    *begun += now.iter().filter(is_new).count();
+                }
+                before.push_front(now);
+                before.truncate(SECOND);
             }
             let expected = rate * n_frames as f64;
-            writeln!(page, "| {name} | {side} x {side} | {rate} | {n_frames} | {expected:.1} | {begun} |")?;
+            writeln!(
+                page,
+                "| {name} | {side} x {side} | {rate} | {n_frames} | {expected:.1} | {} | {} |",
+                begun[0], begun[1]
+            )?;
         }
     }
     Ok(())
