@@ -1,10 +1,11 @@
-//! Whole detectors, a frame: `isolated`, `spot` and movers before a fixed camera, on the frames that their aims name.
+//! Whole detectors, a frame: `isolated`, `spot` and movers before a fixed camera, on the frames that their aims name; `bernoulli` on noise.
 //!
 //! Run: `cargo bench -p boresight --bench detectors`. Fixed seeds; one thread; eight frames in turn. Scenes: the sample clip (320 x 256), 50 and 600 round spots in white noise, and ten textured things before
-//! a textured ground with even noise of 2 counts either way.
+//! a textured ground with even noise of 2 counts either way; 256 x 256 px of even noise.
 
 use boresight::sim::{SceneConfig, Seed};
 use boresight::vision::background::BackgroundConfig;
+use boresight::vision::bernoulli::BernoulliConfig;
 use boresight::vision::threshold::{SpotConfig, ThresholdConfig};
 use boresight::vision::{ClusterConfig, DetectorConfig, IsolatedConfig, build};
 use boresight::{Frame, FrameIndex, FrameSource, Image, Pixels, Scan, Timestamp};
@@ -120,5 +121,20 @@ fn moving_768x576(bencher: Bencher) {
         cluster: ClusterConfig { distance_px: 7.0, min_area_px: Some(60), ..Default::default() },
         ..Default::default()
     };
+    run(bencher, &frames, &config);
+}
+
+/// Velocities of up to 50 px/s at 25 frames/s: 11 x 11 of them; as many frames as fade a background away, before they come again.
+#[divan::bench]
+fn bernoulli_noise_256x256(bencher: Bencher) {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut frame = |k: usize| {
+        let pixels = (0..256 * 256).map(|_| 80 + rng.random_range(0..40u8)).collect();
+        let pixels = Pixels::Gray8(Image::from_vec(256, 256, pixels).expect("as many pixels as the size says"));
+        Frame { index: FrameIndex(k as u64), time: Timestamp::default(), pixels }
+    };
+    let frames: Vec<Frame> = (0..100).map(&mut frame).collect();
+    let config =
+        DetectorConfig { threshold: ThresholdConfig::Bernoulli(BernoulliConfig::default()), ..Default::default() };
     run(bencher, &frames, &config);
 }

@@ -1,6 +1,7 @@
 //! `cargo xtask limit`: what is reached below the noise of a frame beside what was aimed at, as Markdown, written to docs/limit.md.
 
 mod camera;
+mod carried_alarms;
 mod cost;
 mod crossing;
 mod curve;
@@ -19,7 +20,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only the parts whose name holds this: alarms, detection, crossing, turning, real, scene, cost, positions, camera. The page is then printed, not written.
+    /// Only the parts whose name holds this: alarms, detection, crossing, turning, turning-alarms, real, scene, cost, positions, camera. The page is then printed, not written.
     #[arg(default_value = "")]
     only: String,
     /// Windows of eight spots for each point of the curves.
@@ -77,10 +78,9 @@ pub fn run(args: &Args) -> Result<()> {
         white::table_of_alarms(64, args.frames, p)
     })?;
     part("crossing", include_str!("crossing.txt").trim(), &mut |p| crossing::table(args.runs, p))?;
-    part("turning", include_str!("turning.txt").trim(), &mut |p| {
-        turning::table((args.runs / 20).max(1), p)?;
-        p.push('\n');
-        turning::table_of_alarms(args.frames / 10, p)
+    part("turning", include_str!("turning.txt").trim(), &mut |p| turning::table((args.runs / 20).max(1), p))?;
+    part("turning-alarms", include_str!("turning_alarms.txt").trim(), &mut |p| {
+        carried_alarms::table(args.frames / 10, p)
     })?;
     part("scene", include_str!("scene_j.txt").trim(), &mut |p| scene_j::table(p))?;
     let data = args.data.clone().unwrap_or_else(crate::data::test_data);

@@ -5,7 +5,7 @@
 
 use super::scenes::random;
 use anyhow::Result;
-use boresight::vision::bernoulli::BernoulliConfig;
+use boresight::vision::bernoulli::{BernoulliConfig, TargetShape};
 use boresight::vision::integrate::{IntegrateConfig, StillBackground};
 use boresight::vision::probability::Level;
 use boresight::vision::threshold::ThresholdConfig;
@@ -54,18 +54,29 @@ pub fn table(page: &mut String) -> Result<()> {
         "| likelihood-ratio grid, one target | both distributions, size, that there is a target | {:.1} |",
         100.0 * hits as f64 / all
     )?;
-    for rate in [0.01, 1.0] {
-        let carried = ThresholdConfig::Bernoulli(BernoulliConfig {
-            false_alarms_per_frame: rate,
-            sigma_px: SIGMA,
-            background: StillBackground::Spatial,
-            ..BernoulliConfig::default()
-        });
-        let [found, later] = found(&carried, None)?;
-        writeln!(
-            page,
-            "| density carried from frame to frame | a width; {rate} false alarms a frame | {found:.1}; {later:.1} in scans 31 to 50 |"
-        )?;
+    let turns = BernoulliConfig::default().acceleration_density_px2_per_s3;
+    let told = [
+        (TargetShape::Spot, turns, "a width"),
+        (TargetShape::Square, turns, "a square's side"),
+        (TargetShape::Square, 3.0, "a square's side, and that it hardly turns (3 px²/s³)"),
+    ];
+    for (shape, acceleration_density_px2_per_s3, told) in told {
+        for rate in [0.01, 1.0] {
+            let carried = ThresholdConfig::Bernoulli(BernoulliConfig {
+                false_alarms_per_frame: rate,
+                shape,
+                sigma_px: SIGMA,
+                side_px: 9.0,
+                acceleration_density_px2_per_s3,
+                background: StillBackground::Spatial,
+                ..BernoulliConfig::default()
+            });
+            let [found, later] = found(&carried, None)?;
+            writeln!(
+                page,
+                "| density carried from frame to frame | {told}; {rate} false alarms a frame | {found:.1}; {later:.1} in scans 31 to 50 |"
+            )?;
+        }
     }
     for frames in [8u32, 16] {
         let sums = IntegrateConfig {

@@ -147,26 +147,3 @@ pub fn table(runs: u64, page: &mut String) -> Result<()> {
     }
     Ok(())
 }
-
-/// New false targets of the carried density in noise alone, against what is asked for.
-pub fn table_of_alarms(n_frames: u64, page: &mut String) -> Result<()> {
-    writeln!(
-        page,
-        "| new false targets a frame asked | frames seen | expected at most | found |\n| --- | --- | --- | --- |"
-    )?;
-    for rate in [0.1, 0.01, 1e-3] {
-        let carried = BernoulliConfig { false_alarms_per_frame: rate, sigma_px: SIGMA, ..BernoulliConfig::default() };
-        let mut detector = detector_of([SIDE; 2], ThresholdConfig::Bernoulli(carried))?;
-        let (mut rng, mut scan) = (random(7), Scan::default());
-        let (mut begun, mut before) = (0usize, Vec::<[f64; 2]>::new());
-        for k in 0..n_frames {
-            detector.detect(&frame([SIDE; 2], &[], 0.0, k, &mut rng), &mut scan)?;
-            let now: Vec<[f64; 2]> = scan.detections.iter().map(|d| [d.position.x, d.position.y]).collect();
-            let is_new = |d: &&[f64; 2]| !before.iter().any(|b| (b[0] - d[0]).hypot(b[1] - d[1]) < 6.0);
-            begun += now.iter().filter(is_new).count();
-            before = now;
-        }
-        writeln!(page, "| {rate} | {n_frames} | {:.1} | {begun} |", rate * n_frames as f64)?;
-    }
-    Ok(())
-}

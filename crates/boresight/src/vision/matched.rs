@@ -1,7 +1,7 @@
 //! Frames matched to a spot: what the detectors that look below the noise of a frame have in common.
 //!
 //! How: pixels as f32, those that are not finite with their left neighbour's value; where asked for less the mean over a square around; correlated with the
-//! spot P of unit energy, Σ P² = 1, so that white noise keeps its deviation.
+//! spot, or another profile the same along both axes, P of unit energy, Σ P² = 1, so that white noise keeps its deviation.
 //! Source: the matched filter, D. O. North, Proc. IEEE 51, 1016 (1963). Limits: pixels nearer than 3 σ to the border see part of the spot.
 
 use super::pixel::Pixel;
@@ -17,9 +17,13 @@ pub(super) const MAD: f32 = 1.4826;
 /// The spot along one axis, Σ P² = 1.
 pub(super) fn kernel(sigma_px: f64) -> Vec<f32> {
     let radius = (KERNEL * sigma_px).ceil() as i64;
-    let raw: Vec<f64> = (-radius..=radius).map(|i| (-0.5 * (i as f64 / sigma_px).powi(2)).exp()).collect();
-    let energy = raw.iter().map(|v| v * v).sum::<f64>().sqrt();
-    raw.iter().map(|v| (v / energy) as f32).collect()
+    unit_energy((-radius..=radius).map(|i| (-0.5 * (i as f64 / sigma_px).powi(2)).exp()))
+}
+
+/// A profile along one axis, scaled to Σ P² = 1.
+pub(super) fn unit_energy(profile: impl Iterator<Item = f64> + Clone) -> Vec<f32> {
+    let energy = profile.clone().map(|v| v * v).sum::<f64>().sqrt();
+    profile.map(|v| (v / energy) as f32).collect()
 }
 
 /// Half width of the square whose mean is taken out, px.
@@ -49,7 +53,7 @@ pub(super) fn median(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(mid, f32::total_cmp).1
 }
 
-/// Correlates with the spot in x and y; beyond the image there is nothing. `out` has rows of `stride`.
+/// Correlates with a profile of an odd number of pixels in x and y; beyond the image there is nothing. `out` has rows of `stride`.
 pub(super) fn filter(raw: &[f32], w: usize, h: usize, kernel: &[f32], row: &mut [f32], stride: usize, out: &mut [f32]) {
     let r = kernel.len() / 2;
     for y in 0..h {

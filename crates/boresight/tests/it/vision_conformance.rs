@@ -2,7 +2,7 @@
 //! inside the frame, covariances that can be inverted, the same answer twice.
 
 use boresight::vision::FollowConfig;
-use boresight::vision::bernoulli::BernoulliConfig;
+use boresight::vision::bernoulli::{BernoulliConfig, TargetShape};
 use boresight::vision::cfar::CfarConfig;
 use boresight::vision::colour::ColourMatchConfig;
 use boresight::vision::fit::{FitConfig, FitWidth};
@@ -63,6 +63,13 @@ pub fn thresholds() -> Vec<ThresholdConfig> {
         bernoulli(Polarity::Bright, StillBackground::Temporal),
         bernoulli(Polarity::Both, StillBackground::Spatial),
         bernoulli(Polarity::Dark, StillBackground::Both),
+        ThresholdConfig::Bernoulli(BernoulliConfig {
+            shape: TargetShape::Square,
+            side_px: 6.0,
+            max_speed_px_per_s: 30.0,
+            acceleration_density_px2_per_s3: 1000.0,
+            ..Default::default()
+        }),
         ThresholdConfig::Moving(Default::default()),
         ThresholdConfig::Difference(Default::default()),
         ThresholdConfig::Steadied(Default::default()),

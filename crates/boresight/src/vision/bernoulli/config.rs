@@ -15,14 +15,19 @@ pub struct BernoulliConfig {
     /// Expected number of new false targets a frame at most, 1e-9..=1e4. Lower is surer and later. A detection's score is -log10 of that number for one at
     /// least as sure.
     pub false_alarms_per_frame: f64,
-    /// Standard deviation of the spot that a target makes, px, 0.6..=10.
+    /// What a target looks like.
+    pub shape: TargetShape,
+    /// Standard deviation of the spot that a target makes, px, 0.6..=10; of `shape = "spot"`.
     pub sigma_px: f64,
+    /// Side of the square that a target fills evenly, px, 3..=64; of `shape = "square"`.
+    /// Its edges place it twice as finely as a spot of that width is: more places and velocities are told apart, at more cost and memory.
+    pub side_px: f64,
     /// Largest speed along an axis, px/s, above 0. Cost and memory grow with its square.
     pub max_speed_px_per_s: f64,
     /// How targets change their velocity: density of white acceleration along an axis, px²/s³, above 0. Higher follows sharper turns and
-    /// sums fewer frames; the time that a straight line holds is (3 `sigma-px`² / this)^(1/3) seconds.
+    /// sums fewer frames; the time that a straight line holds is (3 δ² / this)^(1/3) seconds, where δ is `sigma-px` or 0.22 `side-px`.
     pub acceleration_density_px2_per_s3: f64,
-    /// Least strength of a target that is looked for: its peak in the frame matched to the spot, in deviations of the noise there, 0.25..=8. Lower needs more frames.
+    /// Least strength of a target that is looked for: its peak in the frame matched to its shape, in deviations of the noise there, 0.25..=8. Lower needs more frames.
     pub least_snr: f64,
     /// Mean time for which a target is there, s, above 0.
     pub mean_life_s: f64,
@@ -32,11 +37,24 @@ pub struct BernoulliConfig {
     pub background: StillBackground,
 }
 
+/// What a target looks like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TargetShape {
+    /// A Gaussian of `sigma-px`.
+    #[default]
+    Spot,
+    /// A square along the axes, even within `side-px`.
+    Square,
+}
+
 impl Default for BernoulliConfig {
     fn default() -> Self {
         Self {
             false_alarms_per_frame: 0.001,
+            shape: TargetShape::Spot,
             sigma_px: 1.3,
+            side_px: 9.0,
             max_speed_px_per_s: 50.0,
             acceleration_density_px2_per_s3: 300.0,
             least_snr: 1.0,
@@ -58,6 +76,7 @@ impl BernoulliConfig {
         let rate = "0.001 is one new false target in a thousand frames";
         in_range("false-alarms-per-frame", self.false_alarms_per_frame, 1e-9, 1e4, "1e-9 to 1e4", rate)?;
         in_range("sigma-px", self.sigma_px, 0.6, 10.0, "0.6 to 10 px", "0.42 of the width at half height")?;
+        in_range("side-px", self.side_px, 3.0, 64.0, "3 to 64 px", "smaller ones are spots")?;
         let (tiny, speed) = (f64::MIN_POSITIVE, "the largest speed of a target in the image");
         in_range(
             "max-speed-px-per-s",
@@ -73,11 +92,6 @@ impl BernoulliConfig {
         in_range("least-snr", self.least_snr, 0.25, 8.0, "0.25 to 8 deviations", "1 needs some forty frames")?;
         in_range("mean-life-s", self.mean_life_s, 1e-3, 1e6, "0.001 to 1e6 s", "10 s suits what crosses the view")
     }
-
-    /// For how long a path is straight to within the spot's own width, s: where white acceleration of the density q moves it by σ, q T³ / 3 = σ².
-    pub(super) fn straight_s(&self) -> f64 {
-        (3.0 * self.sigma_px * self.sigma_px / self.acceleration_density_px2_per_s3).cbrt()
-    }
 }
 
 #[cfg(test)]
@@ -90,6 +104,7 @@ mod tests {
         let wrong = [
             ("false-alarms-per-frame", BernoulliConfig { false_alarms_per_frame: 0.0, ..Default::default() }),
             ("sigma-px", BernoulliConfig { sigma_px: f64::NAN, ..Default::default() }),
+            ("side-px", BernoulliConfig { side_px: 2.0, ..Default::default() }),
             ("max-speed-px-per-s", BernoulliConfig { max_speed_px_per_s: 0.0, ..Default::default() }),
             (
                 "acceleration-density-px2-per-s3",
@@ -102,11 +117,5 @@ mod tests {
             let e = config.validate("detector").unwrap_err().to_string();
             assert!(e.contains(&format!("detector.{key}")) && e.contains("hint"), "{e}");
         }
-    }
-
-    #[test]
-    fn a_path_is_straight_for_as_long_as_white_acceleration_moves_it_by_less_than_the_spot() {
-        let c = BernoulliConfig { sigma_px: 2.0, acceleration_density_px2_per_s3: 12.0, ..Default::default() };
-        assert!((c.straight_s() - 1.0).abs() < 1e-12);
     }
 }

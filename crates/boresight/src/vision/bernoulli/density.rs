@@ -6,23 +6,24 @@
 //! with the probability s and comes anew with 1 − s, all is multiplied by the ratio of the place (`likelihood`):
 //! f ← l (s · moved(mixed f) + (1 − s)). Beyond the border, and where all begins, f = 1. Under noise alone l has the mean 1 and so has f, always: of frames that are independent, by Markov's inequality
 //! the expected number of boxes that do not overlap and hold a sum of at least c is then at most (number of cells) / c, however neighbours depend on each other. `null` begins with it.
-//! Velocities lie dv = 2 σ / T apart, T the straight time: half of that for T is σ, and paths change over between them. A random walk of the density q has p = q dt / dv². A velocity's plane moves by whole cells: what
+//! Velocities lie dv = 2 δ / T apart, δ the target's resolution (`shape`; σ of a spot) and T the straight time: half of that for T is δ, and paths change over between them. A random walk of the density q has p = q dt / dv². A velocity's plane moves by whole cells: what
 //! v t leaves beside them is the same for all its cells and known, so nothing is blurred by it.
 //! Departures: f is no probability but odds against noise for each cell (the exact Bernoulli recursion divides by the odds that all of it is one target: `target`
 //! does, where one is). Numbers are kept in 16 bits with 8 of fraction: random steps of 0.2 % a frame.
 //! Limits: memory 4 bytes a place, velocity and strength. Symbols: f odds; l ratio; s survival.
 
 use super::likelihood::STRENGTHS;
+use super::shape::{Profile, straight_s};
 use nalgebra::{Matrix2, Vector2};
 
-/// Distance of neighbouring velocities times the straight time, in σ.
+/// Distance of neighbouring velocities times the straight time, in resolutions.
 const APART: f64 = 2.0;
 /// Most that a component changes in one mixing.
 const MOST_MIXED: f64 = 0.5;
 
 /// Distance of neighbouring velocities, px/s.
 pub(super) fn apart(config: &super::BernoulliConfig) -> f64 {
-    APART * config.sigma_px / config.straight_s()
+    APART * Profile::new(config).resolution() / straight_s(config)
 }
 
 /// Velocities, and how they move and mix in the step to this frame.

@@ -1,6 +1,6 @@
 //! The detector: whitened frames, the density of the whole frame, targets that stand out of it and are followed by themselves.
 //!
-//! How: the density's mean over velocities and strengths is summed in boxes about as wide as the spot; where the expected number of places of noise with such a sum (`null`) is at most what is
+//! How: the density's mean over velocities and strengths is summed in boxes about as wide as the spot; where the expected number of places of noise that newly come to such a sum in a frame (`null`) is at most what is
 //! asked for, the highest first, a target begins: it takes its surroundings of the density with it, and there the
 //! frame's own is brought back to what noise is expected to have. From then on its light is taken out of the frame for all others, and the frame's density gains nothing where it is.
 //! Its odds begin as one over the expected number of false alarms. Two targets that are at one place now and a straight time ago are one.
@@ -9,9 +9,11 @@
 
 use super::config::BernoulliConfig;
 use super::density::{Density, Motion};
+use super::grid::{add_light, for_near, sum_boxes};
 use super::likelihood::{Levels, STRENGTHS};
 use super::memory::fits;
 use super::null::Null;
+use super::shape::{Profile, shown_at, straight_s};
 use super::target::{LEAST_ODDS, Target};
 use super::whitened::Whitened;
 use crate::vision::config::DetectorConfig;
@@ -27,10 +29,12 @@ const MOST_TARGETS: usize = 64;
 const GAP: f64 = 2.0;
 /// Such gaps in a row, with nothing else before, by which frames are too far apart for what is asked.
 const ONLY_GAPS: u32 = 3;
+/// Distances as those of a spot, in its σ (`Profile::reach`): half side of the box that the density is summed in; where two are one; where a target's own light is taken for its.
+const BOX: f64 = 1.5;
+const TWIN: f64 = 1.5;
+const OWN: f64 = 3.0;
 /// Half side of a target's window, in half sides of the box.
 const WINDOW: i64 = 5;
-/// Width at half height of a Gaussian in units of its deviation.
-const FWHM: f64 = 2.354_82;
 
 /// One sign of contrast.
 #[derive(Debug)]
@@ -85,14 +89,14 @@ impl BernoulliDetector {
             let speed = self.config.max_speed_px_per_s;
             let what =
                 format!("{} x {} px with velocities of up to {speed} px/s take more than 512 MB", frame.0, frame.1);
-            let hint = "lower max-speed-px-per-s, or raise acceleration-density-px2-per-s3 or sigma-px, or look at a part of the frame";
+            let hint = "lower max-speed-px-per-s, or raise acceleration-density-px2-per-s3, sigma-px or side-px, or look at a part of the frame";
             return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(hint));
         }
         let whitened = Whitened::new::<T>(frame.0, frame.1, &self.config);
         let motion = Motion::new(&self.config, whitened.step());
         let ((w, h), nv) = (whitened.size(), motion.count());
         let needed = ((w * h) as f64 / self.config.false_alarms_per_frame).ln();
-        let half = box_of(self.config.sigma_px, whitened.step());
+        let half = box_of(&Profile::new(&self.config).in_cells(whitened.step()));
         let build = |side| OneSide {
             sign: if side == Side::Bright { 1.0 } else { -1.0 },
             is_wanted: self.config.polarity.has(side),
@@ -122,31 +126,36 @@ impl BernoulliDetector {
 impl OneSide {
     /// One frame on.
     fn step(&mut self, config: &BernoulliConfig, motion: &Motion, whitened: &Whitened, dt_s: f64) {
-        let (size, step) = (whitened.size(), whitened.step() as f64);
-        let width = config.sigma_px / step;
+        let size = whitened.size();
+        let profile = Profile::new(config).in_cells(whitened.step());
+        let straight_s = straight_s(config);
         for (l, z) in self.left.iter_mut().zip(whitened.z()) {
             *l = self.sign * z;
         }
         for t in &self.targets {
-            add_light(&mut self.left, size, t.expected(dt_s), -t.existence() * t.snr, width);
+            add_light(&mut self.left, size, t.expected(dt_s), -t.existence() * t.snr, &profile);
         }
         let kept = kept(config, dt_s);
         self.levels.learn(&self.left, kept);
         for (strength, ratios) in self.ratios.iter_mut().enumerate() {
             self.levels.ratios(strength, &self.left, ratios);
             for t in &self.targets {
-                for_near(size, t.expected(dt_s), 3.0 * width, |i, _| ratios[i] = ratios[i].min(1.0));
+                for_near(size, t.expected(dt_s), profile.reach(OWN), |i, d| {
+                    if profile.shows(d) >= shown_at(OWN) {
+                        ratios[i] = ratios[i].min(1.0);
+                    }
+                });
             }
         }
         self.density.step(motion, &self.ratios, 1.0 - motion.survival(), 1.0, [0, 0]);
-        let fading = dt_s / config.straight_s();
+        let fading = dt_s / straight_s;
         let (levels, left) = (&self.levels, &self.left);
         let contains = |x: i64, y: i64| (0..size.0 as i64).contains(&x) && (0..size.1 as i64).contains(&y);
         let is_left = |t: &mut Target| {
             let (at, light) = (t.expected(dt_s), t.existence() * t.snr);
             let own = |x: i64, y: i64| {
                 let d = Vector2::new(x as f64, y as f64) - at;
-                let light = light * (-0.25 * d.norm_squared() / (width * width)).exp();
+                let light = light * profile.shows(d);
                 if contains(x, y) { left[y as usize * size.0 + x as usize] + light as f32 } else { f32::NEG_INFINITY }
             };
             let is_there = t.step(motion, levels, dt_s, own);
@@ -160,14 +169,14 @@ impl OneSide {
             is_there && inside
         };
         give_up(&mut self.targets, &mut self.spare, is_left);
-        self.join_twins(config.straight_s(), width);
-        let half = box_of(config.sigma_px, whitened.step());
+        self.join_twins(straight_s, &profile);
+        let half = box_of(&profile);
         sum_boxes(&self.density.marginal, size.0, half, &mut self.row, &mut self.boxes);
         self.null.look(&self.boxes, kept);
         let sure = (size.0 as f64 * size.1 as f64 / config.false_alarms_per_frame).ln();
         for t in &self.targets {
-            // The blocks that its spot reaches.
-            let reach = 2.0 * width;
+            // The blocks that it reaches.
+            let reach = profile.reach(2.0);
             for (dx, dy) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
                 let (x, y) = (t.moments.place.x + dx * reach, t.moments.place.y + dy * reach);
                 self.null.mark(
@@ -180,7 +189,7 @@ impl OneSide {
     }
 
     /// Of two targets that are at one place now and were a straight time ago, the less sure one goes.
-    fn join_twins(&mut self, straight_s: f64, width: f64) {
+    fn join_twins(&mut self, straight_s: f64, profile: &Profile) {
         let by_odds = |a: &Target, b: &Target| {
             let (pa, pb) = (a.moments.place, b.moments.place);
             b.odds.total_cmp(&a.odds).then(pa.y.total_cmp(&pb.y)).then(pa.x.total_cmp(&pb.x))
@@ -191,7 +200,8 @@ impl OneSide {
             let is_twin = self.targets[..i].iter().any(|o| {
                 let t = &self.targets[i];
                 let (dp, dv) = (t.moments.place - o.moments.place, t.moments.velocity - o.moments.velocity);
-                dp.norm() < 1.5 * width && (dp - dv * straight_s).norm() < 1.5 * width
+                let at_one = |d: Vector2<f64>| profile.shows(d) > shown_at(TWIN);
+                at_one(dp) && at_one(dp - dv * straight_s)
             });
             if is_twin {
                 self.spare.push(self.targets.remove(i));
@@ -204,13 +214,14 @@ impl OneSide {
     /// Begins the targets that stand out of the frame's density more than those of `null` do.
     fn begin(&mut self, config: &BernoulliConfig, motion: &Motion, whitened: &Whitened, null: &Null) {
         let (w, h) = whitened.size();
-        let half = box_of(config.sigma_px, whitened.step());
+        let half = box_of(&Profile::new(config).in_cells(whitened.step()));
         let both = config.polarity == Polarity::Both;
         while self.targets.len() < MOST_TARGETS {
             let best = self.boxes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
             let Some((i, &sum)) = best else { break };
             let expected = null.number(f64::from(sum));
-            if expected > config.false_alarms_per_frame {
+            // A target takes its odds out of the density: where those are only the null, they have to stay as far as it is fitted, or it would learn that nothing goes higher.
+            if expected > config.false_alarms_per_frame || !self.is_wanted && !self.null.is_above(f64::from(sum)) {
                 break;
             }
             let is_ghost = both && null.has_been_surer(i % w, i / w, f64::from(sum).ln());
@@ -224,8 +235,11 @@ impl OneSide {
             }
             (if begins && !is_ghost { &mut self.targets } else { &mut self.spare }).push(target);
             // The same place is not looked at again in this frame.
-            for_near((w, h), Vector2::new(x as f64, y as f64), (WINDOW * half as i64) as f64, |i, _| {
-                self.boxes[i] = 0.0
+            let around = (WINDOW * half as i64) as f64;
+            for_near((w, h), Vector2::new(x as f64, y as f64), around, |i, d| {
+                if d.norm() <= around {
+                    self.boxes[i] = 0.0;
+                }
             });
         }
     }
@@ -245,50 +259,12 @@ fn give_up(targets: &mut Vec<Target>, spare: &mut Vec<Target>, mut is_left: impl
 
 /// What is left of what was learnt before.
 fn kept(config: &BernoulliConfig, dt_s: f64) -> f64 {
-    (-dt_s / (super::whitened::MEMORY * config.straight_s())).exp()
+    (-dt_s / (super::whitened::MEMORY * straight_s(config))).exp()
 }
 
-/// Half side of the box that the density is summed in, cells: 1.5 σ.
-fn box_of(sigma_px: f64, step: usize) -> usize {
-    ((1.5 * sigma_px / step as f64).round() as usize).max(1)
-}
-
-/// Calls `of` with the number of each cell within a radius of a place, and its offset.
-fn for_near(size: (usize, usize), at: Vector2<f64>, radius: f64, mut of: impl FnMut(usize, Vector2<f64>)) {
-    let span = |c: f64, n: usize| {
-        let inside = |v: f64| v.clamp(0.0, n as f64) as usize;
-        inside((c - radius).ceil())..inside((c + radius).floor() + 1.0)
-    };
-    for y in span(at.y, size.1) {
-        for x in span(at.x, size.0) {
-            let d = Vector2::new(x as f64, y as f64) - at;
-            if d.norm() <= radius {
-                of(y * size.0 + x, d);
-            }
-        }
-    }
-}
-
-/// Adds a spot's light to the deviations: matched to itself it is √2 wider.
-fn add_light(z: &mut [f32], size: (usize, usize), at: Vector2<f64>, snr: f64, width: f64) {
-    let scale = 0.25 / (width * width);
-    for_near(size, at, 6.0 * width, |i, d| z[i] += (snr * (-scale * d.norm_squared()).exp()) as f32);
-}
-
-/// Sums over squares of half side `half`; outside there is nothing. Each anew: a running sum would lose small odds beside those of a target.
-fn sum_boxes(from: &[f32], w: usize, half: usize, rows: &mut [f32], to: &mut [f32]) {
-    for (from, to) in from.chunks_exact(w).zip(rows.chunks_exact_mut(w)) {
-        for (x, t) in to.iter_mut().enumerate() {
-            *t = from[x.saturating_sub(half)..(x + half + 1).min(w)].iter().sum();
-        }
-    }
-    let h = from.len() / w;
-    for (y, to) in to.chunks_exact_mut(w).enumerate() {
-        to.fill(0.0);
-        for row in rows.chunks_exact(w).take((y + half + 1).min(h)).skip(y.saturating_sub(half)) {
-            to.iter_mut().zip(row).for_each(|(t, r)| *t += r);
-        }
-    }
+/// Half side of the box that the density is summed in, cells.
+fn box_of(profile: &Profile) -> usize {
+    (profile.reach(BOX).round() as usize).max(1)
 }
 
 impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
@@ -304,7 +280,7 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         }
         self.lay_out::<T>(size)?;
         let Some(Search { whitened, motion, sides, .. }) = &mut self.search else { return Ok(()) };
-        let straight_s = self.config.straight_s();
+        let straight_s = straight_s(&self.config);
         let mut dt_s = frame.dt_s.max(0.0);
         let is_gap = dt_s > GAP * straight_s;
         if is_gap && let Some(gaps) = &mut self.only_gaps {
@@ -313,7 +289,7 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
                 let what = format!(
                     "frames are {dt_s:.3} s apart, and a path is straight for {straight_s:.3} s: nothing can be carried from one to the next"
                 );
-                let density = 3.0 * (self.config.sigma_px / dt_s).powi(2) / dt_s;
+                let density = 3.0 * (Profile::new(&self.config).resolution() / dt_s).powi(2) / dt_s;
                 let hint =
                     format!("lower acceleration-density-px2-per-s3: {density:.2e} is straight from frame to frame");
                 return Err(Error::new(ErrorKind::Config, what).at("detector.threshold.bernoulli").hint(hint));
@@ -339,7 +315,7 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
         self.blind = false;
         let step = whitened.step() as f64;
         let middle = (whitened.step() / 2) as f64;
-        let sigma = self.config.sigma_px;
+        let profile = Profile::new(&self.config);
         // After a gap there is one.
         let frames = if dt_s > 0.0 { straight_s / dt_s } else { 1.0 };
         let first = out.len();
@@ -356,16 +332,14 @@ impl<T: Pixel> TargetFinder<T> for BernoulliDetector {
             for t in side.targets.iter().filter(|t| t.odds >= LEAST_ODDS) {
                 let at = t.moments.place * step + Vector2::repeat(middle);
                 let [cov, velocity_cov, cross] = t.covariances(motion, frames, step);
-                // A matched frame shows a spot of height A as A times the root of its energy, √π σ.
-                let height = f64::from(side.sign) * t.snr * f64::from(whitened.noise_counts())
-                    / (std::f64::consts::PI.sqrt() * sigma);
-                let width = FWHM * sigma;
+                let height = f64::from(side.sign) * t.snr * f64::from(whitened.noise_counts()) / profile.root_energy();
+                let width = profile.width();
                 out.push(
                     Detection::at(at, cov)
                         .with_extent(Extent::around(at, width, width))
-                        .with_area_px((std::f64::consts::FRAC_PI_4 * width * width).round().max(1.0) as u32)
+                        .with_area_px(profile.area().round().max(1.0) as u32)
                         .with_peak(height as f32)
-                        .with_sum(height * std::f64::consts::TAU * sigma * sigma)
+                        .with_sum(height * profile.light())
                         .with_score(t.odds.log10() as f32)
                         .with_velocity(Some(DetectedVelocity {
                             mean: t.moments.velocity * step,

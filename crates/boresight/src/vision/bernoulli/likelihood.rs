@@ -1,7 +1,7 @@
 //! Likelihood ratios of a target of each strength against noise, so that noise alone has the mean 1.
 //!
 //! How: a target of the strength a (deviations) makes z ~ N(a, 1) where noise makes N(0, 1): ln l = a z − a²/2, at most [`Levels::most`], so that no frame alone
-//! decides. Two strengths, the least looked for and twice that: one between loses at most 9 % of its information. Each ratio is
+//! decides; but what a target of the brighter strength is expected to show is not cut. Two strengths, the least looked for and twice that: one between loses at most 9 % of its information. Each ratio is
 //! divided by its mean over the negative frames so far (l of −z: no target is in them, noise and what is left of the background are), at least that of white noise (light that rises all over leaves the
 //! negative nothing to say): under that null the ratio has the mean 1,
 //! whatever the tails, and so have products along any path. That is what bounds the number of false alarms (`density`).
@@ -9,8 +9,10 @@
 
 /// Strengths, as multiples of the least.
 pub(super) const STRENGTHS: [f64; 2] = [1.0, 2.0];
-/// Frames in which a target as bright as can be is sure.
+/// Frames in which a target as bright as can be is sure, where that is not less than what [`EXPECTED`] asks for.
 const FEWEST_FRAMES: f64 = 4.0;
+/// Deviations of ln l of the brighter strength that are no outlier: 95 % of its frames are below. Were they cut, targets that are looked for would be told later and followed worse.
+const EXPECTED: f64 = 1.645;
 /// Frames that white noise's own mean counts for.
 const PRIOR: f64 = 4.0;
 
@@ -36,7 +38,9 @@ fn white_mean(a: f64, m: f64) -> f64 {
 impl Levels {
     /// For a least strength, and the odds (natural logarithm) that a target needs.
     pub(super) fn new(least_snr: f64, needed: f64) -> Self {
-        let most = (needed / FEWEST_FRAMES).max(1.0);
+        // Under a target of the strength a, ln l has the mean a²/2 and the deviation a.
+        let brighter = STRENGTHS[1] * least_snr;
+        let most = (needed / FEWEST_FRAMES).max(brighter * (0.5 * brighter + EXPECTED));
         let white = STRENGTHS.map(|s| white_mean(s * least_snr, most));
         Self { snr: STRENGTHS.map(|s| (s * least_snr) as f32), most: most as f32, white, null: white, weight: PRIOR }
     }

@@ -6,6 +6,7 @@
 use super::config::BernoulliConfig;
 use super::density::{Motion, apart};
 use super::likelihood::STRENGTHS;
+use super::shape::Profile;
 use super::whitened::step_of;
 
 /// Most places, velocities, strengths and signs of a frame: 512 MB.
@@ -13,14 +14,14 @@ const MOST_CELLS: usize = 1 << 27;
 
 /// Velocities along both axes that frames of a size leave room for.
 fn velocities(config: &BernoulliConfig, (width, height): (usize, usize)) -> usize {
-    let step = step_of(config.sigma_px);
+    let step = step_of(&Profile::new(config));
     let places = width.div_ceil(step).saturating_mul(height.div_ceil(step)).max(1);
     MOST_CELLS / places.saturating_mul(2 * STRENGTHS.len())
 }
 
 /// Whether frames of that size take no more memory than is allowed.
 pub(super) fn fits(config: &BernoulliConfig, size: (usize, usize)) -> bool {
-    let along = Motion::new(config, step_of(config.sigma_px)).count();
+    let along = Motion::new(config, step_of(&Profile::new(config))).count();
     along.saturating_mul(along) <= velocities(config, size)
 }
 

@@ -1,15 +1,16 @@
-//! A frame as deviations of its noise on a grid: matched to the spot, with background and noise estimated from the frames so far.
+//! A frame as deviations of its noise on a grid: matched to the target, with background and noise estimated from the frames so far.
 //!
-//! How: the frame is matched to the spot (`matched`) and read at the middles of cells of `step` x `step` pixels, some σ wide. The background B of a cell is the mean of the
+//! How: the frame is matched to the target's profile (`shape`, `matched`) and read at the middles of cells of `step` x `step` pixels, some σ wide. The background B of a cell is the mean of the
 //! frames before, fading over [`MEMORY`] straight times; residual r = frame − B. Noise: 1.4826 times the median of |r| in tiles of cells, as a mean over the frames
 //! that fades likewise, each frame brought to one level by its own median over all tiles, with [`PRIOR`] frames of the mean of all; least [`SHARED`] of that mean, and the
 //! rounding of whole counts. z = r / noise: N(0, 1) where there is noise alone.
 //! Limits: a target that does not move by its width within the memory goes into its own background; noise that changes within a tile.
 
 use super::config::BernoulliConfig;
+use super::shape::{Profile, straight_s};
 use crate::Image;
 use crate::vision::integrate::StillBackground;
-use crate::vision::matched::{MAD, filter, finite, half_surround, kernel, median, subtract_surround};
+use crate::vision::matched::{MAD, filter, finite, median, subtract_surround};
 use crate::vision::pixel::Pixel;
 
 /// Time constant of background and noise, in straight times: long beside what a target needs to leave its place.
@@ -24,6 +25,9 @@ const TILE_PX: usize = 32;
 const TILE_CELLS: usize = 8;
 /// Frames of background from which on a frame is judged: the background then adds a quarter to the noise's variance, which is measured with it.
 const FEWEST: f64 = 4.0;
+
+/// Half a cell, in σ of a spot.
+const RIM: f64 = 0.6;
 
 /// What is carried from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -56,15 +60,18 @@ pub(super) struct Whitened {
     z: Vec<f32>,
 }
 
-/// Side of a cell for a spot, px: odd, so that a pixel is its middle; at most 1.2 σ.
-pub(super) fn step_of(sigma_px: f64) -> usize {
+/// Side of a cell, px: odd, so that a pixel is its middle; 0.5 to 1.5 σ of a spot from a σ of 2 px on, so that at the rim between two 0.87 of it are left at least; of another
+/// shape for the same.
+pub(super) fn step_of(profile: &Profile) -> usize {
+    let sigma_px = profile.reach(RIM) / RIM;
     2 * (sigma_px / 2.6 + 0.2).floor() as usize + 1
 }
 
 impl Whitened {
     /// Makes room for frames of a size.
     pub(super) fn new<T: Pixel>(width: usize, height: usize, config: &BernoulliConfig) -> Self {
-        let step = step_of(config.sigma_px);
+        let profile = Profile::new(config);
+        let step = step_of(&profile);
         let size = (width.div_ceil(step), height.div_ceil(step));
         let tile = (TILE_PX / step).max(TILE_CELLS);
         let (n, n_tiles) = (size.0 * size.1, size.0.div_ceil(tile) * size.1.div_ceil(tile));
@@ -75,10 +82,10 @@ impl Whitened {
             step,
             size,
             tile,
-            kernel: kernel(config.sigma_px),
-            surround: spatial.then(|| half_surround(config.sigma_px)),
+            kernel: profile.kernel(),
+            surround: spatial.then(|| profile.half_surround()),
             temporal: config.background != StillBackground::Spatial,
-            memory_s: MEMORY * config.straight_s(),
+            memory_s: MEMORY * straight_s(config),
             rounding: T::STEP / 12f32.sqrt(),
             raw: vec![0.0; width * height],
             row: vec![0.0; width],

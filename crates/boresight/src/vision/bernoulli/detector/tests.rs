@@ -1,6 +1,6 @@
 //! Spots in noise: found, given up, crossing, after a gap; noise alone; what is refused.
 
-use crate::vision::bernoulli::BernoulliConfig;
+use crate::vision::bernoulli::{BernoulliConfig, TargetShape};
 use crate::vision::integrate::StillBackground;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::vision::{Detector, DetectorConfig, build};
@@ -136,6 +136,55 @@ fn noise_alone_has_no_more_false_targets_than_are_asked_for() {
     }
     // 8 are expected at most; 15 or more of 8 are a chance of 2 %.
     assert!(begun < 15, "{begun} begun");
+}
+
+#[test]
+fn noise_alone_has_about_as_many_false_targets_as_are_asked_for() {
+    let rate = 0.3;
+    let mut detector = detector(BernoulliConfig { false_alarms_per_frame: rate, ..config() });
+    let (mut rng, mut scan) = (ChaCha8Rng::seed_from_u64(18), Scan::default());
+    let (mut begun, mut before) = (0usize, Vec::<[f64; 2]>::new());
+    for k in 0..500u64 {
+        detector.detect(&frame(k, 0.04 * k as f64, &[], &mut rng), &mut scan).unwrap();
+        let now: Vec<[f64; 2]> = scan.detections.iter().map(|d| [d.position.x, d.position.y]).collect();
+        let is_new = |d: &&[f64; 2]| !before.iter().any(|b| (b[0] - d[0]).hypot(b[1] - d[1]) < 6.0);
+        begun += usize::from(k >= 100) * now.iter().filter(is_new).count();
+        before = now;
+    }
+    // 120 are asked for: a factor of three either way.
+    assert!((40..360).contains(&begun), "{begun} begun");
+}
+
+#[test]
+fn a_square_is_found_by_its_edges_and_said_to_be_as_large_and_bright_as_it_is() {
+    const SIDE: f64 = 9.0;
+    let config = BernoulliConfig { shape: TargetShape::Square, side_px: SIDE, ..config() };
+    let mut detector = detector(config);
+    let (mut rng, mut scan) = (ChaCha8Rng::seed_from_u64(19), Scan::default());
+    let (mut held, mut peaks) = (0, 0.0);
+    for k in 0..90u64 {
+        let place = [15.0 + 0.8 * k as f64, 70.0 - 0.5 * k as f64];
+        let mut frame = frame(k, 0.04 * k as f64, &[], &mut rng);
+        if let Pixels::Gray16(image) = &mut frame.pixels {
+            for y in 0..SIZE[1] {
+                for (x, v) in image.row_mut(y).iter_mut().enumerate() {
+                    // What of the pixel is within; 0.3 deviations, 2.7 in the matched frame.
+                    let within = |c: usize, at: f64| (0.5 * SIDE + 0.5 - (c as f64 - at).abs()).clamp(0.0, 1.0);
+                    *v += (0.3 * 40.0 * within(x, place[0]) * within(y, place[1])).round() as u16;
+                }
+            }
+        }
+        detector.detect(&frame, &mut scan).unwrap();
+        let near = |d: &&crate::Detection| (d.position.x - place[0]).hypot(d.position.y - place[1]) < 3.0;
+        if let (Some(d), 40..) = (scan.detections.iter().find(near), k) {
+            (held, peaks) = (held + 1, peaks + f64::from(d.peak));
+            assert_eq!((d.extent.width_px, d.area_px), (SIDE, 81));
+        }
+    }
+    assert!(held >= 47, "held in {held} of 50 frames");
+    // 12 counts; its strength is a mean over a straight time at places rounded to whole pixels, up to 0.5 px beside it.
+    let mean = peaks / f64::from(held);
+    assert!((9.0..14.0).contains(&mean), "{mean} counts");
 }
 
 #[test]
