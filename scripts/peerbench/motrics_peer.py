@@ -1,4 +1,4 @@
-"""motrics (PyPI 0.3.0, Rust) as a peer in the comparison's measures of long sequences, with metrics_peers.json beside it."""
+"""motrics (PyPI 0.3.0, Rust) as a peer in the comparison's measures of long sequences, with metrics.json beside it."""
 import numpy as np
 
 
