@@ -300,3 +300,43 @@ fn a_car_before_an_even_road_with_a_few_marks_is_not_the_camera() {
         assert!(motion.is_none_or(|m| m.shift_px().norm() < 1.0), "frame {k}: {motion:?}");
     }
 }
+
+#[test]
+fn spots_that_move_by_themselves_before_an_even_ground_are_no_motion_of_the_camera() {
+    // As particles, birds or stars: a hundred patches of texture, each with a velocity of its own, and noise that a codec repeats. The camera stands.
+    let (w, h) = (960usize, 540usize);
+    for seed in 0..3 {
+        let mut rng = ChaCha8Rng::seed_from_u64(300 + seed);
+        let mut normal = |std: f64| std * rng.sample::<f64, _>(rand_distr::StandardNormal);
+        let grounds: Vec<Vec<u8>> = (0..6).map(|_| (0..w * h).map(|_| (30.0 + normal(4.0)) as u8).collect()).collect();
+        let mut spots: Vec<[Vector2<f64>; 2]> = (0..50)
+            .map(|_| {
+                [Vector2::new(480.0 + normal(200.0), 270.0 + normal(110.0)), Vector2::new(normal(1.0), normal(1.0))]
+            })
+            .collect();
+        let mut camera = CameraMotionEstimator::default();
+        for k in 0..200 {
+            let mut pixels = grounds[k % 6].clone();
+            for [at, velocity] in &mut spots {
+                *at += *velocity;
+                for (axis, most) in [(0, w as f64), (1, h as f64)] {
+                    if at[axis] < 20.0 || at[axis] > most - 20.0 {
+                        velocity[axis] = velocity[axis].abs().copysign(0.5 * most - at[axis]);
+                    }
+                }
+                let (cx, cy) = (at.x.round() as i64, at.y.round() as i64);
+                for y in (cy - 6).max(0)..(cy + 7).min(h as i64) {
+                    for x in (cx - 6).max(0)..(cx + 7).min(w as i64) {
+                        let r2 = (x as f64 - at.x).powi(2) + (y as f64 - at.y).powi(2);
+                        let p = &mut pixels[y as usize * w + x as usize];
+                        *p = p.saturating_add((180.0 * (-0.5 * r2 / 4.84).exp()) as u8);
+                    }
+                }
+            }
+            if let Some(motion) = camera.step(&Pixels::Gray8(Image::from_vec(w, h, pixels).unwrap())) {
+                let shift = motion.shift_px();
+                assert!(shift.norm() < 1e-6, "seed {seed}, frame {k}: {shift}, {:?}", motion.basis);
+            }
+        }
+    }
+}
