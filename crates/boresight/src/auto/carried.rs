@@ -1,26 +1,21 @@
 //! Detection by a density of targets that is carried from frame to frame, where it was asked for.
 //!
-//! Source: our own. Velocities up to [`SPEED`] a frame are searched, less where a frame is so large that they would take more memory than the detector allows.
+//! Source: our own. As fast as in sums ([`super::summed`]), less where a frame is so large that its velocities would take more memory than the detector allows.
 //! Limits: never chosen unasked. The camera has to stand still, or to move no faster than targets.
 
-use super::scene::{Camera, Scene};
-use super::summed::{polarity, write};
+use super::scene::Scene;
+use super::summed::{background, max_speed, polarity, write};
 use crate::vision::bernoulli::{BernoulliConfig, speed_that_fits};
-use crate::vision::integrate::StillBackground;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, SourceInfo};
 
-/// Largest speed searched, px a frame.
-const SPEED: f64 = 2.0;
-
 /// Writes the detector; `config` is that for isolated targets.
 pub fn configure(scene: &Scene, interval_s: f64, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
-    let background = if scene.camera == Camera::Fixed { StillBackground::Temporal } else { StillBackground::Both };
-    let wanted = (SPEED / interval_s.max(1e-6)).min(1e5);
+    let wanted = max_speed(interval_s);
     let mut carried = BernoulliConfig {
         max_speed_px_per_s: wanted,
         polarity: polarity(config),
-        background,
+        background: background(scene),
         ..BernoulliConfig::default()
     };
     carried.max_speed_px_per_s = speed_that_fits(&carried, (info.width, info.height));

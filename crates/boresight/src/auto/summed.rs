@@ -22,8 +22,7 @@ const MISSED: f64 = 3.0;
 pub fn configure(scene: &Scene, interval_s: f64, config: &mut Config, reasons: &mut Vec<String>) {
     let polarity = polarity(config);
     let frames = ((DURATION_S / interval_s.max(1e-6)).clamp(8.0, 64.0) as u32).next_power_of_two().min(64);
-    let background = if scene.camera == Camera::Fixed { StillBackground::Temporal } else { StillBackground::Both };
-    let max_speed_px_per_s = (SPEED / interval_s.max(1e-6)).min(1e5);
+    let (background, max_speed_px_per_s) = (background(scene), max_speed(interval_s));
     let sums = IntegrateConfig { frames, max_speed_px_per_s, polarity, background, ..IntegrateConfig::default() };
     let report_s = 0.5 * f64::from(frames) * interval_s;
     reasons.push(format!(
@@ -33,6 +32,16 @@ pub fn configure(scene: &Scene, interval_s: f64, config: &mut Config, reasons: &
     ));
     write(ThresholdConfig::Integrate(sums), max_speed_px_per_s, config);
     config.tracker.coast_s = config.tracker.coast_s.max(MISSED * report_s);
+}
+
+/// What is taken for background: a camera that stands has one in time.
+pub(super) fn background(scene: &Scene) -> StillBackground {
+    if scene.camera == Camera::Fixed { StillBackground::Temporal } else { StillBackground::Both }
+}
+
+/// Largest speed searched, px/s.
+pub(super) fn max_speed(interval_s: f64) -> f64 {
+    (SPEED / interval_s.max(1e-6)).min(1e5)
 }
 
 /// The sign that isolated targets have.

@@ -17,7 +17,7 @@ use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, Vote, find, find_near, vote};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
-use super::found::{Found, apart, coarse};
+use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::light::Light;
 use super::other_view::OtherView;
@@ -63,8 +63,6 @@ const UNSURE_SPREAD: f64 = 0.5;
 const AT_REST: f64 = 0.75;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
 const FINE_FOUND: f64 = 0.5;
-/// Share of the weight that keeps together where the fine patches do not bear a motion out: all but what targets may hide.
-const MOST: f64 = 0.8;
 /// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
 const FINE_LOST_PX: f64 = 0.5;
 
@@ -246,7 +244,7 @@ impl CameraMotionEstimator {
             least_turn_px: if self.turning { 0.0 } else { STILL },
             agree_px,
         })?;
-        let (n_coarse, apart_px) = (self.matches.len(), apart(&self.matches, &coarse.now_from_key, MOST));
+        let (n_coarse, alone) = (self.matches.len(), coarse.alone(&self.matches));
         // What is no similarity bends the coarse matches already.
         let limits = Limits { least_px: STILL, most_px: BEND * agree_px };
         let start =
@@ -258,7 +256,8 @@ impl CameraMotionEstimator {
         let ends = agreeing().fold([f64::INFINITY, f64::NEG_INFINITY], |e, x| [e[0].min(x), e[1].max(x)]);
         let is_wide = ends[1] - ends[0] >= UNSURE_SPREAD * self.now.width() as f64;
         let mut n_still = 0;
-        if (n_agree as f64) < CLEAR_COVER * (CELLS.0 * CELLS.1) as f64 {
+        let n_cells = CELLS.0 * CELLS.1;
+        if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
             let (mut n_for, mut n_against) = (0, 0);
             for (i, p) in key.patches.iter().chain(&key.weak).enumerate() {
                 let from = p.middle();
@@ -277,7 +276,7 @@ impl CameraMotionEstimator {
         let may_be_a_thing = !is_wide && 2 * n_still >= n_agree;
         let mut found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
             Some(fine) => Found { n_coarse, may_be_a_thing, apart_px: coarse.apart_px, ..fine },
-            None => Found { covers: false, n_coarse, may_be_a_thing, apart_px, ..coarse },
+            None => Found { n_coarse, may_be_a_thing, ..alone },
         };
         let moved = corners_apart(&found.now_from_key, &Homography::identity(), middle) > BELIEVED;
         let key = if at_last { &self.last } else { &self.key };

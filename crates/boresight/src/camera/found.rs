@@ -8,6 +8,9 @@ use super::scales::of_similarity;
 use crate::{Homography, MotionCov, Similarity};
 use nalgebra::Vector2;
 
+/// Share of the weight that keeps together where a motion stands alone: all but what targets may hide.
+const MOST: f64 = 0.8;
+
 /// Where the key frame's background lies now, reduced px.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
@@ -66,8 +69,15 @@ pub(super) fn coarse(
     })
 }
 
+impl Found {
+    /// The same where the fine patches do not bear it out, by the matches that it comes from: nothing else speaks for it, so more of them have to keep together.
+    pub fn alone(self, matches: &[Match]) -> Self {
+        Self { covers: false, apart_px: apart(matches, &self.now_from_key, MOST), ..self }
+    }
+}
+
 /// The distance from a motion within which that share of the weight lies, reduced px.
-pub(super) fn apart(matches: &[Match], now_from_key: &Homography, share: f64) -> f64 {
+fn apart(matches: &[Match], now_from_key: &Homography, share: f64) -> f64 {
     let mut all = [(0.0, 0.0); MOST_MATCHES];
     let all = &mut all[..matches.len().min(MOST_MATCHES)];
     all.iter_mut().zip(matches).for_each(|(a, m)| *a = ((now_from_key.apply(m.from) - m.to).norm(), m.weight));

@@ -102,35 +102,25 @@ impl Bars {
     }
 
     /// What a cluster whose box's longer side is of that class needs to be a target or become one, if it has grown from the peak of a cell; a peak that is not the highest of
-    /// its cell leads to small ones only. `None` if it cannot.
-    pub fn need(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, class: SideClass) -> Option<Need> {
-        let [grounds, quiet] = &self.lowest;
-        let next = (f64::from(grounds.least[cell]), bar.over_near(grounds.third[cell], quiet.third[cell]));
-        self.need_of(cells, bar, cell, highest, class, next)
-    }
-
-    /// The same for one that is to score more than a cluster of its peak has: beside it the lowest ground and the lowest spread count, since nothing but a better score is lost by
-    /// going on for too long.
-    pub fn need_more(&self, cells: &Cells, bar: &Bar, cell: usize, highest: bool, class: SideClass) -> Option<Need> {
-        let [grounds, quiet] = &self.lowest;
-        let next = (f64::from(grounds.least[cell]), bar.over_near(grounds.least[cell], quiet.least[cell]));
-        self.need_of(cells, bar, cell, highest, class, next)
-    }
-
-    /// As [`Self::need`], with the ground and the bar of the cells next to the peak's.
-    fn need_of(
+    /// its cell leads to small ones only. `None` if it cannot. Where it is to beat a cluster that is a target already, the lowest ground and the lowest spread next to the cell count, not the
+    /// third lowest: it costs nothing but time to go on for too long.
+    pub fn need(
         &self,
         cells: &Cells,
         bar: &Bar,
-        cell: usize,
-        highest: bool,
+        (cell, highest): (usize, bool),
         class: SideClass,
-        (ground, mean): (f64, f32),
+        is_to_beat: bool,
     ) -> Option<Need> {
         let leads = if highest { usize::from(self.leads[cell]) } else { 1 };
         let mut need = Need { mean: f64::INFINITY, ground: f64::INFINITY };
         let first = class.0.unwrap_or_else(|| {
-            need = Need { mean: f64::from(mean), ground };
+            let [grounds, quiet] = &self.lowest;
+            let mean = match is_to_beat {
+                true => bar.over_near(grounds.least[cell], quiet.least[cell]),
+                false => bar.over_near(grounds.third[cell], quiet.third[cell]),
+            };
+            need = Need { mean: f64::from(mean), ground: f64::from(grounds.least[cell]) };
             // The first ring is made of those cells.
             1
         });
@@ -323,12 +313,15 @@ mod tests {
         let mut bars = Bars::default();
         bars.take(&cells, &bar);
         let cell = |x: usize, y: usize| y / CELL * 32 + x / CELL;
-        let need =
-            |x: usize, highest: bool, side: u32| bars.need(&cells, &bar, cell(x, 60), highest, SideClass::of(side));
+        let need = |x: usize, highest: bool, side: u32| {
+            bars.need(&cells, &bar, (cell(x, 60), highest), SideClass::of(side), false)
+        };
         let (quiet, loud) = (need(60, true, 1).unwrap().mean, need(200, true, 1).unwrap().mean);
         assert!(quiet > 102.0 && quiet < 106.0, "{quiet}");
         assert!(loud > 120.0 && loud < 150.0, "{loud}");
         assert!(need(60, true, 50).is_some());
         assert!(need(60, false, 50).is_none(), "another peak of the cell leads to small clusters only");
+        let to_beat = bars.need(&cells, &bar, (cell(60, 60), true), SideClass::of(1), true).unwrap().mean;
+        assert!(to_beat <= quiet, "{to_beat}: the lowest of the cells around is no higher than the third lowest");
     }
 }

@@ -43,9 +43,8 @@ const SIDE_GRACE: f64 = 2.0;
 /// Pixels up to which a cluster is grown to the end of its level: a cell's, whose bar is an estimate that the ring of a small cluster may prove too high.
 const SMALL: u32 = 64;
 
-/// Share of its score that a cluster which is to beat another must surely reach by the bars of its cells: their spread holds the slope of the ground, a third of it where the sky's is as steep as the noise
-/// is high, which a ring's plane takes out.
-const SURE: f64 = 0.7;
+/// Share of a score that the bars of a peak's cells surely tell, 1/√2: the slope of a ground that spreads a cell's values as much as their noise does makes √2 of their spread, and a ring's plane takes it out.
+const SURE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Finds isolated blobs; keeps its memory between frames.
 #[derive(Debug)]
@@ -148,14 +147,17 @@ impl IsolatedDetector {
     fn grow<T: Pixel>(&mut self, image: &Image<T>, config: &DetectorConfig, bar: &Bar, peak: &Peak) {
         let Some(pixel) = image.row(peak.y as usize).get(peak.x as usize) else { return };
         let mut class = SideClass::of(1);
-        let Some(mut need) = self.bars.need(&self.cells, bar, peak.cell, peak.highest, class) else { return };
+        let wanted = |bar: &Bar, class, is_to_beat| {
+            self.bars.need(&self.cells, bar, (peak.cell, peak.highest), class, is_to_beat)
+        };
+        let Some(mut need) = wanted(bar, class, false) else { return };
         let (min_area, max_area) = config.cluster.area_limits();
         self.growth.start(peak.x, peak.y, self.steps.of(*pixel), self.steps.above(need.ground));
         let mut noted = false;
-        // What is wanted of the next clusters; once the clearest one so far has its shape, more than that one's score.
-        let (mut bar, mut small) = (*bar, SMALL);
-        let mut clearest: Option<Clearest> = None;
+        // Once the clearest one so far has its shape, the next ones are to beat it.
+        let (mut bar, mut is_to_beat, mut clearest) = (*bar, false, None::<Clearest>);
         loop {
+            let small = if is_to_beat { 0 } else { SMALL };
             let step = self.growth.step(image, &self.steps, small, need.mean);
             if step == Step::End {
                 return;
@@ -187,17 +189,13 @@ impl IsolatedDetector {
             }
             let (w, h) = blob.sides();
             let grown = SideClass::of(w.max(h));
-            let to_beat = clearest.filter(|c| SURE * c.score > bar.min_score && c.has_its_shape(level));
-            if let Some(clearest) = to_beat {
-                (bar.min_score, small) = (SURE * clearest.score, 0);
+            let mut changed = grown != class;
+            if let Some(c) = clearest.filter(|c| SURE * c.score > bar.min_score && c.has_its_shape(level)) {
+                (bar.min_score, is_to_beat, changed) = (SURE * c.score, true, true);
             }
-            if grown != class || to_beat.is_some() {
-                let wanted = match small {
-                    SMALL => self.bars.need(&self.cells, &bar, peak.cell, peak.highest, grown),
-                    _ => self.bars.need_more(&self.cells, &bar, peak.cell, peak.highest, grown),
-                };
-                let Some(wanted) = wanted else { return };
-                (class, need) = (grown, wanted);
+            if changed {
+                let Some(more) = wanted(&bar, grown, is_to_beat) else { return };
+                (class, need) = (grown, more);
             }
             if !(level > need.ground && (noted || mean >= need.mean)) {
                 return;

@@ -49,12 +49,12 @@ pub fn find<T: Pixel>(
         if high < lowest || high < bars.floor() {
             continue;
         }
-        let Some(need) = bars.need(cells, bar, cell, true, small) else { continue };
+        let Some(need) = bars.need(cells, bar, (cell, true), small, false) else { continue };
         if high < need.mean {
             continue;
         }
         // Of the others of the cell only small clusters are looked for.
-        let least = bars.need(cells, bar, cell, false, small).map_or(high, |n| n.mean.min(high)).max(lowest);
+        let least = bars.need(cells, bar, (cell, false), small, false).map_or(high, |n| n.mean.min(high)).max(lowest);
         let band = if dark { T::band(f64::MIN, -least) } else { T::band(least, f64::MAX) };
         let Some((low, most)) = band else { continue };
         let (left, top) = (cell % columns * CELL, cell / columns * CELL);
