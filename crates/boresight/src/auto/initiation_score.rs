@@ -95,6 +95,10 @@ pub fn raised(found: &Found, area_px2: f64, config: &Config) -> Option<(f64, Str
         score = asked(targets);
         targets = found.per_scan_from(score);
     }
+    // Where false detections score as targets do, the score tells nothing: more targets would be lost than false ones spared.
+    if found.per_scan_from(t.min_initiation_score) - targets > n_false {
+        return None;
+    }
     let score = round(score);
     let reason = || {
         format!(
@@ -229,6 +233,25 @@ mod tests {
         // 2.5 * 200^(1/2) is 35: of such a law no score of 25 stands out, and one that no target reaches starts no track.
         assert_eq!(from(50.0, 2.0, Report::All), None, "no score tells them apart");
     }
+
+    #[test]
+    fn no_more_targets_are_lost_than_false_detections_are_spared() {
+        let mut config = Config::default();
+        config.tracker.min_initiation_score = 4.0;
+        config.tracker.report = Report::All;
+        config.tracker.score_likelihood =
+            Some(ScoreLikelihoodConfig { least_score: 10.0, clutter_exponent: 1.0, ..Default::default() });
+        // Fifty targets a scan of scores from 10 to 59, and false ones that score as they do.
+        let found = Found { per_scan: 50.0, scores: (10..60u8).map(f32::from).collect(), ..Found::default() };
+        let mut of = |n_false: f64| {
+            config.tracker.clutter_density_per_px2 = n_false * 1e-6;
+            raised(&found, 1e6, &config).map(|(score, _)| score)
+        };
+        // From 12.8 on they are one in a hundred, 0.47 of 0.6: three targets would be lost for 0.13.
+        assert_eq!(of(0.6), None);
+        assert_eq!(of(0.5), Some(10.0), "one in a hundred of what all targets reach");
+    }
+
     #[test]
     fn what_hardly_a_target_scores_is_not_kept_and_nothing_that_starts_a_track_goes() {
         let mut config = Config::default();

@@ -10,7 +10,7 @@ use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::request::Request;
-use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, speed};
+use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, pieces, speed};
 use crate::camera::{CameraConfig, CameraPath};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -279,7 +279,8 @@ fn farthest_px(scans: &[Scan]) -> f64 {
     scans.iter().map(far).fold(0.0, f64::max)
 }
 
-/// Learns noise and motion, and of points what the detections are made of; of regions this is not known, and their rule stays.
+/// Learns noise and motion, and what the detections are made of, unless they are pieces of things: what comes of counting those as independent is no probability, and they are confirmed by the
+/// number of their hits.
 fn statistics(
     scans: &[Scan],
     area_px2: f64,
@@ -287,7 +288,7 @@ fn statistics(
     choice: &mut Choice,
 ) -> Result<Option<Found>> {
     noise::learn(scans, area_px2, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons)?;
-    if !is_of_points(&choice.config.detector.threshold) {
+    if !is_of_points(&choice.config.detector.threshold) && pieces::are_pieces(scans, area_px2) {
         if false_tracks_per_hour.is_some() {
             choice.reasons.push(RATE_WITHOUT_EFFECT.to_string());
         }
@@ -305,8 +306,7 @@ fn statistics(
     detection_statistics::learn(scans, area_px2, false_tracks_per_hour, config, reasons).map(Some)
 }
 
-/// Whether what is detected is a point or a blob that stands alone: one detection a target, false ones anywhere. Regions come in pieces, which lie where
-/// targets are; what comes of counting those as independent is no probability, so regions are confirmed by the number of their hits.
+/// Whether what is detected is a point or a blob that stands alone, by the detector's make: one detection a target, false ones anywhere. Regions may come in pieces, which lie where targets are.
 fn is_of_points(threshold: &ThresholdConfig) -> bool {
     matches!(
         threshold,

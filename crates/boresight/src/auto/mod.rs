@@ -34,6 +34,7 @@ mod moving;
 mod noise;
 mod open;
 mod particles;
+mod pieces;
 #[cfg(feature = "report")]
 mod preview;
 mod radar;

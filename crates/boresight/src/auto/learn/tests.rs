@@ -2,8 +2,10 @@
 
 use super::super::in_memory::InMemory;
 use super::*;
+use crate::track::ConfirmationConfig;
 use crate::vision::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
+use crate::vision::threshold::BandConfig;
 use crate::{Frame, FrameIndex, Image, PixelKind, Pixels, SourceInfo, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -100,6 +102,29 @@ fn specks_are_left_out(columns: u32) {
         learnt.detect(frame, &mut a).unwrap();
         anew.detect(frame, &mut b).unwrap();
         assert_eq!(format!("{a:?}"), format!("{b:?}"));
+    }
+}
+
+#[test]
+fn of_a_band_that_was_set_things_are_confirmed_by_probability_and_pieces_by_their_hits() {
+    for in_two in [false, true] {
+        let (frames, info) = filmed(|k, image| {
+            (0..6).for_each(|i| {
+                let (x, y) = (20.0 + 40.0 * f64::from(i % 3) + 0.2 * k as f64, 30.0 + 50.0 * f64::from(i / 3));
+                square(image, [x, y], 200);
+                square(image, [x + 4.0, y], 200);
+                if in_two {
+                    square(image, [x, y + 8.0], 200);
+                    square(image, [x + 4.0, y + 8.0], 200);
+                }
+            });
+        });
+        let mut choice = assumed(2.5, Report::All);
+        choice.config.detector.threshold = ThresholdConfig::Band(BandConfig { low: 150.0, high: 255.0 });
+        let mut replay = Replay::new(Box::new(InMemory(frames.into_iter(), info)), 48).up_to(60);
+        learn(&mut replay, &mut choice, &Request::default(), Ok::<_, Error>).unwrap();
+        let by_probability = matches!(choice.config.tracker.confirmation, ConfirmationConfig::Existence(_));
+        assert_eq!(by_probability, !in_two, "{:?}", choice.reasons);
     }
 }
 
