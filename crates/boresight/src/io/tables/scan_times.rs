@@ -10,8 +10,13 @@ use crate::{Error, ErrorKind, FrameIndex, Result, Scan, Timestamp};
 /// A sequence of frames with a hole larger than this is taken for a wrong number, not for a pause.
 const MAX_GAP_FRAMES: u64 = 1_000_000;
 
-/// All holes of a table together may have this many frames: empty scans take memory as well (10⁷ of them about 0.8 GB).
-const MAX_EMPTY_FRAMES: u64 = 10_000_000;
+/// All holes of a table together may have this many frames, 22 hours of 25 a second: empty scans take memory as well, [`MAX_EMPTY_BYTES`] at most.
+const MAX_EMPTY_FRAMES: u64 = 2_000_000;
+
+/// What the scans of all holes may take.
+const MAX_EMPTY_BYTES: usize = 3 << 29;
+
+const _: () = assert!(MAX_EMPTY_FRAMES as usize * size_of::<Scan>() <= MAX_EMPTY_BYTES);
 
 /// The scans of a table, before they have their times.
 pub(super) struct Grouped {
@@ -26,10 +31,10 @@ pub(super) struct Grouped {
 /// # Errors
 /// [`ErrorKind::Damaged`] for holes that no pause explains.
 pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<Grouped> {
-    let mut scans: Vec<Scan> = Vec::new();
-    let mut times: Vec<Option<Timestamp>> = Vec::new();
+    let n_frames = n_frames(label, &seen)?;
+    let mut scans: Vec<Scan> = Vec::with_capacity(n_frames);
+    let mut times: Vec<Option<Timestamp>> = Vec::with_capacity(n_frames);
     let (mut n_odd, mut first_odd) = (0, None);
-    let mut n_empty = 0;
     for one in seen {
         match scans.last_mut() {
             Some(last) if last.index.0 == one.frame => {
@@ -43,18 +48,6 @@ pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<Grouped> {
             }
             last => {
                 let next = last.map_or(one.frame, |l| l.index.0 + 1);
-                let hole = one.frame - next;
-                n_empty += hole;
-                if hole > MAX_GAP_FRAMES || n_empty > MAX_EMPTY_FRAMES {
-                    let what = format!(
-                        "frame {} follows frame {}: expected holes of at most {MAX_GAP_FRAMES} frames, {MAX_EMPTY_FRAMES} in all",
-                        one.frame,
-                        next - 1
-                    );
-                    return Err(Error::new(ErrorKind::Damaged, what)
-                        .at(label)
-                        .hint("is the frame column really the frame?"));
-                }
                 scans.extend((next..one.frame).map(|f| Scan { index: FrameIndex(f), ..Scan::default() }));
                 times.resize(scans.len(), None);
                 scans.push(Scan { index: FrameIndex(one.frame), detections: vec![one.detection], ..Scan::default() });
@@ -68,6 +61,27 @@ pub(super) fn scans_of(label: &str, seen: Vec<Seen>) -> Result<Grouped> {
         )
     });
     Ok(Grouped { scans, times, warning })
+}
+
+/// Number of frames from the first row to the last; holes that no pause explains are refused before anything is made of them.
+fn n_frames(label: &str, seen: &[Seen]) -> Result<usize> {
+    let mut n_empty = 0;
+    let mut n_with_rows = usize::from(!seen.is_empty());
+    for pair in seen.windows(2) {
+        let [before, frame] = [pair[0].frame, pair[1].frame];
+        let hole = frame.saturating_sub(before).saturating_sub(1);
+        n_empty = hole.saturating_add(n_empty);
+        n_with_rows += usize::from(frame != before);
+        if hole > MAX_GAP_FRAMES || n_empty > MAX_EMPTY_FRAMES {
+            let what = format!(
+                "frame {frame} follows frame {before}: expected holes of at most {MAX_GAP_FRAMES} frames, {MAX_EMPTY_FRAMES} in all"
+            );
+            return Err(Error::new(ErrorKind::Damaged, what)
+                .at(label)
+                .hint("is the frame column really the frame? a table of days is read in parts"));
+        }
+    }
+    Ok(n_with_rows + n_empty as usize)
 }
 
 /// What [`set_times`] found.
