@@ -95,7 +95,7 @@ pub fn raised(found: &Found, area_px2: f64, config: &Config) -> Option<(f64, Str
         score = asked(targets);
         targets = found.per_scan_from(score);
     }
-    // Where false detections score as targets do, the score tells nothing: more targets would be lost than false ones spared.
+    // Where false detections score as targets do, the score tells nothing: more targets would be lost than there are false ones.
     if found.per_scan_from(t.min_initiation_score) - targets > n_false {
         return None;
     }
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_targets_are_lost_than_false_detections_are_spared() {
+    fn no_more_targets_are_lost_than_there_are_false_detections() {
         let mut config = Config::default();
         config.tracker.min_initiation_score = 4.0;
         config.tracker.report = Report::All;
