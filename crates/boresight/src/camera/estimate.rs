@@ -12,9 +12,10 @@
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
+use super::apart::Pieces;
 use super::course::Course;
 use super::cover::{Cover, LEAST_SHARE};
-use super::find_patch::{SEARCH, Vote, find, find_near, vote};
+use super::find_patch::{SEARCH, find, find_near};
 use super::fine::{FinePatches, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
@@ -26,6 +27,7 @@ use super::plane_cov::plane_cov;
 use super::reduce::{factor, reduce};
 use super::rest::{Rest, STILL, moves};
 use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
+use super::votes;
 use super::wide::Wide;
 use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels};
 use nalgebra::Vector2;
@@ -75,6 +77,7 @@ pub struct CameraMotionEstimator {
     key: KeyFrame,
     fine: FinePatches,
     wide: Wide,
+    pieces: Pieces,
     cover: Cover,
     view: OtherView,
     /// The last frame: where the key frame is not found it takes its place.
@@ -116,7 +119,7 @@ impl CameraMotionEstimator {
             return Some(full_size(&Homography::identity(), &MotionCov::zeros(), MotionBasis::Cut, &scales));
         }
         let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
-        let is_of_ground = is_unsure && found.is_some_and(|f| !f.0.may_be_a_thing);
+        let is_of_ground = is_unsure && found.is_some_and(|f| !f.0.may_be_a_thing && !f.0.by_chance);
         self.n_unsure = if is_of_ground { self.n_unsure + 1 } else { 0 };
         if is_unsure && self.n_unsure < UNSURE_FRAMES {
             found = None;
@@ -258,25 +261,17 @@ impl CameraMotionEstimator {
         let mut n_still = 0;
         let n_cells = CELLS.0 * CELLS.1;
         if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
-            let (mut n_for, mut n_against) = (0, 0);
-            for (i, p) in key.patches.iter().chain(&key.weak).enumerate() {
-                let from = p.middle();
-                let places = [start.apply(from), last.apply(from)];
-                match vote((&key.image, &self.now), *p, &predicted.similarity_at(from), places, agree_px) {
-                    Vote::For => n_for += 1,
-                    Vote::Against => n_against += 1,
-                    Vote::Still => n_still += usize::from(i < key.patches.len() && !key.even),
-                    Vote::Neither => {}
-                }
-            }
-            if n_against >= MIN_PATCHES && n_against > n_for {
-                return None;
-            }
+            n_still = votes::n_still(key, &self.now, [predicted, &start, &last], agree_px)?;
         }
         let may_be_a_thing = !is_wide && 2 * n_still >= n_agree;
+        let is_first = !self.known || !self.rest.moving;
+        let common = (&coarse.now_from_key, if coarse.turned { 4 } else { 2 });
+        let by_chance = is_first
+            && !key.even
+            && self.pieces.may_be_chance((&key.image, key.quiet), common, &self.matches, agree_px);
         let mut found = match if at_last { None } else { self.sharpen(&start, pixels, scales) } {
-            Some(fine) => Found { n_coarse, may_be_a_thing, apart_px: coarse.apart_px, ..fine },
-            None => Found { n_coarse, may_be_a_thing, ..alone },
+            Some(fine) => Found { n_coarse, may_be_a_thing, by_chance, apart_px: coarse.apart_px, ..fine },
+            None => Found { n_coarse, may_be_a_thing, by_chance, ..alone },
         };
         let moved = corners_apart(&found.now_from_key, &Homography::identity(), middle) > BELIEVED;
         let key = if at_last { &self.last } else { &self.key };
@@ -318,6 +313,7 @@ impl CameraMotionEstimator {
             turned: plane.n_numbers > 2,
             covers: true,
             may_be_a_thing: false,
+            by_chance: false,
             n_coarse: 0,
             apart_px: 0.0,
         })

@@ -21,6 +21,8 @@ pub(super) struct Found {
     pub covers: bool,
     /// Whether it may be the motion of a thing before a ground that stands.
     pub may_be_a_thing: bool,
+    /// Whether it may be what things that move by themselves have in common ([`super::apart`]).
+    pub by_chance: bool,
     /// Patches of the reduced frame that were found.
     pub n_coarse: usize,
     /// How far from the motion those patches lie that are to keep together if it is a ground's, reduced px.
@@ -47,6 +49,7 @@ pub(super) fn coarse(
             turned: fit.turned,
             covers: true,
             may_be_a_thing: false,
+            by_chance: false,
             n_coarse: 0,
             apart_px: apart(matches, &now_from_key, MAJORITY),
         });
@@ -64,6 +67,7 @@ pub(super) fn coarse(
         turned: true,
         covers: true,
         may_be_a_thing: false,
+        by_chance: false,
         n_coarse: 0,
         apart_px: apart(matches, &now_from_key, MAJORITY),
     })

@@ -18,7 +18,7 @@ pub(super) const MIN_PATCHES: usize = 6;
 /// Cells of the key frame in x and y, each with one patch.
 pub(super) const CELLS: (usize, usize) = (8, 6);
 /// From one place that a patch is looked for at to the next, reduced px.
-const STEP: usize = 4;
+pub(super) const STEP: usize = 4;
 /// Texture below this many times that of the image's quiet quarter does not stand out.
 const QUIET_TIMES: f32 = 2.0;
 
@@ -64,6 +64,8 @@ pub(super) struct KeyFrame {
     /// It has seen the image move.
     pub proven: bool,
     chosen: bool,
+    /// Texture above which a patch stands out, where it is not even.
+    pub quiet: f32,
     textures: Vec<f32>,
     /// By column, the sums of the absolute gradients along x and y over the rows of a patch.
     gradients: Vec<[f32; 2]>,
@@ -121,6 +123,7 @@ impl KeyFrame {
         }
         self.textures.sort_unstable_by(f32::total_cmp);
         let quiet = QUIET_TIMES * self.textures[(self.textures.len() - 1) / 4];
+        self.quiet = quiet;
         self.best.sort_unstable_by(|a, b| b.texture.total_cmp(&a.texture).then(a.cell.cmp(&b.cell)));
         let n_clear = self.best.iter().take_while(|b| b.texture > quiet).count();
         if n_clear < MIN_PATCHES {
@@ -183,7 +186,7 @@ impl KeyFrame {
 
 widest! {
     /// Adds the absolute gradients along x and y of a row to those of each column.
-    fn add_gradients(row: &[f32], below: &[f32], sums: &mut [[f32; 2]]) {
+    pub(super) fn add_gradients(row: &[f32], below: &[f32], sums: &mut [[f32; 2]]) {
         let n = sums.len();
         let (left, right, below) = (&row[..n], &row[1..][..n], &below[..n]);
         for x in 0..n {
@@ -194,7 +197,7 @@ widest! {
 }
 
 /// The smaller of the mean absolute gradients along x and y of a patch, from the sums of its columns.
-fn texture(columns: &[[f32; 2]]) -> f32 {
+pub(super) fn texture(columns: &[[f32; 2]]) -> f32 {
     let (mut gx, mut gy) = (0.0, 0.0);
     for [x, y] in columns {
         gx += x;

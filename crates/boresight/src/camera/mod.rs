@@ -4,6 +4,7 @@
 //! measured or held), [`CameraPath`] keeps what the camera did since the first scan, and [`SteadyGround`] turns detections into the
 //! coordinates of the first scan's background and tracks back into the image's.
 
+mod apart;
 mod course;
 mod cover;
 mod estimate;
@@ -24,6 +25,7 @@ mod register;
 mod rest;
 mod scales;
 mod steady;
+mod votes;
 mod wide;
 mod wide_search;
 

@@ -64,7 +64,8 @@ pub(super) fn moves(
 ) -> bool {
     let moved = |place| found.now_from_key.apply(place) - before.apply(place);
     let (n, square) = places.clone().fold((0.0, 0.0), |(n, sum), place| (n + 1.0, sum + moved(place).norm_squared()));
-    square > n * (TOGETHER * found.apart_px).powi(2)
+    !found.by_chance
+        && square > n * (TOGETHER * found.apart_px).powi(2)
         && places.any(|place| {
             let (e, j) = (moved(place), motion_jacobian(found.now_from_key.apply(place) - middle));
             let chance = (j * found.cov * j.transpose()).cholesky().is_some_and(|c| e.dot(&c.solve(&e)) <= CHANCE);
