@@ -133,7 +133,8 @@ impl Kept {
     /// Takes the configuration as it is given.
     /// # Errors
     /// A parameter that does not fit the frames.
-    pub fn given(self, config: Config) -> Result<Ready> {
+    pub fn given(self, mut config: Config) -> Result<Ready> {
+        self.info.iter().for_each(|info| config.fill_in(info));
         let detector = self.info.as_ref().map(|info| vision::build(&config.detector, info)).transpose()?;
         let contents = self.frames.into_iter().map(Content::Frame).chain(self.scans.into_iter().map(Content::Scan));
         let kept = contents.zip(self.clocks).map(|(content, c)| arrived(content, c)).collect();

@@ -130,7 +130,8 @@ impl Wishes {
                 Ok(plan)
             }
             (None, _) => {
-                let config = changed(base, &self.sets)?;
+                let mut config = changed(base, &self.sets)?;
+                config.fill_in(&info);
                 let detector = vision::build(&config.detector, &info)?;
                 let reasons = reasons.into_iter().chain(unused(&config)).collect();
                 let input = Input::Frames(source, detector);

@@ -14,7 +14,9 @@ const SIDE: usize = 160;
 const TRACKER: &str = include_str!("../../../configs/below-noise.toml");
 
 pub fn table(runs: u64, page: &mut String) -> Result<()> {
-    let tracker = Config::from_toml(TRACKER, "configs/below-noise.toml")?.tracker;
+    let mut tracker = Config::from_toml(TRACKER, "configs/below-noise.toml")?.tracker;
+    // As the command fills it in.
+    tracker.field_px = Some([SIDE as f64; 2]);
     let (mut kept, mut unswapped, mut held, mut rows, mut strangers) = (0, 0, 0usize, 0usize, 0usize);
     for run in 0..runs {
         let mut rng = random(5000 + run);

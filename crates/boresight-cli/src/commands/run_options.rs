@@ -191,8 +191,9 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     }
     if given.is_some() {
         let source = base.input.mend(boresight::io::open(&args.input, &base.input.open_options())?)?;
-        let config = changed(base, args, tracker)?;
+        let mut config = changed(base, args, tracker)?;
         let info = source.info().clone();
+        config.fill_in(&info);
         let detector = vision::build(&config.detector, &info)?;
         let mut reasons = vec!["Configuration as given.".to_string()];
         reasons.extend(unused(&config));

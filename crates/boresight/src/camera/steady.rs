@@ -50,6 +50,10 @@ impl SteadyGround {
         on_ground.camera_motion = scan.camera_motion;
         on_ground.blind = scan.blind;
         on_ground.detections.clone_from(&scan.detections);
+        // Where the camera has not moved the image is the ground, to the last bit; and a velocity in the one is that on the other.
+        if !self.moved {
+            return;
+        }
         let (ground, motion) = self.way_to_ground();
         for d in &mut on_ground.detections {
             to_ground(d, &ground, motion.as_ref());

@@ -10,7 +10,7 @@ use crate::sensor::SensorConfig;
 use crate::track::TrackerConfig;
 use crate::vision::DetectorConfig;
 use crate::world::{World, WorldConfig};
-use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result};
+use crate::{ASSUMED_RATE_HZ, Error, ErrorKind, Result, SourceInfo};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -167,6 +167,11 @@ impl Config {
             Error::new(ErrorKind::NotFound, "the configuration cannot be read").at(path.display()).because(e).hint("`boresight config > my.toml` writes one with every key's default; each run leaves its own as config.toml")
         })?;
         Self::from_toml(&text, &path.display().to_string())
+    }
+
+    /// Fills in what the configuration leaves to the frames: their size as the field in which tracks are reported.
+    pub fn fill_in(&mut self, frames: &SourceInfo) {
+        self.tracker.field_px.get_or_insert([frames.width as f64, frames.height as f64]);
     }
 
     /// Checks every value.

@@ -107,7 +107,7 @@ pub struct TrackerConfig {
     pub coast_s: f64,
     /// It is kept for at least this many scans, whatever the frame rate; 1 or more.
     pub coast_scans: u32,
-    /// Width and height of the image, px, above 0: tracks whose estimate lies outside are not reported; everywhere if absent.
+    /// Width and height of the image, px, above 0: tracks whose estimate lies outside are not reported. Left out: the frames', in a run on frames; else everywhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field_px: Option<[f64; 2]>,
     /// Most tracks alive at a time; no track is started beyond (a guard of memory and time).

@@ -72,6 +72,8 @@ pub struct ScanTable {
     noise: Vec<Cov2>,
     /// Whether some detection was seen before the scan's time, and that counts.
     timed: bool,
+    /// Whether some detection comes with its velocity.
+    has_velocities: bool,
     /// Largest variances in the scan, px².
     max_xx: f64,
     max_yy: f64,
@@ -92,6 +94,7 @@ impl ScanTable {
     pub fn read(&mut self, scan: &Scan, scale: f64, extra_noise_px: f64, extra_per_height: f64) -> Result<()> {
         self.noise.clear();
         self.timed = scan.detections.iter().any(|d| d.age_ns > 0);
+        self.has_velocities = scan.detections.iter().any(|d| d.velocity.is_some());
         (self.max_xx, self.max_yy) = (0.0, 0.0);
         self.largest_half_px = [0.0; 2];
         for (i, d) in scan.detections.iter().enumerate() {
@@ -134,6 +137,12 @@ impl ScanTable {
     /// Takes all detections as seen at the scan's time: what counts frames, not seconds, knows no other.
     pub fn forget_ages(&mut self) {
         self.timed = false;
+    }
+
+    /// Whether some detection comes with its velocity, and that says whose it is: at the scan's time.
+    #[inline]
+    pub fn has_velocities(&self) -> bool {
+        self.has_velocities && !self.timed
     }
 
     /// Whether detections have times of their own.

@@ -191,4 +191,18 @@ mod tests {
             assert_eq!(reported, places.map(|(_, is_inside)| is_inside || field_px.is_none()));
         }
     }
+
+    #[test]
+    fn a_detection_with_its_velocity_starts_a_track_at_once_in_a_field_and_without() {
+        for field_px in [Some([640.0, 512.0]), None] {
+            let mut steady = Stabilised::new(Box::new(Tracker::new(&TrackerConfig::default()).unwrap()), field_px);
+            let mut first = scan(0, &[(30.0, 40.0)], None);
+            let velocity = Vector2::new(12.0, -3.0);
+            let (cov, with_position) = (Matrix2::identity(), Matrix2::zeros());
+            first.detections[0].velocity = Some(crate::DetectedVelocity { mean: velocity, cov, with_position });
+            let states = steady.step(&first).unwrap();
+            let mean = states.first().map(|s| s.kinematics.mean);
+            assert_eq!(mean.map(|m| [m[1], m[3]]), Some([12.0, -3.0]), "{field_px:?}");
+        }
+    }
 }

@@ -128,7 +128,10 @@ impl Tracker {
     fn predict_and_gate(&mut self, scan: &Scan, dt_s: f64) -> Result<()> {
         let Self { config, tracks, table, predicted, association, cost, gate, .. } = self;
         let context = Context { scan, table, config, gate: *gate, dt_s };
-        let plain = config.two_stage.is_none() && config.score_likelihood.is_none() && !config.association_cost.any();
+        let plain = config.two_stage.is_none()
+            && config.score_likelihood.is_none()
+            && !config.association_cost.any()
+            && !table.has_velocities();
         let survival = config.confirmation.survival(dt_s);
         predicted.clear();
         for (batch, tracks) in tracks.chunks_mut(BATCH).enumerate() {
@@ -236,16 +239,21 @@ impl Tracker {
         let n_still = tracks.iter().filter(|t| t.history.accepted && !t.reported).count();
         let scans_per_s = 1.0 / clock.interval.interval_s().max(1e-9);
         let density = config.confirmation.new_target_density_per_px2();
-        let new_per_s = config.field_px.zip(density).map(|([w, h], d)| d * w * h * scans_per_s);
+        let of_rule = config.field_px.zip(density).map(|([w, h], d)| d * w * h * scans_per_s);
+        let new_per_s = of_rule.or_else(|| lost.new_per_s(now));
         let stay = Stay { survival_per_s: config.confirmation.survival(1.0), new_per_s };
         let field = Field::new(config.field_px, config.max_speed_px_per_s, stay, [n_reported, n_still]);
         for k in 0..new.len() {
             let i = new[k] as usize;
-            tracks[i].identified = true;
+            let is_first = !std::mem::replace(&mut tracks[i].identified, true);
             let has_moved = is_reported(&states[i]);
             tracks[i].reported |= has_moved;
             let identity = lost.identify(&config.reidentification, tracks, i, has_moved, now, &field);
-            if !matches!(identity, Identity::New) {
+            if matches!(identity, Identity::New) {
+                if is_first {
+                    lost.note_new(now);
+                }
+            } else {
                 tracks[i].motion.pass();
                 tracks[i].reported = true;
                 renamed.push((states[i].id, TrackId(tracks[i].id)));

@@ -98,8 +98,11 @@ pub(in crate::track) fn gate_confirmed(
         } else {
             let detections = &context.scan.detections;
             let strong = |j: u32| detections[j as usize].score >= high;
+            let measure = stage.velocity_cost();
             let extra = |p: &Predicted, j: u32| {
-                cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j)
+                cost.cost(p.x, p.y, &t.appearance, &detections[j as usize])
+                    + context.score_cost(t, j)
+                    + context.velocity_cost(t, j, measure)
             };
             stage.add(first + k, t, p, context, strong, extra);
         }
@@ -181,7 +184,11 @@ fn add_later(
 ) {
     let (t, p, detections) = (&tracks[i], &predicted[i], &context.scan.detections);
     let free = |j: u32| !used[j as usize] && detections[j as usize].score >= min_score;
-    let extra =
-        |p: &Predicted, j: u32| cost.cost(p.x, p.y, &t.appearance, &detections[j as usize]) + context.score_cost(t, j);
+    let measure = stage.velocity_cost();
+    let extra = |p: &Predicted, j: u32| {
+        cost.cost(p.x, p.y, &t.appearance, &detections[j as usize])
+            + context.score_cost(t, j)
+            + context.velocity_cost(t, j, measure)
+    };
     stage.add(i, t, p, context, free, extra);
 }

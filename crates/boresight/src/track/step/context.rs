@@ -1,11 +1,14 @@
 //! What every part of a step reads and none changes: the scan, its table, the configuration.
 
 use super::super::config::TrackerConfig;
+use super::super::initiation::from_velocity;
 use super::super::scan_table::{Cov2, Predicted, ScanTable};
 use super::super::score_likelihood::LogScore;
 use super::super::single_track::Track;
+use super::gate::normalised_square;
 use crate::{Scan, Timestamp};
-use nalgebra::Vector2;
+use boresight_filters::Filter;
+use nalgebra::{Matrix2, Vector2};
 
 /// What every part of a step reads.
 #[derive(Clone, Copy)]
@@ -17,6 +20,15 @@ pub(in crate::track) struct Context<'a> {
     pub gate: f64,
     /// Time since the scan before, s.
     pub dt_s: f64,
+}
+
+/// What a velocity that does not fit costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::track) enum VelocityCost {
+    /// The square of its deviation, χ² with 2 degrees of freedom.
+    Square,
+    /// −2 ln of its density over that of clutter.
+    Likelihood,
 }
 
 impl Context<'_> {
@@ -44,6 +56,38 @@ impl Context<'_> {
             (Some(c), Some(score)) => -2.0 * c.target_density(track.log_score, track.history.misses > 0, score).ln(),
             _ => 0.0,
         }
+    }
+
+    /// −2 ln of how much likelier detection `j` moves as it does if it is the track's, whose filter stands at the scan, than if it is clutter, whose velocity is
+    /// anything up to the largest speed: N(v; v̂, S) π v² with v̂ and S given where it is. `d2` alone: the square of the deviation. 0 where a detection has no velocity.
+    pub fn velocity_cost(&self, track: &Track, j: u32, measure: VelocityCost) -> f64 {
+        let detection = &self.scan.detections[j as usize];
+        let Some(velocity) = detection.velocity.as_ref().filter(|_| self.table.has_velocities()) else { return 0.0 };
+        let belief = track.filter.kinematics();
+        let noise = self.table.noise(j);
+        let measured =
+            from_velocity(&detection.position, &noise.matrix(), velocity, self.config.detection_covariance_scale);
+        let (innovation, s) = (measured.mean - belief.mean, measured.cov + belief.cov);
+        let block = |rows: [usize; 2], columns: [usize; 2]| Matrix2::from_fn(|a, b| s[(rows[a], columns[b])]);
+        const PLACE: [usize; 2] = [0, 2];
+        const MOTION: [usize; 2] = [1, 3];
+        let at = |rows: [usize; 2]| Vector2::new(innovation[rows[0]], innovation[rows[1]]);
+        let Some(inverse) = block(PLACE, PLACE).try_inverse() else { return 0.0 };
+        let gain = block(MOTION, PLACE) * inverse;
+        let (left, given) = (at(MOTION) - gain * at(PLACE), block(MOTION, MOTION) - gain * block(PLACE, MOTION));
+        let d2 = normalised_square(&left, &given);
+        let cost = match measure {
+            VelocityCost::Square => d2,
+            VelocityCost::Likelihood => {
+                d2 + given.determinant().ln() - 2.0 * (0.5 * self.config.max_speed_px_per_s.powi(2)).ln()
+            }
+        };
+        if cost.is_finite() { cost } else { 0.0 }
+    }
+
+    /// What a pair may cost by its velocities: another gate of as many degrees of freedom.
+    pub fn velocity_budget(&self) -> f64 {
+        if self.table.has_velocities() { self.gate } else { 0.0 }
     }
 
     /// Likelihood ratio of detection `j`'s score for a target not known before the detection with the score `first`, if there is one; 1 where scores say

@@ -7,7 +7,7 @@ use super::super::clutter::Clutter;
 use super::super::scan_table::Predicted;
 use super::super::score_likelihood::ScanScores;
 use super::super::single_track::Track;
-use super::context::Context;
+use super::context::{Context, VelocityCost};
 use super::gate::gate_row;
 use super::plot_time::gate_row_by_time;
 use crate::Scan;
@@ -60,6 +60,11 @@ impl Stage {
         std::hint::black_box(sum);
     }
 
+    /// How its associator takes a velocity that does not fit.
+    pub fn velocity_cost(&self) -> VelocityCost {
+        if self.likelihood { VelocityCost::Likelihood } else { VelocityCost::Square }
+    }
+
     /// Begins a scan.
     pub fn begin(&mut self, scan: &Scan, clutter: &Clutter, scores: &ScanScores) {
         self.gates.reset(scan.detections.len(), clutter.density());
@@ -95,7 +100,7 @@ impl Stage {
             p_gate: config.gate_probability,
             // A hard choice is what the target would have chosen if it exists; whether it does is what its likelihood then tells.
             existence: if self.soft { config.confirmation.existence(&track.history) } else { 1.0 },
-            miss_cost: gate + self.cost_budget,
+            miss_cost: gate + self.cost_budget + context.velocity_budget(),
         });
     }
 

@@ -10,7 +10,7 @@ use super::super::merged_measurements::Part;
 use super::super::scan_table::{Cov2, Predicted};
 use super::super::single_track::{Outcome, Track};
 use super::associate::Association;
-use super::context::Context;
+use super::context::{Context, VelocityCost};
 use super::gate::{innovation_cov, normalised_square};
 use super::plot_time::{Carried, advance};
 use crate::associate::{Gates, Share};
@@ -96,12 +96,13 @@ fn hard(
     let detection = &context.scan.detections[share.detection as usize];
     let (position, noise) = context.measured(share.detection, predicted);
     let measurement = Measurement { position, cov: noise.matrix() };
+    let velocity = context.velocity_cost(track, share.detection, VelocityCost::Likelihood);
     if track.filter.update(&[Weighted { measurement, weight: 1.0 }]).is_err() {
         return missed;
     }
     let innovation = innovation_of(&position, predicted, &innovation_cov(predicted, &noise));
     let clutter = gates.clutter(share.detection);
-    let score = (-0.5 * context.score_cost(track, share.detection)).exp();
+    let score = (-0.5 * (context.score_cost(track, share.detection) + velocity)).exp();
     let density = score * (-0.5 * innovation.nis).exp() / (std::f64::consts::TAU * innovation.cov.determinant().sqrt());
     let log_score = context.table.scores.log_score(share.detection);
     track.follow(detection, context.age_ns(share.detection), &noise, log_score, context.config.appearance_gain);
