@@ -89,6 +89,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         out.put(&View { frame: None, scan: &scan, tracks: &frame.tracks })?;
     }
     Box::new(out).finish()?;
+    if done.n_cut > 0 {
+        say!(
+            "note: {} rows do not follow from the one before: their tracks were lost and found again there, or the camera moved; each part was smoothed by itself",
+            done.n_cut
+        );
+    }
     say!(
         "{} tracks, {} rows ({} filled in): median deviation of a position {:.3} -> {:.3} px: {}",
         done.n_tracks,

@@ -163,7 +163,9 @@ fn chain(
                 let both = fused(&ahead, &next.1.kinematics)?;
                 moved_to(&mut next.1, both);
             }
-            each_belief(&mut part, rows.first(), scans, |times, beliefs| smooth_track(times, beliefs, model))?;
+            each_belief(&mut part, rows.first(), scans, |times, beliefs| {
+                smooth_track(times, beliefs, model).map(|_| ())
+            })?;
         }
         part.append(&mut rows);
         rows = part;

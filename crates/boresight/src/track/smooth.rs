@@ -4,8 +4,11 @@
 //! `boresight_filters::smooth`. The rows of a tracker are filtered beliefs, which is all a smoother needs: measurements are
 //! not looked at again. Rows without velocity (tables from elsewhere) are positions: [`filter_track`] comes first.
 //! Symbols: state `[x, vx, y, vy]` (px, px/s). Model: constant velocity with white acceleration, as in the tracker.
+//! A row that does not follow from the one before ([`cut`]) begins a part of its own: a track that was lost and found again, or whose camera moved, is smoothed in between only.
 //! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
+
+mod cut;
 
 use super::filter::AccelerationNoise;
 use crate::validate::{check, not_negative};
@@ -74,16 +77,33 @@ impl SmoothConfig {
     }
 }
 
-/// Replaces the beliefs of one track, in the order of their times, by the smoothed ones.
+/// Replaces the beliefs of one track, in the order of their times, by the smoothed ones; each part by itself where a row does not follow from the one before. Returns the number of parts.
 /// # Errors
 /// Times that do not ascend; a covariance that cannot be factored.
-pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &SmoothConfig) -> Result<()> {
+pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &SmoothConfig) -> Result<usize> {
     config.validate("smooth")?;
-    let model = config.model()?;
     let mut scans = scans_of(times, beliefs)?;
+    let (mut first, mut n_parts) = (0, 0);
+    while first < scans.len() {
+        let mut end = first + 1;
+        while end < scans.len() && cut::follows(&predict(&beliefs[end - 1], scans[end].dt_s, config)?, &beliefs[end]) {
+            end += 1;
+        }
+        smooth_part(&mut scans[first..end], config)?;
+        (first, n_parts) = (end, n_parts + 1);
+    }
+    for (belief, scan) in beliefs.iter_mut().zip(&scans) {
+        *belief = scan.belief;
+    }
+    Ok(n_parts)
+}
+
+/// Smooths rows each of which follows from the one before.
+fn smooth_part(scans: &mut [Filtered<4>], config: &SmoothConfig) -> Result<()> {
+    let model = config.model()?;
     match config.method {
-        SmoothMethod::Rts => rts(&model, &mut scans)?,
-        SmoothMethod::SquareRoot => rts_square_root(&model, &mut scans)?,
+        SmoothMethod::Rts => rts(&model, scans)?,
+        SmoothMethod::SquareRoot => rts_square_root(&model, scans)?,
         SmoothMethod::FixedLag(lag) => {
             // Row k is overwritten only after all rows before it have been told of it.
             for k in 0..scans.len() {
@@ -95,9 +115,6 @@ pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &S
                 scans[k].belief = smoothed;
             }
         }
-    }
-    for (belief, scan) in beliefs.iter_mut().zip(&scans) {
-        *belief = scan.belief;
     }
     Ok(())
 }
@@ -195,7 +212,8 @@ mod tests {
             let (times, rows, truth) = run(seed);
             let mut beliefs = rows.clone();
             filter_track(&times, &mut beliefs, 60.0, &config(SmoothMethod::Rts)).unwrap();
-            smooth_track(&times, &mut beliefs, &config(SmoothMethod::Rts)).unwrap();
+            let n_parts = smooth_track(&times, &mut beliefs, &config(SmoothMethod::Rts)).unwrap();
+            assert_eq!(n_parts, 1, "seed {seed}");
             for k in [30, 60, 90] {
                 raw += (rows[k].mean - truth[k]).component_mul(&Vector4::new(1.0, 0.0, 1.0, 0.0)).norm_squared();
                 let e = beliefs[k].mean - truth[k];
@@ -239,6 +257,36 @@ mod tests {
         let ahead = predict(&filtered[40], 0.04, &config).unwrap();
         assert!((ahead.mean[0] - truth[41][0]).abs() < 4.0 * ahead.cov[(0, 0)].sqrt());
         assert!(predict(&filtered[40], f64::NAN, &config).is_err());
+    }
+
+    #[test]
+    fn where_a_track_was_begun_anew_neither_part_tells_of_the_other() {
+        // Lost at row 60 and begun anew by the next two detections, 20 px off; and as an image's coordinates move with a camera, by 6 px once.
+        for (jump_px, is_restart) in [(20.0, true), (6.0, false)] {
+            let (times, mut rows, _) = run(5);
+            rows[60..].iter_mut().for_each(|r| r.mean[0] += jump_px);
+            let config = config(SmoothMethod::Rts);
+            let filter = |part: std::ops::Range<usize>| {
+                let mut beliefs = rows[part.clone()].to_vec();
+                filter_track(&times[part], &mut beliefs, 60.0, &config).unwrap();
+                beliefs
+            };
+            let [before, behind] = if is_restart {
+                [filter(0..60), filter(60..120)]
+            } else {
+                let (_, still, _) = run(5);
+                let mut all = still;
+                filter_track(&times, &mut all, 60.0, &config).unwrap();
+                all[60..].iter_mut().for_each(|b| b.mean[0] += jump_px);
+                [all[..60].to_vec(), all[60..].to_vec()]
+            };
+            let mut whole = [before.clone(), behind.clone()].concat();
+            let n_parts = smooth_track(&times, &mut whole, &config).unwrap();
+            let (mut first, mut second) = (before, behind);
+            smooth_track(&times[..60], &mut first, &config).unwrap();
+            smooth_track(&times[60..], &mut second, &config).unwrap();
+            assert_eq!((n_parts, whole), (2, [first, second].concat()), "by {jump_px} px");
+        }
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct SmoothedTable {
     pub n_rows: usize,
     /// Number of rows filled in.
     pub n_filled: usize,
+    /// Number of rows that do not follow from the one before of their track, and begin a part that is smoothed by itself.
+    pub n_cut: usize,
     /// Median over the rows of the standard deviation of a position before smoothing, mean of both axes, px.
     pub median_std_before_px: f64,
     /// The same afterwards, px.
@@ -50,17 +52,24 @@ pub fn smooth_table(
     for (id, rows) in &mut tracks {
         // The filter's noise follows from the box with which the track began.
         let config = &config.of_height(rows.first().map_or(0.0, |r| r.2.extent.height_px));
+        let mut n_cut = 0;
         let mut one = || -> Result<usize> {
             if let Some(std) = speed_std_px_per_s {
                 each_belief(rows, |times, beliefs| filter_track(times, beliefs, std, config))?;
             }
             let n_filled = if fill_gaps { fill(rows, frames, config)? } else { 0 };
             stds[0].extend(rows.iter().map(|r| position_std_px(&r.2)));
-            each_belief(rows, |times, beliefs| smooth_track(times, beliefs, config))?;
+            let mut n_parts = 0;
+            each_belief(rows, |times, beliefs| {
+                n_parts = smooth_track(times, beliefs, config)?;
+                Ok(())
+            })?;
+            n_cut = n_parts.saturating_sub(1);
             stds[1].extend(rows.iter().map(|r| position_std_px(&r.2)));
             Ok(n_filled)
         };
         out.n_filled += one().map_err(|e| e.at(format!("track {id}")))?;
+        out.n_cut += n_cut;
         out.n_rows += rows.len();
         for (index, time, state) in rows.drain(..) {
             let frame = smoothed.entry(index).or_insert(TrackFrame { index, time, tracks: Vec::new() });
