@@ -9,6 +9,7 @@ use super::evidence::Evidence;
 use super::ground::Ground;
 use super::looks;
 use super::spread::spread;
+use super::value_step::value_step;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
@@ -29,6 +30,9 @@ const MOST_SPREAD: f64 = 3.0;
 /// Area of a cell where none was seen, px.
 const ASSUMED_AREA_PX: f64 = 400.0;
 
+/// Least height of a cell's pixels above the ground, steps of their values.
+const LEAST_STEPS: f64 = 2.5;
+
 /// What was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
@@ -36,13 +40,15 @@ pub struct Cells {
     pub per_frame: f64,
     /// Their median area, px.
     pub area_px: f64,
+    /// Step of the pixels' values, counts.
+    pub step: f64,
 }
 
 /// The detector, with a least area that lets everything but specks through.
-fn detector(info: &SourceInfo, min_area_px: u32) -> DetectorConfig {
+fn detector(info: &SourceInfo, min_area_px: u32, step: f64) -> DetectorConfig {
     // One cell of the background's grid holds the whole frame.
     let cell_px = info.width.max(info.height).clamp(4, 4096) as u32;
-    let local = LocalConfig { k: 5.0, polarity: Polarity::Bright, cell_px, min_contrast: 2.5 };
+    let local = LocalConfig { k: 5.0, polarity: Polarity::Bright, cell_px, min_contrast: round(LEAST_STEPS * step) };
     let mut config = DetectorConfig {
         filter: SpatialConfig::Mean(WindowConfig { size: 5, ..WindowConfig::default() }),
         threshold: ThresholdConfig::Local(local),
@@ -76,7 +82,8 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(C
     let pixels = (info.width * info.height) as f64;
     // A thing of less than 10 px across is a spot, not a cell.
     let specks = 60;
-    let scans = looks::scans(&detector(info, specks), spread(frames, LOOKS), info, n_threads)?;
+    let step = value_step(frames);
+    let scans = looks::scans(&detector(info, specks, step), spread(frames, LOOKS), info, n_threads)?;
     let (mut areas, mut compact, mut all, mut looks) = (Vec::new(), 0.0, 0.0, 0usize);
     for scan in &scans {
         looks += 1;
@@ -98,7 +105,7 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(C
         && compact >= COMPACT_SHARE * all
         && at(0.75) <= MOST_SPREAD * at(0.25);
     let area_px = if areas.is_empty() { ASSUMED_AREA_PX } else { at(0.5) };
-    Ok((Cells { per_frame, area_px }, fits))
+    Ok((Cells { per_frame, area_px, step }, fits))
 }
 
 /// The chains of the pieces that would be detected, in the frames at these places; `ground` is the first one's in each.
@@ -112,7 +119,8 @@ pub fn chains(
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Evidence> {
-    let scans = looks::scans(&detector(info, least_area(cells)), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+    let detector = detector(info, least_area(cells), cells.step);
+    let scans = looks::scans(&detector, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     Ok(Evidence::of_looks(&scans, places, ground, info))
 }
 
@@ -130,7 +138,7 @@ pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut
          smoothed frame's median is detected, in pieces of {least} px or more.",
         cells.per_frame
     ));
-    config.detector = detector(info, least);
+    config.detector = detector(info, least, cells.step);
     let tracker = &mut config.tracker;
     *tracker = TrackerConfig::default();
     tracker.extra_noise_px = round((0.03 * side).max(0.5));

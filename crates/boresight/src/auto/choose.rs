@@ -163,10 +163,11 @@ pub(super) fn choose_looked(
             Some(seen) => {
                 let places = growing(frames.len());
                 let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
+                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such, or where none does while something else moves: stars, lamps.
                 let alone = &evidence.bright.chains;
                 let most_move = 2.0 * alone.moving.len() as f64 > seen.per_frame;
-                Some(seen).filter(|_| !(most_move && alone.is_surely_more_than(&own)))
+                let all_stand = own.moving.is_empty();
+                Some(seen).filter(|_| !((most_move || all_stand) && alone.is_surely_more_than(&own)))
             }
             None => None,
         };

@@ -49,6 +49,7 @@ mod spots;
 mod spread;
 mod steadied;
 mod summed;
+mod value_step;
 mod whole_tracks;
 
 pub use crate::io::Replay;

@@ -7,6 +7,7 @@ use super::digits::round;
 use super::looks;
 use super::scene::{Camera, Scene};
 use super::spread::spread;
+use super::value_step::value_step;
 use crate::camera::CameraConfig;
 use crate::track::TrackerConfig;
 use crate::vision::config::DetectorConfig;
@@ -46,6 +47,8 @@ pub struct Particles {
     pub per_frame: f64,
     /// Median width at half height, px.
     pub width_px: f64,
+    /// Step of the pixels' values, counts: the least response.
+    pub step: f64,
 }
 
 /// Particles, if the frames are full of them.
@@ -64,7 +67,8 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Particles, bool)> {
-    let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX };
+    let step = value_step(frames);
+    let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX, step };
     let (mut best, mut most, mut counts): (Option<Particles>, Particles, [f64; 2]) = (None, none, [0.0; 2]);
     for (polarity, count) in [Polarity::Bright, Polarity::Dark].into_iter().zip(&mut counts) {
         let isolated =
@@ -90,7 +94,7 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(P
         let at = |share: f64| widths.get((share * widths.len() as f64) as usize).copied().unwrap_or(0.0);
         let width_px = at(0.5);
         let alike = at(0.75) <= MOST_SPREAD * at(0.25);
-        let seen = Particles { polarity, per_frame, width_px };
+        let seen = Particles { polarity, per_frame, width_px, step };
         if everywhere && alike && per_frame >= LEAST && best.is_none_or(|b| per_frame > b.per_frame) {
             best = Some(seen);
         }
@@ -133,7 +137,7 @@ pub fn configure(
         size_px,
         k: round(threshold(particles, size_px, info)),
         polarity: particles.polarity,
-        min_contrast: 1.0,
+        min_contrast: round(particles.step),
         surround: 1.0,
         smooth_px: Some(round((0.27 * size_px).max(1.0))),
     };

@@ -16,6 +16,8 @@ use crate::{Config, Frame, Result, Scan, SourceInfo};
 const SURE: f64 = 8.0;
 /// More sure blobs a frame than this are particles or cells.
 const MANY: f64 = 15.0;
+/// Where fewer of them move, surely, they are what something moves before: one of ten.
+const FEW_MOVE: f64 = 0.1;
 /// Targets with a longer side than this are large, px.
 const LARGE_PX: f64 = 24.0;
 /// How much the velocity of a target changes within one second before anything of it was measured, as a share of the largest speed.
@@ -209,7 +211,9 @@ pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reason
         MergedMeasurementsConfig { max_secondary_s: tracker.coast_s, ..MergedMeasurementsConfig::default() };
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.min_initiation_score = INITIATION_SCORE;
-    if per_frame > MANY {
+    let n_moving = evidence.bright.chains.moving.len() + evidence.dark.chains.moving.len();
+    let few_move = evidence.moves() && (n_moving as f64) < FEW_MOVE * per_frame;
+    if per_frame > MANY && !few_move {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
         );
@@ -217,6 +221,9 @@ pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reason
         return;
     }
     tracker.report = Report::Moving;
+    if per_frame > MANY {
+        reasons.push(format!("Of so many {n_moving} move and the others stand: stars or lamps before which something moves, no particles."));
+    }
     reasons.push(
         "A track is reported once it has moved farther than its covariance, the camera's motion and the wander of its outline explain: what stands \
          still is taken for scenery. Report that too with --set tracker.report=all."
