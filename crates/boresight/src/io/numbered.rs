@@ -1,7 +1,7 @@
 //! Numbers in the names of a sequence's files: where frames are missing, the frames behind the hole have later numbers and times.
 //!
 //! Source: our own. Names that differ in one number only, which rises by the same step nearly everywhere, are numbered frames;
-//! a rise by several steps is a hole. Names of any other form, or with more holes than frames, say nothing.
+//! a rise by several steps is a hole. Names of any other form, or with more holes than frames, say nothing, nor do clock times, which rise by 41 from one minute to the next.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -30,6 +30,9 @@ impl Numbering {
 /// Finds holes in the numbering of files in natural order; `None` if there are none, or no numbering.
 pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
     let numbers = numbers(files)?;
+    if are_clock_times(files, &numbers) {
+        return None;
+    }
     let rises: Vec<u64> = numbers.windows(2).map(|w| w[1] - w[0]).collect();
     let step = *rises.iter().min()?;
     if rises.iter().any(|r| r % step != 0) || rises.iter().filter(|r| **r == step).count() * 2 < rises.len() {
@@ -39,6 +42,19 @@ pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
     let n_missing = places.last()? + 1 - places.len() as u64;
     let at = rises.iter().position(|r| *r > step)?;
     (n_missing <= places.len() as u64).then_some(Numbering { places, n_missing, first_hole: (at, at + 1) })
+}
+
+/// Whether the numbers are written as clock times, hhmmss or behind a date, and some of them follow each other in seconds and not as numbers.
+fn are_clock_times(files: &[PathBuf], numbers: &[u64]) -> bool {
+    let n_digits = |f: &PathBuf| split(&f.file_stem()?.to_string_lossy()).map(|(_, digits, _)| digits.len());
+    let seconds = |n: &u64| {
+        let [s, m, h] = [n % 100, n / 100 % 100, n / 10_000 % 100];
+        (s < 60 && m < 60 && h < 24).then_some(s + 60 * (m + 60 * h))
+    };
+    let Some(times) = numbers.iter().map(seconds).collect::<Option<Vec<u64>>>() else { return false };
+    let is_written_so = files.iter().all(|f| matches!(n_digits(f), Some(6 | 14)));
+    let turns = times.windows(2).zip(numbers.windows(2)).any(|(t, n)| t[1].wrapping_sub(t[0]) < n[1] - n[0]);
+    is_written_so && turns
 }
 
 /// The numbers of files in natural order, which must rise; `None` for names of any other form.
@@ -108,6 +124,14 @@ mod tests {
         assert_eq!(of(&["f1.png", "f2.tif", "f2.png", "f4.png"]), None, "a number twice");
         assert_eq!(of(&["f1.png", "f4.png", "f6.png", "f11.png"]), None, "times in the names");
         assert_eq!(of(&["a.png", "b.png"]), None);
+        assert_eq!(of(&["c_235857.png", "c_235858.png", "c_235859.png", "c_235900.png"]), None, "clock times");
+        let dated = ["20261126105958.png", "20261126105959.png", "20261126110000.png", "20261126110001.png"];
+        assert_eq!(of(&dated), None, "with a date");
+        assert_eq!(
+            of(&["t000057.png", "t000058.png", "t000061.png"]).map(|n| n.n_missing),
+            Some(2),
+            "no minute has 61"
+        );
         assert_eq!(of(&["99999999999999999999999.png", "3.png"]), None);
         assert_eq!(of(&[]), None);
     }

@@ -70,9 +70,10 @@ pub(crate) fn push_seconds(out: &mut String, time: Timestamp) {
     }
 }
 
-/// Reads seconds exactly to the nanosecond where they are written as plain decimals, else through f64.
-pub(crate) fn parse_seconds(text: &str) -> Option<Timestamp> {
-    let text = text.trim();
+/// Reads seconds exactly to the nanosecond where they are written as plain decimals, else through f64; with `decimal_comma` a comma may stand for the point.
+pub(crate) fn parse_seconds(text: &str, decimal_comma: bool) -> Option<Timestamp> {
+    let point = if decimal_comma { text.replacen(',', ".", 1) } else { text.to_string() };
+    let text = point.trim();
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
         None => (false, text),
@@ -151,7 +152,7 @@ mod tests {
         fn times_read_back_to_the_same_nanosecond(ns in -999_999_999_999_999_999i64..999_999_999_999_999_999) {
             let mut s = String::new();
             push_seconds(&mut s, Timestamp::from_ns(ns));
-            prop_assert_eq!(parse_seconds(&s), Some(Timestamp::from_ns(ns)));
+            prop_assert_eq!(parse_seconds(&s, false), Some(Timestamp::from_ns(ns)));
         }
     }
 }

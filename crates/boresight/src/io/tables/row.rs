@@ -156,7 +156,7 @@ impl<'t> Row<'t> {
     pub fn time(&self) -> Result<Option<Timestamp>> {
         let Some(word) = self.word(Field::TimeS) else { return Ok(None) };
         let (time, expected) = match self.form.layout.time_scale {
-            None => (parse_seconds(&word), "a time in seconds"),
+            None => (parse_seconds(&word, self.form.separator != Separator::Byte(b',')), "a time in seconds"),
             Some(scale) => (timestamp_of_seconds(self.need(Field::TimeS)? * scale), "a time within 292 years"),
         };
         time.map(Some).ok_or_else(|| self.wrong(Field::TimeS, &word, expected))
