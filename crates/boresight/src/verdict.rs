@@ -7,7 +7,7 @@
 //! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
 
 use crate::pipeline::Summary;
-use crate::track::{ConfirmationConfig, Report};
+use crate::track::{ConfirmationConfig, Report, TrackerConfig};
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Result, Sink, TrackStatus, View};
 use nalgebra::Vector2;
@@ -29,6 +29,13 @@ const RIGHT_NIS: [f64; 2] = [1.6, 2.4];
 const WHITE: f64 = 0.2;
 /// A background is known from a run at least so many times as long as the time it is learnt in: then what stays in its place for half of that time is seen to come or go.
 const LEAST_STARTS: f64 = 2.0;
+/// Share of the detections that start tracks below which that is why there is none.
+const FEW_START: f64 = 0.05;
+/// Share of them that is proposed to start some: three of four.
+const STARTING: f64 = 0.75;
+/// Scores are counted in so many steps to the double, from a sixteenth on.
+const STEPS_TO_DOUBLE: f32 = 8.0;
+const N_STEPS: usize = 128;
 /// Fewer innovations say nothing.
 const LEAST_NIS: u64 = 50;
 
@@ -60,6 +67,45 @@ pub struct Observed {
     products: f64,
     squares: f64,
     n_products: u64,
+    scores: Scores,
+}
+
+/// How many detections have which score.
+#[derive(Clone, Debug)]
+struct Scores([u64; N_STEPS]);
+
+impl Default for Scores {
+    fn default() -> Self {
+        Self([0; N_STEPS])
+    }
+}
+
+impl Scores {
+    fn put(&mut self, score: f32) {
+        let step = STEPS_TO_DOUBLE * (score.max(f32::MIN_POSITIVE).log2() + 4.0);
+        self.0[(step.max(0.0) as usize).min(N_STEPS - 1)] += 1;
+    }
+
+    /// Share of detections that score as much, to a step.
+    fn share_from(&self, score: f64) -> f64 {
+        let (mut from, mut all) = (0, 0);
+        for (k, n) in self.0.iter().enumerate() {
+            all += n;
+            from += if Self::ends_at(k) > score { *n } else { 0 };
+        }
+        from as f64 / (all as f64).max(1.0)
+    }
+
+    /// The score that this share of them reaches, to a step.
+    fn reached_by(&self, share: f64) -> f64 {
+        let most = (0..N_STEPS).rev().map(|k| Self::ends_at(k) / 2f64.powf(1.0 / f64::from(STEPS_TO_DOUBLE)));
+        most.into_iter().find(|score| self.share_from(*score * (1.0 + 1e-9)) >= share).unwrap_or(0.0)
+    }
+
+    /// The score at which a step ends.
+    fn ends_at(k: usize) -> f64 {
+        2f64.powf((k + 1) as f64 / f64::from(STEPS_TO_DOUBLE) - 4.0)
+    }
 }
 
 /// What is thought of a run.
@@ -95,6 +141,7 @@ impl Observed {
         let now = view.scan.time.ns;
         self.frames += 1;
         let frame_px2 = self.frame_px2;
+        view.scan.detections.iter().for_each(|d| self.scores.put(d.score));
         let mut is_there = false;
         for t in view.tracks {
             let life = self.lives.entry(t.id.0).or_default();
@@ -172,6 +219,17 @@ impl Observed {
                     Some("--set tracker.report=all".to_string()),
                 );
             }
+            let least = config.tracker.min_initiation_score;
+            let starting = all.scores.share_from(least);
+            if least > 0.0 && starting < FEW_START {
+                return doubt(
+                    format!(
+                        "no track: of {per_frame:.2} detections a frame {:.0} % have the score of {least} from which on one starts a track.",
+                        100.0 * starting,
+                    ),
+                    Some(format!("--set tracker.min-initiation-score={:.1}", all.scores.reached_by(STARTING))),
+                );
+            }
             let next = match &config.tracker.confirmation {
                 ConfirmationConfig::Existence(_) => "--false-tracks-per-hour 1000".to_string(),
                 _ => format!("--set tracker.max-speed-px-per-s={}", 2.0 * config.tracker.max_speed_px_per_s),
@@ -202,14 +260,13 @@ impl Observed {
             );
         }
         if let Some(nis) = nis.filter(|n| !(HONEST_NIS[0]..=HONEST_NIS[1]).contains(n)) {
-            let scale = config.tracker.detection_covariance_scale * nis / 2.0;
             let words = if nis > 2.0 { "too small" } else { "too large" };
             return doubt(
                 format!(
                     "{}, but the stated covariances are {words}: mean NIS {nis:.2}, 2 is honest.",
                     self.found(mean_s, summary)
                 ),
-                Some(format!("--set tracker.detection-covariance-scale={scale:.3}")),
+                Some(noise_scaled(&config.tracker, nis / 2.0)),
             );
         }
         if let ThresholdConfig::Moving(background) = &config.detector.threshold
@@ -307,6 +364,22 @@ fn another_detector(config: &Config) -> Option<String> {
 /// A number with its thing, in the plural where it is not one.
 fn counted(n: u64, thing: &str) -> String {
     format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The options that multiply the covariance of every measurement by that factor: what the detector states and what is added to it, if that is more than nothing.
+fn noise_scaled(tracker: &TrackerConfig, factor: f64) -> String {
+    const NOTHING: f64 = 1e-3;
+    let digits = |v: f64| if v < 0.1 { format!("{v:.2e}") } else { format!("{v:.3}") };
+    let mut options =
+        format!("--set tracker.detection-covariance-scale={}", digits(tracker.detection_covariance_scale * factor));
+    for (key, std) in
+        [("extra-noise-px", tracker.extra_noise_px), ("extra-noise-per-height", tracker.extra_noise_per_height)]
+    {
+        if std > NOTHING {
+            options += &format!(" --set tracker.{key}={}", digits(std * factor.sqrt()));
+        }
+    }
+    options
 }
 
 #[cfg(test)]

@@ -10,8 +10,17 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Takes the name of a format, for the name of its file.
 pub fn file_name() -> impl TypedValueParser<Value = &'static str> {
-    PossibleValuesParser::new(FORMATS.map(|(format, _)| format.name()))
-        .try_map(|name| FORMATS.iter().find(|(f, _)| f.name() == name).map(|(_, file)| *file).ok_or("no such format"))
+    PossibleValuesParser::new(FORMATS.map(|(format, _)| format.name())).try_map(|name| {
+        let of_name = FORMATS.iter().find(|(f, _)| f.name() == name);
+        let is_built = |format| cfg!(feature = "parquet") || !matches!(format, Format::Parquet);
+        match of_name {
+            Some((format, file)) if is_built(*format) => Ok(*file),
+            Some(_) => {
+                Err("this build writes no Parquet: cargo install --path crates/boresight-cli --features parquet")
+            }
+            None => Err("no such format"),
+        }
+    })
 }
 
 /// Writes the files among `names` and says what they cannot hold; what could not be written is returned. `size_px`: width and height of the frames.

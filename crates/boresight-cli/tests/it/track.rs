@@ -215,12 +215,13 @@ fn a_run_that_finds_nothing_says_so_and_names_the_next_command() {
     let said = stderr(&out);
     assert!(out.status.success() && said.contains("\nverdict: doubtful: no track: "), "{said}");
     let next = said.lines().find_map(|l| l.strip_prefix("try next: boresight ")).expect(&said);
-    assert!(next.ends_with(" --false-tracks-per-hour 1000") && next.contains("it'\\''s here'"), "{next}");
+    let (_, score) = next.rsplit_once(" --set tracker.min-initiation-score=").expect(next);
+    assert!(next.contains("it'\\''s here'") && score.parse::<f64>().is_ok_and(|s| s > 0.0 && s < 100.0), "{next}");
     let report = std::fs::read_to_string(folder.join("report.html")).unwrap();
-    assert!(report.contains("Doubtful: ") && report.contains("--false-tracks-per-hour 1000"));
+    assert!(report.contains("Doubtful: ") && report.contains(&format!("min-initiation-score={score}")));
     // What it names is a command that runs.
     let again = boresight()
-        .args(["track", "--no-video", "--no-report", "--false-tracks-per-hour", "1000", "-o"])
+        .args(["track", "--no-video", "--no-report", "--set", &format!("tracker.min-initiation-score={score}"), "-o"])
         .arg(&folder)
         .arg(clip())
         .output()

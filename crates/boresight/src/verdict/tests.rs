@@ -73,9 +73,10 @@ fn each_way_to_fail_is_told_with_what_to_try() {
     doubted(run(&all, 1, |k| vec![(k / 5, true, 5.0, 2.0)]), "20 tracks of 0.40 s", "--detector moving");
     let in_pieces = |k| if k % 5 < 3 { vec![(k / 50, true, 5.0, 2.0)] } else { vec![] };
     doubted(run(&all, 1, in_pieces), "2 tracks in 20 pieces of 0.20 s", "--detector moving");
-    let scale = "--set tracker.detection-covariance-scale=14.000";
+    let scale = "--set tracker.detection-covariance-scale=14.000 --set tracker.extra-noise-px=1.122";
     doubted(run(&all, 1, |_| vec![(1, true, 5.0, 28.0)]), "too small: mean NIS 28.00", scale);
-    doubted(run(&all, 1, |_| vec![(1, true, 5.0, 0.5)]), "too large", "--set tracker.detection-covariance-scale=0.250");
+    let scale = "--set tracker.detection-covariance-scale=0.250 --set tracker.extra-noise-px=0.150";
+    doubted(run(&all, 1, |_| vec![(1, true, 5.0, 0.5)]), "too large", scale);
 }
 
 #[test]
@@ -149,4 +150,18 @@ fn what_is_kept_does_not_grow_with_the_run() {
         seen.put(&View { frame: None, scan: &Scan::default(), tracks: &[state(k)] });
     }
     assert_eq!((seen.lives.len(), seen.ended), (1, 9999));
+}
+
+#[test]
+fn detections_too_faint_to_start_a_track_are_named_as_the_cause() {
+    // They score 1 each.
+    let mut config = isolated(Report::All);
+    config.tracker.min_initiation_score = 6.0;
+    let v = run(&config, 3, |_| vec![]);
+    assert!(v.is_doubtful && v.sentence.contains("0 % have the score of 6"), "{v:?}");
+    assert_eq!(v.next.as_deref(), Some("--set tracker.min-initiation-score=1.0"));
+    let mut scores = Scores::default();
+    (1..=100).for_each(|k| scores.put(k as f32 * 0.1));
+    assert!((scores.reached_by(0.75) / 2.5 - 1.0).abs() < 0.1, "{}", scores.reached_by(0.75));
+    assert!((scores.share_from(5.0) - 0.5).abs() < 0.05, "{}", scores.share_from(5.0));
 }
