@@ -36,7 +36,9 @@ pub fn scene(n_frames: u64, rate_hz: f64) -> SceneConfig {
 }
 
 pub fn config() -> Config {
-    let text = "[detector.threshold.band]\nlow = 120\nhigh = 180\n[detector.cluster]\nmin-area-px = 25\n[tracker]\ncoast-s = 0.6\n";
+    // Every track has a number of its own, so that what begins and ends can be counted.
+    let text = "[detector.threshold.band]\nlow = 120\nhigh = 180\n[detector.cluster]\nmin-area-px = 25\n[tracker]\ncoast-s = 0.6\nfield-px = [160, 120]\n\
+                [tracker.reidentification]\nmax-gap-s = 0\n";
     Config::from_toml(text, "test").unwrap()
 }
 

@@ -263,6 +263,26 @@ mod tests {
     }
 
     #[test]
+    fn the_frames_fill_in_their_size_where_no_field_is_said() {
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: 320,
+            height: 256,
+            kind: crate::PixelKind::Gray8,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        let mut config = Config::default();
+        config.fill_in(&info);
+        assert_eq!(config.tracker.field_px, Some([320.0, 256.0]));
+        config.tracker.field_px = Some([9.0, 8.0]);
+        config.fill_in(&info);
+        assert_eq!(config.tracker.field_px, Some([9.0, 8.0]), "what is said holds");
+    }
+
+    #[test]
     fn a_misspelt_key_is_named_with_its_line() {
         let e = Config::from_toml("[tracker]\ngate_probability = 0.9\n", "my.toml").unwrap_err().to_string();
         assert!(e.starts_with("my.toml: ") && e.contains("line 2") && e.contains("gate-probability"), "{e}");

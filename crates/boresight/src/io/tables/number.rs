@@ -100,6 +100,13 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
+    fn a_time_may_have_a_decimal_comma_where_the_table_has_another_separator() {
+        assert_eq!(parse_seconds(" 1,04", true), Some(Timestamp::from_ns(1_040_000_000)));
+        assert_eq!(parse_seconds("-0.04", true), Some(Timestamp::from_ns(-40_000_000)));
+        assert_eq!([parse_seconds("1,04", false), parse_seconds("1,0,4", true)], [None; 2]);
+    }
+
+    #[test]
     fn extreme_numbers_stay_short() {
         let text = |v| {
             let mut s = String::new();

@@ -22,6 +22,9 @@ pub(in crate::track) struct Context<'a> {
     pub dt_s: f64,
 }
 
+/// Share of the velocities that say nothing, since the target turned while they were measured: a pair that fits but for its velocity is still made where there is no other.
+const ODD_VELOCITIES: f64 = 0.01;
+
 /// What a velocity that does not fit costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::track) enum VelocityCost {
@@ -59,7 +62,7 @@ impl Context<'_> {
     }
 
     /// −2 ln of how much likelier detection `j` moves as it does if it is the track's, whose filter stands at the scan, than if it is clutter, whose velocity is
-    /// anything up to the largest speed: N(v; v̂, S) π v² with v̂ and S given where it is. `d2` alone: the square of the deviation. 0 where a detection has no velocity.
+    /// anything up to the largest speed: N(v; v̂, S) π v² with v̂ and S given where it is, but for [`ODD_VELOCITIES`]. 0 where a detection has no velocity.
     pub fn velocity_cost(&self, track: &Track, j: u32, measure: VelocityCost) -> f64 {
         let detection = &self.scan.detections[j as usize];
         let Some(velocity) = detection.velocity.as_ref().filter(|_| self.table.has_velocities()) else { return 0.0 };
@@ -77,9 +80,10 @@ impl Context<'_> {
         let (left, given) = (at(MOTION) - gain * at(PLACE), block(MOTION, MOTION) - gain * block(PLACE, MOTION));
         let d2 = normalised_square(&left, &given);
         let cost = match measure {
-            VelocityCost::Square => d2,
+            VelocityCost::Square => d2.min(-2.0 * ODD_VELOCITIES.ln()),
             VelocityCost::Likelihood => {
-                d2 + given.determinant().ln() - 2.0 * (0.5 * self.config.max_speed_px_per_s.powi(2)).ln()
+                let cost = d2 + given.determinant().ln() - 2.0 * (0.5 * self.config.max_speed_px_per_s.powi(2)).ln();
+                -2.0 * ((1.0 - ODD_VELOCITIES) * (-0.5 * cost).exp() + ODD_VELOCITIES).ln()
             }
         };
         if cost.is_finite() { cost } else { 0.0 }
@@ -104,5 +108,44 @@ impl Context<'_> {
     /// Least score of a detection that may initiate a track or is assigned first: −∞ without the two-stage rule.
     pub fn high_score(&self) -> f32 {
         self.config.two_stage.as_ref().map_or(f32::NEG_INFINITY, |c| c.high_score)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::track::{Tracker, TrackerConfig, Tracking};
+    use crate::{DetectedVelocity, Detection, FrameIndex, Scan, Timestamp, TrackId};
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn where_two_meet_their_velocities_tell_whose_a_detection_is() {
+        // They meet after two seconds, and noise has each where the other one is.
+        let ids = |has_velocity: bool| {
+            let mut tracker = Tracker::new(&TrackerConfig::default()).unwrap();
+            let mut seen = Vec::new();
+            for k in 0..=4 {
+                let t = f64::from(k);
+                let mut places = [(20.0 + 10.0 * t, 50.0, 10.0), (60.0 - 10.0 * t, 50.6, -10.0)];
+                if k == 2 {
+                    (places[0].1, places[1].1) = (50.6, 50.0);
+                }
+                let detection = |(x, y, v): (f64, f64, f64)| {
+                    let mut d = Detection::at(Vector2::new(x, y), Matrix2::identity() * 0.05);
+                    let (cov, with_position) = (Matrix2::identity() * 0.1, Matrix2::zeros());
+                    // The first ones tell it in either case, so that tracks are as sure.
+                    let tells = has_velocity || k == 0;
+                    d.velocity = tells.then(|| DetectedVelocity { mean: Vector2::new(v, 0.0), cov, with_position });
+                    d
+                };
+                let scan = Scan::at(FrameIndex(k as u64), Timestamp::from_secs_f64(t));
+                let states = tracker.step(&scan.with_detections(places.map(detection).to_vec())).unwrap();
+                let of = |j: u32| states.iter().find(|s| s.detection == Some(j)).map(|s| s.id);
+                seen.push([of(0), of(1)]);
+            }
+            seen
+        };
+        let (first, second) = (Some(TrackId(1)), Some(TrackId(2)));
+        assert!(ids(true).iter().all(|i| *i == [first, second]), "{:?}", ids(true));
+        assert_eq!(ids(false)[2], [second, first], "without them the nearer one is taken");
     }
 }
