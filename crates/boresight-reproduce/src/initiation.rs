@@ -10,7 +10,9 @@ use super::score::{MEASURES, four_numbers, spread};
 use super::study::{LOST_PX, Options, monte_carlo};
 use boresight::sim::{PAPER_START, paper_scene};
 use boresight::sim::{SceneConfig, Seed};
-use boresight::track::{ConfirmationConfig, InitialTrackConfig, MOfNConfig, MergedMeasurementsConfig, TrackerConfig};
+use boresight::track::{
+    ConfirmationConfig, InitialTrackConfig, MOfNConfig, MergedMeasurementsConfig, ReidentificationConfig, TrackerConfig,
+};
 use boresight::vision::{ClusterConfig, GivenNoise, NoiseConfig};
 use boresight::vision::{DetectorConfig, threshold::BandConfig, threshold::ThresholdConfig};
 use boresight::{FrameSource, Result, Scan, TrackId, TrackStatus};
@@ -55,6 +57,8 @@ pub fn paper_tracker() -> TrackerConfig {
         confirmation: ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, tentative_s: 1e9 }),
         coast_s: 5.0,
         coast_scans: 5,
+        // The papers know none.
+        reidentification: ReidentificationConfig { max_gap_s: 0.0 },
         ..TrackerConfig::default()
     }
 }
