@@ -4,7 +4,7 @@
 //! `boresight_filters::smooth`. The rows of a tracker are filtered beliefs, which is all a smoother needs: measurements are
 //! not looked at again. Rows without velocity (tables from elsewhere) are positions: [`filter_track`] comes first.
 //! Symbols: state `[x, vx, y, vy]` (px, px/s). Model: constant velocity with white acceleration, as in the tracker.
-//! A row that does not follow from the one before ([`cut`]) begins a part of its own: a track that was lost and found again, or whose camera moved, is smoothed in between only.
+//! A row that does not follow from the one before (`cut.rs`) begins a part of its own: a track that was lost and found again, or whose camera moved, is smoothed in between only.
 //! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
 
