@@ -91,20 +91,19 @@ impl Scores {
         let (mut from, mut all) = (0, 0);
         for (k, n) in self.0.iter().enumerate() {
             all += n;
-            from += if Self::ends_at(k) > score { *n } else { 0 };
+            from += if Self::begins_at(k) >= score { *n } else { 0 };
         }
         from as f64 / (all as f64).max(1.0)
     }
 
     /// The score that this share of them reaches, to a step.
     fn reached_by(&self, share: f64) -> f64 {
-        let most = (0..N_STEPS).rev().map(|k| Self::ends_at(k) / 2f64.powf(1.0 / f64::from(STEPS_TO_DOUBLE)));
-        most.into_iter().find(|score| self.share_from(*score * (1.0 + 1e-9)) >= share).unwrap_or(0.0)
+        (0..N_STEPS).rev().find(|k| self.share_from(Self::begins_at(*k)) >= share).map_or(0.0, Self::begins_at)
     }
 
-    /// The score at which a step ends.
-    fn ends_at(k: usize) -> f64 {
-        2f64.powf((k + 1) as f64 / f64::from(STEPS_TO_DOUBLE) - 4.0)
+    /// The score at which a step begins.
+    fn begins_at(k: usize) -> f64 {
+        2f64.powf(k as f64 / f64::from(STEPS_TO_DOUBLE) - 4.0)
     }
 }
 
@@ -141,7 +140,10 @@ impl Observed {
         let now = view.scan.time.ns;
         self.frames += 1;
         let frame_px2 = self.frame_px2;
-        view.scan.detections.iter().for_each(|d| self.scores.put(d.score));
+        // Scores say only why there is no track.
+        if self.frames_with_tracks == 0 {
+            view.scan.detections.iter().for_each(|d| self.scores.put(d.score));
+        }
         let mut is_there = false;
         for t in view.tracks {
             let life = self.lives.entry(t.id.0).or_default();

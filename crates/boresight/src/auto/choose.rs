@@ -13,11 +13,9 @@ use super::spread::growing;
 use super::whole_tracks::report_whole;
 use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
 use crate::io::Colour;
+use crate::track::ReidentificationConfig;
 use crate::vision::threshold::Polarity;
 use crate::{Config, Frame, Result, SourceInfo, shown_rate};
-
-/// How long a target may be hidden and keep its id, s, where it is not known how long targets stay: someone behind a lamp post.
-pub(super) const REIDENTIFY_S: f64 = 2.0;
 
 /// A proposed configuration and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,11 +161,10 @@ pub(super) fn choose_looked(
             Some(seen) => {
                 let places = growing(frames.len());
                 let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such, or where none does while something else moves: stars, lamps.
+                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
                 let alone = &evidence.bright.chains;
                 let most_move = 2.0 * alone.moving.len() as f64 > seen.per_frame;
-                let all_stand = own.moving.is_empty();
-                Some(seen).filter(|_| !((most_move || all_stand) && alone.is_surely_more_than(&own)))
+                Some(seen).filter(|_| !(most_move && alone.is_surely_more_than(&own)))
             }
             None => None,
         };
@@ -196,9 +193,10 @@ pub(super) fn choose_looked(
     let if_fixed = if_fixed.map(|(config, reasons)| Box::new(Choice::alone(config, reasons)));
     let mut choice = Choice { config, reasons, runner_up, if_fixed, gain };
     choice.change(|c| {
-        c.config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
+        c.config.tracker.reidentification = ReidentificationConfig::default();
+        let hidden_s = c.config.tracker.reidentification.max_gap_s;
         c.reasons.push(format!(
-            "A target that is lost and found again keeps its id, within {REIDENTIFY_S} s where it is not known how long targets stay (--no-stitch gives every track its \
+            "A target that is lost and found again keeps its id, within {hidden_s} s where it is not known how long targets stay (--no-stitch gives every track its \
              own)."
         ));
         Ok::<(), crate::Error>(())

@@ -249,6 +249,30 @@ mod tests {
     }
 
     #[test]
+    fn before_many_that_stand_what_moves_is_reported_and_where_many_move_all_are() {
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: 320,
+            height: 240,
+            kind: crate::PixelKind::Gray8,
+            n_frames: None,
+            rate_hz: None,
+            true_times: true,
+        };
+        // One chain in motion beside so many sure blobs a frame.
+        let report = |per_frame: f64, step_px: f64| {
+            let bright = side(per_frame, 20.0, 50.0, 50.0, step_px);
+            let (mut config, mut reasons) = (Config::default(), Vec::new());
+            configure(&Seen { bright, dark: Side::default() }, &info, &mut config, &mut reasons);
+            config.tracker.report
+        };
+        assert_eq!(report(44.0, 4.0), Report::Moving, "stars and a satellite");
+        assert_eq!(report(44.0, 0.0), Report::All, "nothing moves");
+        assert_eq!(report(3.0, 4.0), Report::Moving, "few");
+    }
+
+    #[test]
     fn the_polarity_is_that_of_what_moves_where_nothing_stands_clear() {
         let seen = |bright, dark| Seen { bright, dark }.polarity();
         let still = || side(0.0, 0.0, 50.0, 50.0, 0.0);

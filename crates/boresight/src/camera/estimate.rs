@@ -12,7 +12,7 @@
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
 
-use super::apart::Pieces;
+use super::apart::{Pieces, WIDE};
 use super::course::Course;
 use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, find, find_near};
@@ -56,11 +56,9 @@ const MOST_HELD: u32 = 12;
 const WAIT_FRAMES: u32 = 5;
 /// Share of the image's cells from which on the others are not asked.
 const CLEAR_COVER: f64 = 0.75;
-/// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other.
+/// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other. It may be that of a thing, and is not
+/// believed, where its patches spread over less than [`WIDE`] of the image's width, and half as many or more stand still: nothing that stands out stands before a camera that moves.
 const UNSURE_FRAMES: u32 = 3;
-/// It may be that of a thing, and is not believed, where its patches spread over less than this share of the image's width, and half as many or more stand still: a ground below a sky reaches from
-/// side to side, and nothing that stands out stands before a camera that moves.
-const UNSURE_SPREAD: f64 = 0.5;
 /// Share of the key frame's patches that must lie where they lay, so that the others are not looked for. Chosen: a target may hide a fourth.
 const AT_REST: f64 = 0.75;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
@@ -257,7 +255,7 @@ impl CameraMotionEstimator {
         let agreeing = || self.matches.iter().filter(agrees).map(|m| m.from.x);
         let n_agree = agreeing().count();
         let ends = agreeing().fold([f64::INFINITY, f64::NEG_INFINITY], |e, x| [e[0].min(x), e[1].max(x)]);
-        let is_wide = ends[1] - ends[0] >= UNSURE_SPREAD * self.now.width() as f64;
+        let is_wide = ends[1] - ends[0] >= WIDE * self.now.width() as f64;
         let mut n_still = 0;
         let n_cells = CELLS.0 * CELLS.1;
         if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {

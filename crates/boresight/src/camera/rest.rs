@@ -54,7 +54,7 @@ impl Rest {
     }
 }
 
-/// Whether one of the places has moved by more than [`STILL`] and by more than chance, and all of them, in the root of the mean square, by more than they have moved against each
+/// Whether a motion that is no chance says that one of the places has moved by more than [`STILL`] and by more than chance, and all of them, in the root of the mean square, by more than they have moved against each
 /// other. Corners without patches, as a sky's, are extrapolated: they say nothing of a camera at rest.
 pub(super) fn moves(
     before: &Homography,

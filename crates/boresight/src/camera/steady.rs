@@ -50,12 +50,10 @@ impl SteadyGround {
         on_ground.camera_motion = scan.camera_motion;
         on_ground.blind = scan.blind;
         on_ground.detections.clone_from(&scan.detections);
-        // Where the camera has not moved the image is the ground, to the last bit; and a velocity in the one is that on the other.
-        if !self.moved {
-            return;
-        }
         let (ground, motion) = self.way_to_ground();
         for d in &mut on_ground.detections {
+            // Where the camera has not moved a velocity in the image is that on the ground; else it was measured over frames between which the ground moved.
+            d.velocity = d.velocity.filter(|_| !self.moved);
             to_ground(d, &ground, motion.as_ref());
         }
     }
@@ -64,6 +62,7 @@ impl SteadyGround {
     pub(crate) fn detection_on_ground(self, d: &Detection) -> Detection {
         let mut d = d.clone();
         if self.moved {
+            d.velocity = None;
             let (ground, motion) = self.way_to_ground();
             to_ground(&mut d, &ground, motion.as_ref());
         }
@@ -138,8 +137,6 @@ impl SteadyGround {
 /// Turns a detection to the ground.
 #[inline]
 fn to_ground(d: &mut Detection, ground: &Homography, motion: Option<&CameraMotion>) {
-    // Measured over frames between which the ground moved: it is not the velocity on it.
-    d.velocity = None;
     if let Some(m) = motion {
         d.cov += m.cov_at(d.position);
     }
@@ -174,6 +171,7 @@ fn moved(e: Extent, by: &Homography) -> Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DetectedVelocity;
     use crate::{Detection, FrameIndex, MotionBasis, Similarity, TrackId, TrackStatus};
     use boresight_filters::Gaussian;
     use nalgebra::Vector4;
@@ -260,6 +258,34 @@ mod tests {
         ground.tracks_in_image(&mut states);
         assert!(states[0].kinematics.cov[(0, 0)] > 0.4 && states[1].kinematics.cov[(0, 0)] == 0.0);
         assert!(states[1].kinematics.cov[(1, 1)] > 0.4 / (0.04 * 0.04));
+    }
+
+    #[test]
+    fn a_camera_bridged_at_rest_adds_what_is_not_known_of_it_and_leaves_velocities() {
+        let at = Vector2::new(30.0, 40.0);
+        let held = CameraMotion {
+            cov: MotionCov::from_diagonal(&[0.4, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].into()),
+            basis: MotionBasis::Held,
+            ..CameraMotion::exact_shift(Vector2::zeros())
+        };
+        let velocity = DetectedVelocity {
+            mean: Vector2::new(3.0, 4.0),
+            cov: Matrix2::identity(),
+            with_position: Matrix2::zeros(),
+        };
+        let moves = |mut scan: Scan| {
+            scan.detections[0].velocity = Some(velocity);
+            scan
+        };
+        let now = moves(scan(1, at, Some(held)));
+        let mut on_ground = Scan::default();
+        SteadyGround::default().after(&scan(0, at, None)).after(&now).scan_on_ground(&now, &mut on_ground);
+        let added = on_ground.detections[0].cov - now.detections[0].cov;
+        assert!((added - Matrix2::new(0.4, 0.0, 0.0, 0.5)).norm() < 1e-9, "{added}");
+        assert_eq!(on_ground.detections[0].velocity, Some(velocity));
+        let pan = moves(scan(1, at, Some(CameraMotion::exact_shift(Vector2::new(2.0, 0.0)))));
+        SteadyGround::default().after(&scan(0, at, None)).after(&pan).scan_on_ground(&pan, &mut on_ground);
+        assert_eq!(on_ground.detections[0].velocity, None, "of the image, not of the ground");
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(crate) fn holes(files: &[PathBuf]) -> Option<Numbering> {
     (n_missing <= places.len() as u64).then_some(Numbering { places, n_missing, first_hole: (at, at + 1) })
 }
 
-/// Whether the numbers are written as clock times, hhmmss or behind a date, and some of them follow each other in seconds and not as numbers.
+/// Whether the numbers are written as clock times, hhmmss or behind a date, and where they rise otherwise than seconds do they are one step apart in seconds.
 fn are_clock_times(files: &[PathBuf], numbers: &[u64]) -> bool {
     let n_digits = |f: &PathBuf| split(&f.file_stem()?.to_string_lossy()).map(|(_, digits, _)| digits.len());
     let seconds = |n: &u64| {
@@ -53,8 +53,11 @@ fn are_clock_times(files: &[PathBuf], numbers: &[u64]) -> bool {
     };
     let Some(times) = numbers.iter().map(seconds).collect::<Option<Vec<u64>>>() else { return false };
     let is_written_so = files.iter().all(|f| matches!(n_digits(f), Some(6 | 14)));
-    let turns = times.windows(2).zip(numbers.windows(2)).any(|(t, n)| t[1].wrapping_sub(t[0]) < n[1] - n[0]);
-    is_written_so && turns
+    let rises = || times.windows(2).zip(numbers.windows(2)).map(|(t, n)| (t[1].checked_sub(t[0]), n[1] - n[0]));
+    let Some(step) = rises().map(|r| r.1).min() else { return false };
+    // From one minute, hour or day to the next.
+    let turns = || rises().filter(|r| r.0 != Some(r.1));
+    is_written_so && turns().count() > 0 && turns().all(|r| r.0.is_none_or(|seconds| seconds == step))
 }
 
 /// The numbers of files in natural order, which must rise; `None` for names of any other form.
@@ -127,6 +130,10 @@ mod tests {
         assert_eq!(of(&["c_235857.png", "c_235858.png", "c_235859.png", "c_235900.png"]), None, "clock times");
         let dated = ["20261126105958.png", "20261126105959.png", "20261126110000.png", "20261126110001.png"];
         assert_eq!(of(&dated), None, "with a date");
+        // What could be a clock but for its steps: from 59 to 110 are eleven seconds.
+        let hole: Vec<String> = (10..60).chain(110..130).map(|k| format!("t{k:06}.png")).collect();
+        let hole: Vec<&str> = hole.iter().map(String::as_str).collect();
+        assert_eq!(of(&hole).map(|n| n.n_missing), Some(50));
         assert_eq!(
             of(&["t000057.png", "t000058.png", "t000061.png"]).map(|n| n.n_missing),
             Some(2),

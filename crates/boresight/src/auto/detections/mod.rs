@@ -7,14 +7,13 @@
 mod links;
 mod scores;
 
-use super::choose::REIDENTIFY_S;
 use super::detection_statistics::{self, RATE_WITHOUT_EFFECT};
 use super::digits::round;
 use super::noise;
 use crate::io::LengthUnit;
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
-    OverlapConfig, OverlapKind, TrackerConfig, TwoStageConfig,
+    OverlapConfig, OverlapKind, ReidentificationConfig, TrackerConfig, TwoStageConfig,
 };
 use crate::{Config, Scan};
 use links::{Links, Motion};
@@ -39,7 +38,7 @@ pub fn for_detections(
     reasons: &mut Vec<String>,
 ) {
     let of_boxes = assumed(scans, rate_hz, unit, config, reasons);
-    config.tracker.reidentification.max_gap_s = REIDENTIFY_S;
+    config.tracker.reidentification = ReidentificationConfig::default();
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
     let _ = noise::learn(scans, area_px2, unit, config, reasons);

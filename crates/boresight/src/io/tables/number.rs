@@ -7,6 +7,7 @@
 //! tracks is written.
 
 use crate::Timestamp;
+use std::borrow::Cow;
 use std::fmt::Write;
 
 /// A number as the standard parser reads it; with `decimal_comma` a comma may stand for the point.
@@ -72,8 +73,8 @@ pub(crate) fn push_seconds(out: &mut String, time: Timestamp) {
 
 /// Reads seconds exactly to the nanosecond where they are written as plain decimals, else through f64; with `decimal_comma` a comma may stand for the point.
 pub(crate) fn parse_seconds(text: &str, decimal_comma: bool) -> Option<Timestamp> {
-    let point = if decimal_comma { text.replacen(',', ".", 1) } else { text.to_string() };
-    let text = point.trim();
+    let text = if decimal_comma && text.contains(',') { Cow::from(text.replacen(',', ".", 1)) } else { text.into() };
+    let text = text.trim();
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
         None => (false, text),

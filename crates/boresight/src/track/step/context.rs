@@ -25,6 +25,10 @@ pub(in crate::track) struct Context<'a> {
 /// Share of the velocities that say nothing, since the target turned while they were measured: a pair that fits but for its velocity is still made where there is no other.
 const ODD_VELOCITIES: f64 = 0.01;
 
+/// Where places and velocities stand in `[x, vx, y, vy]`.
+const PLACE: [usize; 2] = [0, 2];
+const MOTION: [usize; 2] = [1, 3];
+
 /// What a velocity that does not fit costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::track) enum VelocityCost {
@@ -72,8 +76,6 @@ impl Context<'_> {
             from_velocity(&detection.position, &noise.matrix(), velocity, self.config.detection_covariance_scale);
         let (innovation, s) = (measured.mean - belief.mean, measured.cov + belief.cov);
         let block = |rows: [usize; 2], columns: [usize; 2]| Matrix2::from_fn(|a, b| s[(rows[a], columns[b])]);
-        const PLACE: [usize; 2] = [0, 2];
-        const MOTION: [usize; 2] = [1, 3];
         let at = |rows: [usize; 2]| Vector2::new(innovation[rows[0]], innovation[rows[1]]);
         let Some(inverse) = block(PLACE, PLACE).try_inverse() else { return 0.0 };
         let gain = block(MOTION, PLACE) * inverse;
