@@ -94,6 +94,7 @@ pub mod report;
 pub mod sensor;
 pub mod sim;
 mod similarity;
+mod tempo;
 mod time;
 pub mod track;
 mod tracks;

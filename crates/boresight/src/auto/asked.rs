@@ -5,7 +5,9 @@
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
 use super::second_look::Second;
+use super::stretch;
 use super::{carried, cells, colour, faint, moving, particles, spots, steadied, summed};
+use crate::tempo::Tempo;
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
 
 /// Side of a moving thing of which nothing was seen, as a share of the frame's width.
@@ -29,12 +31,15 @@ pub fn configure(
     reasons: &mut Vec<String>,
 ) -> Result<()> {
     reasons.push(format!("The detector is the one asked for: {kind}, for {}.", kind.purpose()));
+    let tempo = Tempo::of(interval_s);
     match kind {
         DetectorKind::Isolated => {
-            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, reasons)
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, reasons);
+            stretch::of_both(tempo, config);
         }
         DetectorKind::Cfar => {
             spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
+            stretch::of_both(tempo, config);
             faint::configure_asked(
                 &faint::better(faint::count(frames, &scene.ground, info, n_threads)?.0),
                 config,
@@ -43,17 +48,20 @@ pub fn configure(
         }
         DetectorKind::Integrate => {
             spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
+            stretch::of_both(tempo, config);
             summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Bernoulli => {
             spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
+            stretch::of_both(tempo, config);
             carried::configure(scene, interval_s, info, config, reasons);
         }
         DetectorKind::Moving => {
             let explained = scene.explained(&second.or(frames), info, n_threads)?;
             moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
+            stretch::of_both(tempo, config);
         }
-        DetectorKind::Steadied => steadied::configure_asked(frames, scene, info, config, reasons)?,
+        DetectorKind::Steadied => steadied::configure_asked(frames, scene, tempo, info, config, reasons)?,
         DetectorKind::Spot => {
             let seen = particles::count(frames, info, n_threads)?.0;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
@@ -74,6 +82,7 @@ pub fn configure(
                 .hint("give the colour in a configuration: detector.threshold.colour.reference = [red, green, blue]"));
             };
             colour::configure(&reference, info, config, reasons);
+            stretch::of_both(tempo, config);
         }
     }
     Ok(())

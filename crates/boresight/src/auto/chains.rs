@@ -9,9 +9,10 @@
 
 use super::sighting_density::Density;
 use super::sightings::{Sighting, Sightings};
+use crate::tempo::Tempo;
 use nalgebra::Vector2;
 
-/// Within this time a target may change its velocity by as much as it is, s.
+/// Within this time a target may change its velocity by as much as it is, s of video.
 const TURN_S: f64 = 1.0;
 /// χ² with 2 degrees of freedom: a true detection in a thousand lies outside.
 const GATE: f64 = 13.8;
@@ -129,9 +130,9 @@ impl Open {
         out
     }
 
-    fn predict(&mut self, time_s: f64) {
+    fn predict(&mut self, time_s: f64, turn_s: f64) {
         let dt = time_s - self.time_s;
-        let q = self.velocity.norm_squared() / TURN_S;
+        let q = self.velocity.norm_squared() / turn_s;
         let [a, b, c] = self.p;
         self.at += self.velocity * dt;
         self.p = [a + 2.0 * dt * b + dt * dt * c + q * dt.powi(3) / 3.0, b + dt * c + q * dt * dt / 2.0, c + q * dt];
@@ -154,6 +155,8 @@ impl Open {
 /// Scans looked at for chains, in any order of their times: what is known of each sighting whatever the order.
 pub struct Field<'a> {
     scans: &'a [Sightings],
+    /// [`TURN_S`] in the tempo of the scans, s.
+    turn_s: f64,
     /// Of each sighting of each scan, where it lies: sightings per px² and scan.
     density: Vec<Vec<f64>>,
     /// Each scan's sightings by x, px.
@@ -168,6 +171,7 @@ impl<'a> Field<'a> {
         let map = Density::of(scans, area_px2);
         Self {
             scans,
+            turn_s: Tempo::of_times(scans.iter().map(|s| s.time_s)).stretched(TURN_S),
             density: scans.iter().map(|s| s.all.iter().map(|s| map.at(s.at)).collect()).collect(),
             by_x: scans.iter().map(sorted).collect(),
             widest: scans.iter().map(|s| s.all.iter().map(|s| s.variance).fold(0.0, f64::max)).collect(),
@@ -189,7 +193,7 @@ impl<'a> Field<'a> {
         for k in 1..self.scans.len() {
             let (now, by_x, widest) = (&self.scans[order[k]].all, &self.by_x[order[k]], self.widest[order[k]]);
             for mut c in open.drain(..) {
-                c.predict(self.scans[k].time_s);
+                c.predict(self.scans[k].time_s, self.turn_s);
                 let far = (GATE * (c.p[0] + widest)).sqrt();
                 let from = by_x.partition_point(|e| e.0 < c.at.x - far);
                 let mut best: Option<(f64, f64, usize)> = None;

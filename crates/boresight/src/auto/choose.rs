@@ -5,14 +5,17 @@
 //! whatever was chosen.
 
 use super::asked;
+use super::digits::round;
 use super::interval::interval_s;
 use super::request::Request;
 use super::scene::{self, Camera, Scene};
 use super::second_look::Second;
 use super::spread::growing;
+use super::stretch;
 use super::whole_tracks::report_whole;
 use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
 use crate::io::Colour;
+use crate::tempo::Tempo;
 use crate::track::ReidentificationConfig;
 use crate::vision::threshold::Polarity;
 use crate::{Config, Frame, Result, SourceInfo, shown_rate};
@@ -117,6 +120,7 @@ pub(super) fn choose_looked(
     let mut config = base.clone();
     let (mut runner_up, mut gain) = (None, f64::INFINITY);
     let interval_s = interval_s(frames, info);
+    let tempo = Tempo::of(interval_s);
     let n_looked = frames.len().max(second.frames.len());
     let looked = &second.or(frames)[..];
     let over_s = match (frames.first(), looked.last()) {
@@ -137,7 +141,7 @@ pub(super) fn choose_looked(
         },
     ));
     let if_fixed = match request.detector {
-        None => if_fixed::look(looked, scene, info, n_threads, (config.clone(), reasons.clone()))?,
+        None => if_fixed::look(looked, scene, tempo, info, n_threads, (config.clone(), reasons.clone()))?,
         Some(_) => None,
     };
     // Who asks for grey gets grey.
@@ -146,10 +150,12 @@ pub(super) fn choose_looked(
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
         colour::configure(&reference, info, &mut config, &mut reasons);
+        stretch::of_both(tempo, &mut config);
     } else if scene.camera == Camera::Fixed
         && let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)?
     {
         moving::configure(scene, explained, info, &mut config, &mut reasons);
+        stretch::of_both(tempo, &mut config);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
@@ -168,12 +174,19 @@ pub(super) fn choose_looked(
             }
             None => None,
         };
-        if let Some(seen) = cells {
+        let spots_for_cells = match &cells {
+            Some(_) => particles::look_in_place_of_cells(frames, info, n_threads)?,
+            None => None,
+        };
+        if let Some(seen) = spots_for_cells {
+            particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+        } else if let Some(seen) = cells {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {
-            let steadied = steadied::look_beside(&evidence, frames, scene, info, n_threads)?;
+            let steadied = steadied::look_beside(&evidence, frames, scene, tempo, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, info, &mut config, &mut reasons);
+            stretch::of_both(tempo, &mut config);
             gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
             if (evidence.is_poor() || !evidence.moves())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
@@ -184,6 +197,7 @@ pub(super) fn choose_looked(
             }
             if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
                 steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
+                stretch::of_both(tempo, &mut first.config);
                 gain = seen.chains.gain();
                 runner_up = Some(Box::new(Choice::alone(config, reasons)));
                 Choice { config, reasons, .. } = first;
@@ -193,8 +207,8 @@ pub(super) fn choose_looked(
     let if_fixed = if_fixed.map(|(config, reasons)| Box::new(Choice::alone(config, reasons)));
     let mut choice = Choice { config, reasons, runner_up, if_fixed, gain };
     choice.change(|c| {
-        c.config.tracker.reidentification = ReidentificationConfig::default();
-        let hidden_s = c.config.tracker.reidentification.max_gap_s;
+        let hidden_s = round(tempo.stretched(ReidentificationConfig::default().max_gap_s));
+        c.config.tracker.reidentification = ReidentificationConfig { max_gap_s: hidden_s };
         c.reasons.push(format!(
             "A target that is lost and found again keeps its id, within {hidden_s} s where it is not known how long targets stay (--no-stitch gives every track its \
              own)."

@@ -12,13 +12,14 @@ use super::digits::round;
 use super::first_scans::{Shares, first};
 use super::score_statistics::{self, Held};
 use crate::associate::{AssociatorConfig, CostKind, GlobalNearestConfig};
+use crate::tempo::Tempo;
 use crate::track::{ClutterConfig, ClutterMapConfig, ConfirmationConfig, ExistenceConfig};
 use crate::{Config, Result, Scan, TrackStatus};
 use std::collections::BTreeMap;
 
 /// The tracker runs this often: the first time under the assumed rule, the second under the one learnt from it.
 const PASSES: usize = 2;
-/// False tracks that are allowed where nobody says how many: one an hour, or one for a hundred targets that come if that is more.
+/// False tracks that are allowed where nobody says how many: one an hour of video, or one for a hundred targets that come if that is more.
 const FALSE_PER_HOUR: f64 = 1.0;
 const FALSE_SHARE: f64 = 0.01;
 /// Probability at which a track is reported, at least: with hardly a new target an hour one false track an hour would allow every second one.
@@ -33,11 +34,11 @@ const PRIOR_HITS: [f64; 2] = [9.0, 1.0];
 const PRIOR_FOUND: [f64; 2] = [1.0, 1.0];
 /// P_D is not more certain than this: a target may be hidden in any clip.
 const MOST_P_DETECTION: f64 = 0.99;
-/// Shortest mean time of a target, s.
+/// Shortest mean time of a target, s of video.
 const LEAST_LIFE_S: f64 = 2.0;
 /// A thing at rest is not taken for moving more often than this.
 const MOST_FALSE_MOTION: f64 = 0.01;
-/// A target may be hidden for so long and keep its id, s: now that it is known how long targets stay, likelihoods decide, and this bounds memory alone.
+/// A target may be hidden for so long and keep its id, s of video: now that it is known how long targets stay, likelihoods decide, and this bounds memory alone.
 const LONGEST_HIDDEN_S: f64 = 3600.0;
 /// Share of the targets' detections that may be given up with what scores less.
 pub(super) const FAINT_SHARE: f64 = 0.01;
@@ -108,6 +109,7 @@ pub fn learn(
         return Ok(found);
     }
     let interval_s = over_s / (n_scans - 1) as f64;
+    let tempo = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9));
     for _ in 0..PASSES {
         let (tracks, held) = run(scans, config)?;
         let targets = || tracks.values().filter(|t| t.confirmed);
@@ -145,7 +147,8 @@ pub fn learn(
         let tracked = tracks.values().filter(|t| t.hits >= LEAST_HITS).count();
         let per_hour = 3600.0 / (over_s + interval_s);
         let new_per_hour = (begun as f64).max(0.5) * per_hour;
-        let allowed = false_per_hour.unwrap_or_else(|| (FALSE_SHARE * new_per_hour).max(FALSE_PER_HOUR));
+        let allowed =
+            false_per_hour.unwrap_or_else(|| (FALSE_SHARE * new_per_hour).max(FALSE_PER_HOUR / tempo.stretched(1.0)));
         let confirm =
             (new_per_hour / (new_per_hour + allowed)).clamp(LEAST_CONFIRM_PROBABILITY, 1.0 - LEAST_PROBABILITY);
         let false_motion = allowed / ((tracked as f64).max(0.5) * per_hour);
@@ -155,9 +158,12 @@ pub fn learn(
         t.redetection_probability = Some(round(after_miss.clamp(0.01, MOST_P_DETECTION)));
         t.clutter_density_per_px2 = round(false_density);
         // Glitter on water, a tree in the wind: there a detection says less.
-        t.clutter = ClutterConfig::Map(ClutterMapConfig::default());
+        t.clutter = ClutterConfig::Map(ClutterMapConfig {
+            memory_s: round(tempo.stretched(ClutterMapConfig::default().memory_s)),
+            ..ClutterMapConfig::default()
+        });
         if t.reidentification.max_gap_s > 0.0 {
-            t.reidentification.max_gap_s = LONGEST_HIDDEN_S;
+            t.reidentification.max_gap_s = tempo.stretched(LONGEST_HIDDEN_S);
         }
         t.score_likelihood = score_statistics::of(scans, &held, t.appearance_gain);
         if t.score_likelihood.is_some() {
@@ -166,7 +172,7 @@ pub fn learn(
         t.confirmation = ConfirmationConfig::Existence(ExistenceConfig {
             new_target_density_per_px2: round(new_density),
             confirm_probability: 1.0 - round(1.0 - confirm),
-            mean_target_lifetime_s: round(life_s.max(LEAST_LIFE_S)),
+            mean_target_lifetime_s: round(life_s.max(tempo.stretched(LEAST_LIFE_S))),
             ..ExistenceConfig::default()
         });
     }

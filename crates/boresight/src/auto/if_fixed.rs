@@ -8,6 +8,8 @@
 use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::moving;
 use super::scene::{Camera, Scene};
+use super::stretch;
+use crate::tempo::Tempo;
 use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
 
 /// The candidate's configuration and reasons, from those so far, if little but things that move differs from the background; `frames` are those looked at.
@@ -16,6 +18,7 @@ use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
 pub fn look(
     frames: &[&Frame],
     scene: &Scene,
+    tempo: Tempo,
     info: &SourceInfo,
     n_threads: usize,
     (mut config, mut reasons): (Config, Vec<String>),
@@ -25,6 +28,7 @@ pub fn look(
     }
     let Some(explained) = moving::look(frames, scene, info, n_threads)? else { return Ok(None) };
     moving::configure(scene, explained, info, &mut config, &mut reasons);
+    stretch::of_both(tempo, &mut config);
     Ok(Some((config, reasons)))
 }
 

@@ -10,12 +10,13 @@ use super::digits::round;
 use super::evidence::Evidence;
 use crate::Scan;
 use crate::camera::CameraPath;
+use crate::tempo::Tempo;
 use crate::vision::steadied::SECOND_LAG;
 use nalgebra::Vector2;
 
 /// Thickness over way of a disc that moves by just its own diameter: thicker ones, in the median, move by less than their size.
 const WHOLE: f64 = std::f64::consts::FRAC_PI_4;
-/// The lag is doubled up to this, s: frames of four and a half seconds are kept then.
+/// The lag is doubled up to this, s of video: frames of four and a half seconds are kept then.
 const LONGEST_S: f64 = 1.28;
 /// The frames read ahead last so many lags at least: in the first four or so, later frames stand in.
 const LEAST_LAGS: f64 = 8.0;
@@ -29,7 +30,8 @@ const LEAST_WAYS: usize = 20;
 pub(super) fn longer(scans: &[Scan], shown: &Evidence, lag_s: f64, size_px: [f64; 2]) -> Option<(f64, String)> {
     let longer_s = round(2.0 * lag_s);
     let lasts_s = scans.last()?.time.seconds_since(scans[0].time);
-    if longer_s > LONGEST_S
+    let longest_s = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9)).stretched(LONGEST_S);
+    if longer_s > longest_s
         || lasts_s < LEAST_LAGS * longer_s
         || covered(scans, SECOND_LAG * longer_s, size_px) < LEAST_COVERED
     {

@@ -48,6 +48,7 @@ mod speed;
 mod spots;
 mod spread;
 mod steadied;
+mod stretch;
 mod summed;
 mod value_step;
 mod whole_tracks;

@@ -111,7 +111,7 @@ pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut 
     // People walk side by side for seconds.
     config.tracker.merged_measurements.max_secondary_s = 8.0;
     reasons.push(format!(
-        "Regions of {least} px or more count, parts nearer than {} px are one. What stands for a minute becomes background \
+        "Regions of {least} px or more count, parts nearer than {} px are one. What stands long becomes background \
          (detector.threshold.moving.standing-time-s); a track is reported once it has moved farther than its covariance and the wander of its \
          outline explain, all are with --set tracker.report=all.",
         config.detector.cluster.distance_px

@@ -7,9 +7,10 @@ use super::digits::round;
 use super::looks;
 use super::scene::{Camera, Scene};
 use super::spread::spread;
+use super::stretch;
 use super::value_step::value_step;
 use crate::camera::CameraConfig;
-use crate::track::TrackerConfig;
+use crate::tempo::Tempo;
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
@@ -32,6 +33,9 @@ const ASSUMED_WIDTH_PX: f64 = 3.0;
 const WIDEST_PX: u32 = 40;
 /// A soft-edged spot's diameter in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
 const DIAMETER_PER_WIDTH: f64 = 2.45;
+
+/// Things of less across are spots, not cells, px.
+const SPOT_PX: f64 = 10.0;
 
 /// Expected false detections for each blob seen: the tracks' existence weighs them, and a dim particle is worth ten.
 const FALSE_SHARE: f64 = 0.1;
@@ -59,17 +63,36 @@ pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize
     if scene.camera == Camera::Fixed && scene.regions < LEAST {
         return Ok(None);
     }
-    let (seen, fits) = count(frames, info, n_threads)?;
-    Ok(fits.then_some(seen))
+    let (seen, kind) = count(frames, info, n_threads)?;
+    Ok(kind.fills.then_some(seen))
 }
 
-/// The blobs of the polarity of which there are more of one size all over the frame, else of which there are more; whether they are particles.
+/// What is there of bright pieces that pass for cells, if at half of their height they are spots, of one size: how large a piece is that is cut at some deviations of the noise tells how
+/// bright a spot is.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Particles, bool)> {
+pub fn look_in_place_of_cells(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Particles>> {
+    let (seen, kind) = count(frames, info, n_threads)?;
+    let are_spots = seen.polarity == Polarity::Bright && DIAMETER_PER_WIDTH * seen.width_px < SPOT_PX;
+    Ok((are_spots && kind.alike).then_some(seen))
+}
+
+/// What blobs in the frames are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Kind {
+    /// Of one size, and of one sign.
+    alike: bool,
+    /// That, many, and all over the frame.
+    fills: bool,
+}
+
+/// The blobs of the polarity of which there are more of one size all over the frame, else of which there are more; what they are.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Particles, Kind)> {
     let step = value_step(frames);
     let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX, step };
-    let (mut best, mut most, mut counts): (Option<Particles>, Particles, [f64; 2]) = (None, none, [0.0; 2]);
+    let (mut best, mut most, mut most_alike, mut counts) = (None::<Particles>, none, false, [0.0; 2]);
     for (polarity, count) in [Polarity::Bright, Polarity::Dark].into_iter().zip(&mut counts) {
         let isolated =
             IsolatedConfig { polarity, min_score: SCORE, max_side_px: WIDEST_PX, ..IsolatedConfig::default() };
@@ -99,13 +122,15 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(P
             best = Some(seen);
         }
         if per_frame > most.per_frame {
-            most = seen;
+            (most, most_alike) = (seen, alike);
         }
     }
     // Texture, and what a codec makes of noise, is as often dark as bright.
     let other = counts[0].min(counts[1]);
     let best = best.filter(|b| b.per_frame >= MOST_SIDED * other && b.per_frame - other >= LEAST);
-    Ok((best.unwrap_or(most), best.is_some()))
+    let kind =
+        Kind { alike: best.is_some() || (most_alike && most.per_frame >= MOST_SIDED * other), fills: best.is_some() };
+    Ok((best.unwrap_or(most), kind))
 }
 
 /// Threshold in standard deviations of the smoothed noise at which [`FALSE_SHARE`] of a frame's detections is expected to be noise: one independent look for
@@ -148,7 +173,7 @@ pub fn configure(
     };
     config.detector.camera = CameraConfig::Fixed;
     let tracker = &mut config.tracker;
-    *tracker = TrackerConfig::default();
+    *tracker = stretch::tracker(Tempo::of(interval_s));
     let step_px = 0.1 * size_px;
     tracker.acceleration_density_px2_per_s3 = round(step_px * step_px / interval_s.powi(3));
     tracker.max_speed_px_per_s = round(0.5 * size_px / interval_s);
@@ -156,4 +181,53 @@ pub fn configure(
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     reasons.push(format!("None goes farther than half its size ({:.1} px) from frame to frame.", 0.5 * size_px));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::choose;
+    use super::*;
+    use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// What is chosen for twelve frames of thirty things that diffuse by a pixel a frame, as bright at the distance r px as `light` says.
+    fn chosen(light: impl Fn(f64) -> f64) -> ThresholdConfig {
+        const SIZE: usize = 240;
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut at: Vec<[f64; 2]> =
+            (0..30).map(|i| [24.0 + 38.0 * f64::from(i % 6), 24.0 + 48.0 * f64::from(i / 6)]).collect();
+        let mut frame = |k: u64| {
+            at.iter_mut().flatten().for_each(|v| *v += rng.sample::<f64, _>(StandardNormal));
+            let value = |i: usize| {
+                let far = |p: &[f64; 2]| ((i % SIZE) as f64 - p[0]).hypot((i / SIZE) as f64 - p[1]);
+                200.0 + at.iter().map(|p| light(far(p))).sum::<f64>()
+            };
+            let values = (0..SIZE * SIZE).map(|i| (value(i) + 14.0 * rng.sample::<f64, _>(StandardNormal)) as u16);
+            let pixels = Pixels::Gray16(Image::from_vec(SIZE, SIZE, values.collect()).unwrap());
+            Frame { index: FrameIndex(k), time: Timestamp::from_secs_f64(0.1 * k as f64), pixels }
+        };
+        let frames: Vec<Frame> = (0..12).map(&mut frame).collect();
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: SIZE,
+            height: SIZE,
+            kind: PixelKind::Gray16,
+            n_frames: Some(12),
+            rate_hz: Some(10.0),
+            true_times: true,
+        };
+        choose(&frames, &info, &Config::default()).unwrap().config.detector.threshold
+    }
+
+    #[test]
+    fn bright_spots_are_no_cells_and_discs_are() {
+        // A foot of eight pixels and more at five deviations of the smoothed noise, 3.5 at half height.
+        let spots = chosen(|r| 500.0 * (-r * r / 4.5).exp());
+        assert!(matches!(spots, ThresholdConfig::Spot(_)), "{spots:?}");
+        let discs = chosen(|r| 200.0 / (1.0 + (2.0 * (r - 7.0)).exp()));
+        assert!(matches!(discs, ThresholdConfig::Local(_)), "{discs:?}");
+    }
 }

@@ -11,8 +11,10 @@ use super::evidence::{Evidence, LEAST_EXPLAINED, SURE_GAIN};
 use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
 use super::spread::growing;
+use super::stretch;
 use super::{faint, moving, spots};
 use crate::camera::CameraConfig;
+use crate::tempo::Tempo;
 use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, Report, TwoPointConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::steadied::SteadiedConfig;
@@ -79,6 +81,7 @@ pub fn look_beside(
     isolated: &spots::Seen,
     frames: &[Frame],
     scene: &Scene,
+    tempo: Tempo,
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Option<Seen>> {
@@ -92,7 +95,7 @@ pub fn look_beside(
     if !asked || frames.len() < LEAST_FRAMES {
         return Ok(None);
     }
-    let seen = look(frames, scene, info)?;
+    let seen = look(frames, scene, tempo, info)?;
     if !seen.chains.is_sure() || seen.explained < LEAST_EXPLAINED {
         return Ok(None);
     }
@@ -132,9 +135,14 @@ fn gain_beside(seen: &Seen, others: &Evidence, places: &[usize]) -> f64 {
     own.map(|c| c.gain).sum::<f64>() - seen.chains.by_chance[1]
 }
 
+/// The lag that is begun with, s.
+fn lag_s(tempo: Tempo) -> f64 {
+    round(tempo.stretched(SteadiedConfig::default().lag_s))
+}
+
 /// What is seen with the usual lag.
-fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo) -> Result<Seen> {
-    let lag_s = SteadiedConfig::default().lag_s;
+fn look(frames: &[Frame], scene: &Scene, tempo: Tempo, info: &SourceInfo) -> Result<Seen> {
+    let lag_s = lag_s(tempo);
     let span_s = frames.last().map_or(0.0, |f| f.time.seconds_since(frames[0].time));
     let apart_s = span_s / frames.len().saturating_sub(1).max(1) as f64;
     let step = ((0.25 * lag_s / apart_s) as usize).min(frames.len() / LOOKS).max(1);
@@ -192,11 +200,13 @@ pub fn configure(seen: &Seen, info: &SourceInfo, config: &mut Config, reasons: &
 pub fn configure_asked(
     frames: &[Frame],
     scene: &Scene,
+    tempo: Tempo,
     info: &SourceInfo,
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) -> Result<()> {
-    let seen = if frames.is_empty() { Seen::default() } else { look(frames, scene, info)? };
-    configure(&Seen { camera: scene.camera, lag_s: SteadiedConfig::default().lag_s, ..seen }, info, config, reasons);
+    let seen = if frames.is_empty() { Seen::default() } else { look(frames, scene, tempo, info)? };
+    configure(&Seen { camera: scene.camera, lag_s: lag_s(tempo), ..seen }, info, config, reasons);
+    stretch::of_both(tempo, config);
     Ok(())
 }

@@ -14,6 +14,7 @@ use super::reduced::Reduced;
 use super::text::Lettering;
 use super::tone::Tone;
 use crate::palette::track_colour;
+use crate::tempo::Pace;
 use crate::{CameraMotion, Error, ErrorKind, Image, Result, Timestamp, TrackId, TrackState, TrackStatus, View};
 use nalgebra::Vector2;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -42,6 +43,7 @@ pub struct Annotator {
     tone: Tone,
     lettering: Option<(f32, Lettering)>,
     trails: BTreeMap<TrackId, Trail>,
+    pace: Pace,
     points: Vec<(f64, f64)>,
     labels: Labels,
     /// Place of each label in the frame before.
@@ -74,6 +76,7 @@ impl Annotator {
             tone: Tone::default(),
             lettering: None,
             trails: BTreeMap::new(),
+            pace: Pace::default(),
             points: Vec::new(),
             labels: Labels::default(),
             places: BTreeMap::new(),
@@ -148,6 +151,7 @@ impl Annotator {
     /// Appends to the trails and forgets what is old or ended.
     fn remember(&mut self, view: &View<'_>) {
         let now = view.scan.time;
+        self.pace.note(now);
         if view.scan.is_cut() {
             self.trails.clear();
         }
@@ -168,13 +172,18 @@ impl Annotator {
                 trail.push_back((now, (mean[0], mean[2])));
             }
         }
-        let limit = self.options.trail_s;
+        let limit = self.trail_s();
         self.trails.retain(|_, trail| {
             while trail.front().is_some_and(|(t, _)| now.seconds_since(*t) > limit) {
                 trail.pop_front();
             }
             !trail.is_empty()
         });
+    }
+
+    /// How long trails are here, s.
+    fn trail_s(&self) -> f64 {
+        self.pace.tempo().stretched(self.options.trail_s)
     }
 
     fn draw_trail(&mut self, canvas: &mut Canvas<'_>, track: &TrackState, now: Timestamp, zoom: Zoom, width_px: f32) {
@@ -185,7 +194,7 @@ impl Annotator {
         let edge = Pen { alpha: 0.35, ..Pen::solid([0; 3], width_px * 1.2 + 1.5) };
         self.points.windows(2).for_each(|pair| canvas.line(pair[0], pair[1], &edge));
         for (pair, (time, _)) in self.points.windows(2).zip(trail.iter().skip(1)) {
-            let age = (now.seconds_since(*time) / self.options.trail_s).clamp(0.0, 1.0) as f32;
+            let age = (now.seconds_since(*time) / self.trail_s()).clamp(0.0, 1.0) as f32;
             let alpha = TRAIL_ALPHA[1] + age * (TRAIL_ALPHA[0] - TRAIL_ALPHA[1]);
             canvas.line(pair[0], pair[1], &Pen { alpha, ..Pen::solid(colour, width_px * 1.2) });
         }

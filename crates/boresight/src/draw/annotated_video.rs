@@ -14,7 +14,7 @@ const MIN_SIDE: usize = 16;
 /// Writes `annotated.mp4`: every frame with what was found in it.
 ///
 /// The file is created with the first frame, has its name only when whole, and is removed if the sink is dropped
-/// unfinished. Frames beyond the encoder's size are made smaller by a whole number, smaller ones than it takes get a black
+/// unfinished. It can be watched, whatever the interval between frames ([`Mp4Options::watchable`]). Frames beyond the encoder's size are made smaller by a whole number, smaller ones than it takes get a black
 /// margin at the right and below.
 pub struct AnnotatedVideo {
     path: PathBuf,
@@ -33,6 +33,7 @@ impl AnnotatedVideo {
     pub fn create(path: impl Into<PathBuf>, draw: DrawOptions, options: Mp4Options) -> Result<Self> {
         let (path, mut annotator) = (path.into(), Annotator::new(draw)?);
         annotator.set_most(MAX_SIZE);
+        let options = Mp4Options { watchable: true, ..options };
         Ok(Self { path, annotator, options, writer: None, narrow: Image::default() })
     }
 

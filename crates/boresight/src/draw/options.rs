@@ -14,7 +14,7 @@ pub struct DrawOptions {
     pub scale: u32,
     /// Reduction of the picture, whole number, 1..=32: so many pixels across and down become one; 0 chooses one with at most 1280 x 720 pixels.
     pub reduce: u32,
-    /// Length of the trails, s, 0..=3600; 0 draws none.
+    /// Length of the trails, s of video (longer where frames are farther apart than a third of a second), 0..=3600; 0 draws none.
     pub trail_s: f64,
     /// Whether detections that no track took are marked with a small cross.
     pub detections: bool,

@@ -18,6 +18,7 @@
 //! Limits: a track keeps its own number while it is tentative. At most [`MOST_LOST`] lost tracks are remembered, the newest.
 
 use super::filter::TrackedFilter;
+use super::scan_interval::ScanInterval;
 use super::single_track::Track;
 use crate::validate::not_negative;
 use crate::{Result, Timestamp};
@@ -27,8 +28,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// How long a new track may take to be confirmed, s: a lost one is remembered for so much longer than the gap.
+/// How long a new track may take to be confirmed, s, and scans where these last longer: a lost one is remembered for so much longer than the gap.
 const CONFIRM_S: f64 = 10.0;
+const CONFIRM_SCANS: u32 = 30;
 /// Share of losses where the target had turned hard; with none, every reversal gives a new id. Chosen: such turns are rarer than hiding.
 const TURNED: f64 = 0.1;
 /// Share of losses where the target had stopped. Chosen as the one of turns.
@@ -145,9 +147,10 @@ impl Reidentification {
         self.lost.iter_mut().for_each(|l| l.hits <<= 1);
     }
 
-    /// Forgets what was lost too long ago.
-    pub fn forget(&mut self, config: &ReidentificationConfig, now: Timestamp) {
-        self.lost.retain(|l| now.seconds_since(Timestamp::from_ns(l.last_seen_ns)) <= config.max_gap_s + CONFIRM_S);
+    /// Forgets what was lost too long ago; `interval` is the usual one between scans.
+    pub fn forget(&mut self, config: &ReidentificationConfig, interval: &ScanInterval, now: Timestamp) {
+        let longest_s = config.max_gap_s + CONFIRM_S.max(interval.span_s(CONFIRM_SCANS));
+        self.lost.retain(|l| now.seconds_since(Timestamp::from_ns(l.last_seen_ns)) <= longest_s);
     }
 
     /// Gives track `new`, just confirmed by its rule or, if it `has_moved`, reported, the id of the track that it continues, if there is one.

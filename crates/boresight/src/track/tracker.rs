@@ -224,7 +224,7 @@ impl Tracker {
         let Self { config, tracks, states, lost, new, renamed, clock, .. } = self;
         let is_reported = |s: &TrackState| s.status != TrackStatus::Tentative;
         new.extend((first_begun..states.len()).filter(|&i| tracks[i].history.accepted).map(|i| i as u32));
-        lost.forget(&config.reidentification, now);
+        lost.forget(&config.reidentification, &clock.interval, now);
         if new.is_empty() {
             return;
         }

@@ -10,7 +10,9 @@ mod scores;
 use super::detection_statistics::{self, RATE_WITHOUT_EFFECT};
 use super::digits::round;
 use super::noise;
+use super::stretch;
 use crate::io::LengthUnit;
+use crate::tempo::Tempo;
 use crate::track::{
     AssociationCostConfig, ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig,
     OverlapConfig, OverlapKind, ReidentificationConfig, TrackerConfig, TwoStageConfig,
@@ -23,7 +25,7 @@ use scores::Calibration;
 const INITIATES: f64 = 0.5;
 /// With at least this one it may continue a track: the track's own prediction speaks for it as well.
 const CONTINUES: f64 = 0.1;
-/// Acceleration density of things without height, px²/s³, of which the tracker wants more than 0: nothing beside any target's.
+/// Acceleration density of things without height, px²/s³ of video, of which the tracker wants more than 0: nothing beside any target's.
 const NO_ACCELERATION_PX2_PER_S3: f64 = 1e-4;
 /// The largest speed over the one that one step in a thousand exceeds: there are faster targets than those that were seen.
 const SPEED_RESERVE: f64 = 1.5;
@@ -37,8 +39,9 @@ pub fn for_detections(
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) {
-    let of_boxes = assumed(scans, rate_hz, unit, config, reasons);
     config.tracker.reidentification = ReidentificationConfig::default();
+    stretch::of_tracker(Tempo::of(1.0 / rate_hz), &mut config.tracker);
+    let of_boxes = assumed(scans, rate_hz, unit, config, reasons);
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
     let _ = noise::learn(scans, area_px2, unit, config, reasons);
@@ -80,7 +83,7 @@ fn assumed(scans: &[Scan], rate_hz: f64, unit: LengthUnit, config: &mut Config, 
     let calibration = links.as_ref().and_then(|l| Calibration::of(l.supported()));
     let high_score = calibration.as_ref().map_or(f32::NEG_INFINITY, |c| c.score_at(INITIATES));
     if let Some(motion) = links.and_then(|l| l.motion(high_score)) {
-        for_boxes(tracker, &motion);
+        for_boxes(tracker, &motion, Tempo::of(1.0 / rate));
         reasons.push(format!(
             "{} steps of boxes that overlap: centres to {:.3} of a box height beyond what is stated, acceleration of density {:.3} heights²/s³, speeds to {:.0} {px}/s, {:.0} % go on.",
             motion.n_steps,
@@ -112,16 +115,18 @@ fn assumed(scans: &[Scan], rate_hz: f64, unit: LengthUnit, config: &mut Config, 
 }
 
 /// Boxes of an object detector: every number in heights and seconds, as measured; boxes must overlap to be one target's.
-fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion) {
+fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion, tempo: Tempo) {
     tracker.extra_noise_per_height = round(motion.extra_noise);
     tracker.acceleration_density_per_height2_per_s3 = round(motion.density_per_s3);
     // All of both was measured in heights.
     tracker.extra_noise_px = 0.0;
-    tracker.acceleration_density_px2_per_s3 = NO_ACCELERATION_PX2_PER_S3;
-    tracker.max_speed_px_per_s = round(SPEED_RESERVE * motion.fastest_px_per_s).max(1.0);
+    tracker.acceleration_density_px2_per_s3 = tempo.density(NO_ACCELERATION_PX2_PER_S3);
+    let hardly_moves = tempo.speed(1.0);
+    tracker.max_speed_px_per_s = round(SPEED_RESERVE * motion.fastest_px_per_s).max(hardly_moves);
     tracker.detection_probability = round(motion.p_detection.clamp(0.1, 0.99));
-    tracker.initiation =
-        InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s: round(motion.speed_std_px_per_s).max(1.0) });
+    tracker.initiation = InitiationConfig::OnePoint(OnePointConfig {
+        velocity_std_px_per_s: round(motion.speed_std_px_per_s).max(hardly_moves),
+    });
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 2, scans: 3, ..MOfNConfig::default() });
     // As in `configs/detections-mot.toml`: sizes and overlap decide where places do not.
     tracker.association_cost = AssociationCostConfig {
@@ -131,6 +136,6 @@ fn for_boxes(tracker: &mut TrackerConfig, motion: &Motion) {
     };
     tracker.appearance_gain = 0.5;
     tracker.merged_measurements = MergedMeasurementsConfig::off();
-    tracker.coast_s = 1.0;
+    tracker.coast_s = tempo.stretched(1.0);
     tracker.coast_scans = 1;
 }

@@ -50,21 +50,22 @@ const STEPS: [f64; 2] = [2.0, 0.05];
 const FACTOR_STEPS: [f64; 2] = [0.4, 0.02];
 /// One deviation of the prior of the factor on stated variances: they are known better than the rest.
 const SCALE_PRIOR_FACTOR: f64 = 2.0;
-/// Least value of any of the five numbers: nothing beside a pixel and a second.
+/// Least value of any of the five numbers: nothing beside a pixel and a second of video.
 pub const LEAST: f64 = 1e-6;
 /// Innovations that every series gives before they count: its velocity is not known at first.
 const SETTLING: usize = 2;
 
-/// Finds the noise, from what was assumed before and the deviation of the targets' speeds (px/s) in a field of `area_px2`.
-pub fn fit(series: &[Vec<Step>], before: Noise, speed_std: f64, area_px2: f64) -> Noise {
+/// Finds the noise, from what was assumed before and the deviation of the targets' speeds (px/s) in a field of `area_px2`; densities are `least_density` at least.
+pub fn fit(series: &[Vec<Step>], before: Noise, least_density: f64, speed_std: f64, area_px2: f64) -> Noise {
+    let least = [LEAST, LEAST, LEAST, least_density, least_density].map(f64::ln);
     let start = [before.scale, before.extra_px, before.extra_per_height, before.density, before.density_per_height2];
-    let start = start.map(|v| v.max(LEAST).ln());
+    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().max(least[i]));
     let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
     let cost = |x: &[f64; 5]| {
         let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
         0.5 * prior - log_likelihood(series, &noise_of(x), speed_std, area_px2)
     };
-    noise_of(&search(start, STEPS, [LEAST.ln(), f64::INFINITY], cost))
+    noise_of(&search(start, STEPS, [least, [f64::INFINITY; 5]], cost))
 }
 
 /// The factors on R and on q, both within `1 / most ..= most`, that make the innovations most probable; begun at `from`. One deviation of the prior, around
@@ -84,7 +85,7 @@ pub fn fit_factors(
         let prior: f64 = (0..2).map(|i| (x[i] / edge).powi(2) + ((x[i] - start[i]) / drift_std[i]).powi(2)).sum();
         0.5 * prior - log_likelihood(series, &noise.times(x.map(f64::exp)), speed_std, area_px2)
     };
-    search(start, FACTOR_STEPS, [-edge, edge], cost).map(f64::exp)
+    search(start, FACTOR_STEPS, [[-edge; 2], [edge; 2]], cost).map(f64::exp)
 }
 
 impl Noise {
@@ -100,11 +101,11 @@ impl Noise {
     }
 }
 
-/// Least cost by a compass search from `at`, with the first and the last step and the limits of every number.
+/// Least cost by a compass search from `at`, with the first and the last step and the lowest and highest values of each number.
 fn search<const N: usize>(
     mut at: [f64; N],
     steps: [f64; 2],
-    limits: [f64; 2],
+    [low, high]: [[f64; N]; 2],
     cost: impl Fn(&[f64; N]) -> f64,
 ) -> [f64; N] {
     let mut step = steps[0];
@@ -114,7 +115,7 @@ fn search<const N: usize>(
         for i in 0..at.len() {
             for sign in [-1.0, 1.0] {
                 let mut next = at;
-                next[i] = (at[i] + sign * step).clamp(limits[0], limits[1]);
+                next[i] = (at[i] + sign * step).clamp(low[i], high[i]);
                 let c = cost(&next);
                 if c < least {
                     (at, least, moved) = (next, c, true);
@@ -231,7 +232,7 @@ mod tests {
                 Step { dt_s: 0.04, position, variance: [0.01; 2], height_px: 5.0, weight: 1.0 }
             })
             .collect();
-        let found = fit(&[steps], before, 50.0, 1e5);
+        let found = fit(&[steps], before, LEAST, 50.0, 1e5);
         let r = (0.01 * found.scale + found.extra_px.powi(2)).sqrt();
         assert!(r < 0.2, "0.1 px is the truth: {found:?}");
     }
@@ -243,7 +244,7 @@ mod tests {
         for (density, std, dt_s) in
             [(400.0, 0.5, 1.0 / 30.0), (400.0, 0.5, 1.0 / 120.0), (4.0, 2.0, 0.1), (9e4, 0.3, 0.04)]
         {
-            let found = fit(&series(density, std, dt_s), before, 50.0, 1e5);
+            let found = fit(&series(density, std, dt_s), before, LEAST, 50.0, 1e5);
             let r = 0.01 * found.scale + found.extra_px.powi(2) + (5.0 * found.extra_per_height).powi(2);
             let q = found.density + 25.0 * found.density_per_height2;
             assert!((r.sqrt() / std - 1.0).abs() < 0.06, "{density} {std} {dt_s}: {found:?}");

@@ -10,6 +10,7 @@ use super::digits::round;
 use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
+use crate::tempo::Tempo;
 use crate::track::TrackerParameters;
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
@@ -24,7 +25,7 @@ const COPY: f64 = 0.02;
 /// Probability that a target's detection lies in the gate, once the innovations are as wide as their covariances say: one true detection in
 /// ten thousand outside, a track's loss in some minutes of video. With 0.99 of covariances that were far too large the gate was as wide.
 const GATE_PROBABILITY: f64 = 0.9999;
-/// How long targets are one detection when they pass each other, s.
+/// How long targets are one detection when they pass each other, s of video.
 const MERGED_S: f64 = 1.0;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
@@ -106,18 +107,20 @@ pub fn learn(
         return Ok(());
     }
     let every = n_steps.div_ceil(MOST_STEPS);
-    let size_std = deviation(&mut size_wander(&tracks));
+    let tempo = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9));
+    let least_density = tempo.density(fit::LEAST);
+    let size_std = deviation(&mut size_wander(&tracks, tempo.stretched(MERGED_S)));
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
     let before = assumed(&TrackerParameters::of(t));
-    let found = fit(&series, before, t.max_speed_px_per_s / 3.0, area_px2);
+    let found = fit(&series, before, least_density, t.max_speed_px_per_s / 3.0, area_px2);
     t.merged_measurements.edge_std_px = round(size_std);
     t.gate_probability = GATE_PROBABILITY;
     t.detection_covariance_scale = round(found.scale);
-    t.extra_noise_px = or_none(found.extra_px);
-    t.extra_noise_per_height = or_none(found.extra_per_height);
+    t.extra_noise_px = or_none(found.extra_px, fit::LEAST);
+    t.extra_noise_per_height = or_none(found.extra_per_height, fit::LEAST);
     t.acceleration_density_px2_per_s3 = round(found.density);
-    t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2);
+    t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2, least_density);
     // Points have no boxes.
     let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
     let px = unit.sign();
@@ -143,23 +146,23 @@ pub(super) fn is_copy(position: [f64; 2], before: &Step) -> bool {
 }
 
 /// Three digits of a number, 0 where the search has left it at its floor.
-fn or_none(v: f64) -> f64 {
-    if v <= 2.0 * fit::LEAST { 0.0 } else { round(v) }
+fn or_none(v: f64, least: f64) -> f64 {
+    if v <= 2.0 * least { 0.0 } else { round(v) }
 }
 
-/// How far widths and heights change within [`MERGED_S`], over √2: px. The place of a member of a merged measurement is an edge and half of its own
+/// How far widths and heights change within that time, s, over √2: px. The place of a member of a merged measurement is an edge and half of its own
 /// size from before, and both are only known as well as that.
-fn size_wander(tracks: &BTreeMap<u64, Followed>) -> Vec<f64> {
+fn size_wander(tracks: &BTreeMap<u64, Followed>, merged_s: f64) -> Vec<f64> {
     let mut out = Vec::new();
     for t in tracks.values() {
         let mut now_s = 0.0;
         let times: Vec<f64> = t.steps.iter().map(|s| (now_s += s.dt_s, now_s).1).collect();
         let mut from = 0;
         for (to, time) in times.iter().enumerate() {
-            while from < to && time - times[from + 1] >= MERGED_S {
+            while from < to && time - times[from + 1] >= merged_s {
                 from += 1;
             }
-            if time - times[from] >= MERGED_S {
+            if time - times[from] >= merged_s {
                 let change = t.sizes.iter().map(|s| (s[to] - s[from]).abs() / std::f64::consts::SQRT_2);
                 out.extend(change);
             }

@@ -8,10 +8,12 @@
 use super::coder::{H264Coder, failed, sample_entry};
 use super::options::Mp4Options;
 use crate::io::atomic::AtomicFile;
+use crate::tempo::{Pace, Tempo};
 use crate::{Error, ErrorKind, Image, Result, Timestamp};
 use shiguredo_mp4::TrackKind;
 use shiguredo_mp4::boxes::SampleEntry;
 use shiguredo_mp4::mux::{Mp4FileMuxer, Mp4FileMuxerOptions, Sample, estimate_maximum_moov_box_size};
+use std::collections::VecDeque;
 use std::io::{Seek, SeekFrom, Write};
 use std::num::NonZeroU32;
 use std::path::Path;
@@ -19,8 +21,10 @@ use std::sync::mpsc::{Receiver, Sender};
 
 /// Ticks a second.
 pub(super) const TIMESCALE: u32 = 720_000;
-/// Longest time a frame may stand, ticks.
+/// Longest time that a frame stands, ticks: a pause of more is one of an hour.
 const MAX_DURATION: i64 = 3600 * TIMESCALE as i64;
+/// Time that the only frame of a video stands, ticks.
+const ALONE: i64 = TIMESCALE as i64 / 25;
 
 /// A frame to encode, or the wish to end.
 pub(super) type Work = Option<(Image<[u8; 3]>, Timestamp)>;
@@ -32,13 +36,23 @@ pub(super) struct Encoding {
     muxer: Mp4FileMuxer,
     size: (usize, usize),
     written: u64,
-    /// The coded frame that waits for its duration: time in ticks, place, size, key.
-    waiting: Option<(i64, u64, usize, bool)>,
+    /// The coded frames that wait for their duration.
+    waiting: VecDeque<Waiting>,
+    /// How fast they are played, where that is not as they came.
+    pace: Option<Pace>,
     /// How the frames are coded, until the muxer has it.
     entry: Option<SampleEntry>,
     described: bool,
     first: Option<Timestamp>,
     last_duration: i64,
+}
+
+/// A coded frame: ns since the first one, place and size in the file, whether decoding can start with it.
+struct Waiting {
+    since_ns: i128,
+    place: u64,
+    size: usize,
+    is_key: bool,
 }
 
 /// A time in ns, in ticks, rounded to the nearest.
@@ -71,11 +85,12 @@ impl Encoding {
             muxer,
             size,
             written,
-            waiting: None,
+            waiting: VecDeque::new(),
+            pace: options.watchable.then(Pace::default),
             entry: None,
             described: false,
             first: None,
-            last_duration: i64::from(TIMESCALE / 25),
+            last_duration: ALONE,
         })
     }
 
@@ -98,33 +113,54 @@ impl Encoding {
 
     fn encode(&mut self, frame: &Image<[u8; 3]>, time: Timestamp) -> Result<()> {
         let first = *self.first.get_or_insert(time);
-        let ticks = ticks_of(i128::from(time.ns) - i128::from(first.ns))?;
-        if let Some((start, ..)) = self.waiting {
-            let duration = ticks - start;
-            if !(1..=MAX_DURATION).contains(&duration) {
-                let what = format!(
-                    "frame times must rise by at most an hour; one follows after {} ns",
-                    i128::from(duration) * 12500 / 9
-                );
-                return Err(Error::new(ErrorKind::Output, what));
-            }
-            self.last_duration = duration;
-            self.append()?;
+        let since_ns = i128::from(time.ns) - i128::from(first.ns);
+        if let Some(before) = self.waiting.back()
+            && since_ns <= before.since_ns
+        {
+            let what = format!("frame times must rise; one follows after {} ns", since_ns - before.since_ns);
+            return Err(Error::new(ErrorKind::Output, what));
         }
+        let is_settled = self.pace.as_mut().is_none_or(|pace| {
+            pace.note(time);
+            pace.is_settled()
+        });
         let coded = self.coder.code_rgb(frame, false)?;
         if !self.described {
             self.entry = Some(sample_entry(self.size, coded)?);
             self.described = true;
         }
         self.file.write_all(&coded.data).map_err(|e| failed("cannot be written", e))?;
-        self.waiting = Some((ticks, self.written, coded.data.len(), coded.is_key));
-        self.written += coded.data.len() as u64;
+        let (size, is_key) = (coded.data.len(), coded.is_key);
+        self.waiting.push_back(Waiting { since_ns, place: self.written, size, is_key });
+        self.written += size as u64;
+        if is_settled { self.append_ended() } else { Ok(()) }
+    }
+
+    /// When a frame is shown, ticks.
+    fn shown(&self, since_ns: i128) -> Result<i64> {
+        match self.pace.as_ref().map(Pace::tempo).filter(|tempo| *tempo != Tempo::VIDEO) {
+            Some(tempo) => Ok((tempo.in_video(since_ns as f64 * 1e-9) * f64::from(TIMESCALE)).round() as i64),
+            None => ticks_of(since_ns),
+        }
+    }
+
+    /// Enters the waiting frames that another one follows in the tables.
+    fn append_ended(&mut self) -> Result<()> {
+        while let [a, b] = [0, 1].map(|i| self.waiting.get(i).map(|w| w.since_ns))
+            && let (Some(start), Some(end)) = (a, b)
+        {
+            self.last_duration = (self.shown(end)? - self.shown(start)?).clamp(1, MAX_DURATION);
+            self.append()?;
+        }
         Ok(())
     }
 
-    /// Enters the waiting frame in the tables.
+    /// Enters the first of the waiting frames in the tables.
     fn append(&mut self) -> Result<()> {
-        let Some((_, data_offset, data_size, keyframe)) = self.waiting.take() else { return Ok(()) };
+        let Some(Waiting { place: data_offset, size: data_size, is_key: keyframe, .. }) = self.waiting.pop_front()
+        else {
+            return Ok(());
+        };
         let sample = Sample {
             track_kind: TrackKind::Video,
             sample_entry: self.entry.take(),
@@ -139,9 +175,10 @@ impl Encoding {
     }
 
     fn finish(mut self) -> Result<()> {
-        if self.waiting.is_none() {
+        if self.waiting.is_empty() {
             return Err(Error::new(ErrorKind::Output, "no frame was written, so there is no video"));
         }
+        self.append_ended()?;
         self.append()?;
         let boxes = self.muxer.finalize().map_err(|e| failed("the file's tables cannot be made", e))?;
         for (offset, bytes) in boxes.offset_and_bytes_pairs() {

@@ -139,6 +139,34 @@ mod tests {
     }
 
     #[test]
+    fn what_was_not_taken_at_the_rate_of_video_can_be_watched() {
+        let dir = tempfile::tempdir().unwrap();
+        // A frame in ten minutes with a pause of a day, and ten thousand a second.
+        for (interval_ns, pause_ns, shown_ns) in
+            [(600_000_000_000, 86_400_000_000_000, 333_333_333), (100_000, 0, 8_333_333)]
+        {
+            let path = dir.path().join("out.mp4");
+            let options = Mp4Options { watchable: true, ..Mp4Options::default() };
+            let mut writer = Mp4Writer::create(&path, 32, 32, options).unwrap();
+            for k in 0..14 {
+                let ns = k * interval_ns + if k > 11 { pause_ns } else { 0 };
+                writer.write(Image::filled(32, 32, [9 * k as u8; 3]), Timestamp::from_ns(ns)).unwrap();
+            }
+            writer.finish().unwrap();
+            let mut video = open_mp4(&path, &OpenOptions::default()).unwrap();
+            let mut times = Vec::new();
+            while let Some(frame) = video.next_frame().unwrap() {
+                times.push(frame.time.ns);
+            }
+            assert_eq!(times.len(), 14);
+            for (k, gap) in times.windows(2).map(|w| w[1] - w[0]).enumerate() {
+                let expected = if k == 11 { shown_ns + pause_ns / 1800 } else { shown_ns };
+                assert!((gap - expected).abs() < 3000, "frame {k}: {gap} ns, not {expected}");
+            }
+        }
+    }
+
+    #[test]
     fn an_unfinished_video_leaves_nothing_behind() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("out.mp4");

@@ -12,12 +12,15 @@ pub struct Mp4Options {
     pub key_every: u32,
     /// Takes what stands still as it was in the frame before, whatever is left between the two: a quarter less time before a fixed camera. For videos to be looked at, not measured.
     pub still_as_before: bool,
+    /// Plays what was not taken at the rate of video so that it can be watched: frames that are farther apart than a third of a second (by the first ten) at three a second, more than 120 a
+    /// second at that.
+    pub watchable: bool,
     /// Number of frames, if known: their table is then put in front, so that players can start before all is loaded.
     pub expected_frames: Option<u64>,
 }
 
 impl Default for Mp4Options {
     fn default() -> Self {
-        Self { quantiser: 26, key_every: 60, still_as_before: false, expected_frames: None }
+        Self { quantiser: 26, key_every: 60, still_as_before: false, watchable: false, expected_frames: None }
     }
 }
