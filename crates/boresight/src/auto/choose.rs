@@ -188,7 +188,7 @@ pub(super) fn choose_looked(
             spots::configure(&evidence, info, &mut config, &mut reasons);
             stretch::of_both(tempo, &mut config);
             gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
-            if (evidence.is_poor() || !evidence.moves())
+            if (evidence.is_poor() || !evidence.moves() || evidence.many_faint().is_some())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
             {
                 faint::configure(&seen, &mut config, &mut reasons);

@@ -73,7 +73,7 @@ pub fn better([bright, dark]: [Faint; 2]) -> Faint {
     Faint { polarity, ..most }
 }
 
-/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if there are more detections than false alarms and nothing moves surely.
+/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if they are most of the many of which a part would never start a track, or if there are more detections than false alarms and nothing moves surely.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(
@@ -96,7 +96,9 @@ pub fn look(
         let longer = look_at(frames, &all, ground, seen.polarity, info, n_threads)?;
         return Ok(longer.chains.is_sure().then_some(longer));
     }
-    let mut more = seen.chains.is_surely_more_than(chains);
+    let finds_most = |n: &f64| seen.polarity == polarity && 2.0 * seen.per_frame > *n;
+    let many = isolated.many_faint().filter(finds_most).is_some() && seen.chains.is_sure();
+    let mut more = many || seen.chains.is_surely_more_than(chains);
     if !more && !chains.is_surely_more_than(&seen.chains) {
         // What is gone after a second shows in few of the frames looked at.
         let all: Vec<usize> = (0..frames.len()).collect();
@@ -191,6 +193,32 @@ mod tests {
         assert!((8.0..13.0).contains(&seen.per_frame), "{seen:?}");
         let (noise, info) = frames(0);
         assert_eq!(look(&noise, &[], &Seen::default(), &info, 1).unwrap(), None);
+    }
+
+    #[test]
+    fn of_many_that_diffuse_and_mostly_score_too_little_to_start_a_track_all_are_looked_for() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let (mut many, info) = frames(0);
+        let mut at: Vec<[f64; 2]> =
+            (0..24).map(|i| [16.0 + 33.0 * f64::from(i % 6), 20.0 + 40.0 * f64::from(i / 6)]).collect();
+        for (k, frame) in many.iter_mut().enumerate() {
+            let Pixels::Gray8(image) = &mut frame.pixels else { unreachable!() };
+            frame.time = Timestamp::from_secs_f64(0.04 * k as f64);
+            at.iter_mut().flatten().for_each(|v| *v += 0.7 * rng.sample::<f64, _>(StandardNormal));
+            for y in 0..160 {
+                for (x, p) in image.row_mut(y).iter_mut().enumerate() {
+                    let d2 = |a: &[f64; 2]| (x as f64 - a[0]).powi(2) + (y as f64 - a[1]).powi(2);
+                    let light: f64 = at.iter().map(|a| 90.0 * (-0.5 * d2(a) / 1.69).exp()).sum();
+                    *p = p.saturating_add(light.round() as u8);
+                }
+            }
+        }
+        let isolated = spots::look(&many, &[], &info, 1).unwrap();
+        assert!(isolated.many_faint().is_some(), "{isolated:?}");
+        let choice = crate::auto::choose(&many, &info, &Config::default()).unwrap();
+        let threshold = choice.config.detector.threshold;
+        let every = matches!(threshold, ThresholdConfig::Cfar(_) | ThresholdConfig::Spot(_));
+        assert!(every && choice.config.tracker.min_initiation_score == 0.0, "{threshold:?}");
     }
 
     #[test]

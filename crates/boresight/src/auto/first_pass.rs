@@ -33,11 +33,12 @@ impl FirstPass {
         taken
     }
 
-    /// Takes frames that are read ahead, or read now as long as they may be held, until `most` or more are taken in all or the detector refuses one.
+    /// Takes frames that are read ahead, or read now as long as they may be held, until `most` are taken in all or the detector refuses one.
     pub fn take_on(&mut self, frames: &mut Replay, at_once: &mut AtOnce, most: usize) {
         while self.scans.len() < most {
             let taken = self.scans.len();
-            let frames = frames.read_on(taken + at_once.n_frames()).get(taken..).unwrap_or_default();
+            let ahead = frames.read_on(taken.saturating_add(at_once.n_frames()).min(most));
+            let frames = ahead.get(taken..ahead.len().min(most)).unwrap_or_default();
             if frames.is_empty() || !self.take(frames, at_once) {
                 return;
             }

@@ -34,6 +34,9 @@ const MIN_SCORE: f64 = 2.5;
 pub struct Side {
     /// Sure blobs a frame.
     pub per_frame: f64,
+    /// All blobs a frame, and those that would start no track.
+    pub all_per_frame: f64,
+    pub faint_per_frame: f64,
     /// Their mean score.
     pub mean_score: f64,
     /// Median and 95 % point of the longer side of their boxes, px.
@@ -51,10 +54,15 @@ impl Side {
             sum += f64::from(d.score).min(100.0);
             sides.push(d.extent.width_px.max(d.extent.height_px));
         }
+        let n_scans = scans.len().max(1) as f64;
+        let all = || scans.iter().flat_map(|s| &s.detections);
+        let n_faint = all().filter(|d| f64::from(d.score) < INITIATION_SCORE).count();
         sides.sort_by(f64::total_cmp);
         let at = |q: f64| sides.get((sides.len().saturating_sub(1) as f64 * q) as usize).copied().unwrap_or(0.0);
         Self {
-            per_frame: n as f64 / scans.len().max(1) as f64,
+            per_frame: n as f64 / n_scans,
+            all_per_frame: all().count() as f64 / n_scans,
+            faint_per_frame: n_faint as f64 / n_scans,
             mean_score: sum / n.max(1) as f64,
             side_px: [at(0.5), at(0.95)],
             chains,
@@ -80,6 +88,18 @@ impl Seen {
     /// Whether anything moves as a target would.
     pub fn moves(&self) -> bool {
         self.bright.chains.is_sure() || self.dark.chains.is_sure()
+    }
+
+    /// How many blobs a frame there are if they are as many, beyond those of the other polarity, as particles are, and more than a fourth score too little to start a track: many targets
+    /// never would. Of noise and texture there are as many of both.
+    pub fn many_faint(&self) -> Option<f64> {
+        let (side, other) = match self.most().0 {
+            Polarity::Dark => (&self.dark, &self.bright),
+            _ => (&self.bright, &self.dark),
+        };
+        let beyond = side.all_per_frame - other.all_per_frame;
+        let faint = side.faint_per_frame - other.faint_per_frame;
+        (beyond > MANY && faint > MOST_FAINT * beyond).then_some(beyond)
     }
 
     /// The polarity whose chains gain more, and these.
@@ -164,6 +184,8 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
 /// the exam 1.1, 4.7, 8.3 false tracks a minute come in half A and 0.4, 1.2, 2.7 in half B, for 95.0, 95.1, 96.7 and 88.6, 89.9, 92.4 % held.
 const INITIATION_SCORE: f64 = 6.0;
 const WEAK_INITIATION_SCORE: f64 = 4.0;
+/// Share of the blobs that may score less.
+const MOST_FAINT: f64 = 0.25;
 
 /// Writes detector and tracker for isolated targets.
 pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
@@ -245,7 +267,20 @@ mod tests {
                 Sightings { time_s: 0.04 * f64::from(k), all: vec![Sighting::of_box(at, 0.1, 6.0)] }
             })
             .collect();
-        Side { per_frame, mean_score, side_px: [6.0; 2], chains: Evidence::of(&scans, 76_800.0) }
+        let chains = Evidence::of(&scans, 76_800.0);
+        Side { per_frame, mean_score, side_px: [6.0; 2], chains, ..Side::default() }
+    }
+
+    #[test]
+    fn many_faint_ones_are_those_of_one_polarity_that_would_start_no_track() {
+        let many = |[bright, faint]: [f64; 2], [dark, faint_dark]: [f64; 2]| {
+            let side = |all_per_frame, faint_per_frame| Side { all_per_frame, faint_per_frame, ..Side::default() };
+            Seen { bright: side(bright, faint), dark: side(dark, faint_dark) }.many_faint()
+        };
+        assert_eq!(many([40.0, 30.0], [0.0, 0.0]), Some(40.0));
+        assert_eq!(many([40.0, 5.0], [0.0, 0.0]), None, "nearly all start tracks");
+        assert_eq!(many([40.0, 30.0], [38.0, 30.0]), None, "texture");
+        assert_eq!(many([12.0, 10.0], [0.0, 0.0]), None, "few");
     }
 
     #[test]

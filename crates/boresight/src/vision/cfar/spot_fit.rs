@@ -1,13 +1,14 @@
 //! A Gaussian spot fitted by least squares: position, its covariance, and whether it is a spot at all.
 //!
-//! Model: I(x, y) = b + A exp(-((x - x0)² + (y - y0)²) / (2 σ²)), five unknowns, Levenberg's form of Gauss-Newton. Covariance of the
+//! Model: I(x, y) = b + gx (x - cx) + gy (y - cy) + A exp(-((x - x0)² + (y - y0)²) / (2 σ²)), c the middle of the window: seven unknowns, Levenberg's form of Gauss-Newton. A ground
+//! that slopes by s counts a pixel draws a fit without slope by some 2 s σ² / A. Covariance of the
 //! position: s² (JᵀJ)⁻¹, the Cramér-Rao bound for normal noise of the deviation s of the residuals (at least the rounding noise). The
 //! residuals hold what the ground adds, so the covariance does too. Source: K. Mortensen et al., Nat. Methods 7, 377 (2010).
 //! Limits: the pixel's own width is taken into σ, right for σ above 0.5 px; a spot cut by the border is fitted to what is seen.
-//! Symbols: A height (counts), b ground (counts), σ deviation of the spot (px).
+//! Symbols: A height (counts), b ground (counts), g its slope (counts/px), σ deviation of the spot (px).
 
 use super::pyramid::Level;
-use nalgebra::{Matrix2, Matrix5, Vector2, Vector5};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 const STEPS: usize = 8;
 /// Half side of the window, in deviations of the spot expected.
@@ -40,10 +41,14 @@ pub(super) struct Guess {
     pub(super) sigma: f64,
 }
 
-/// Normal equations and cost at a state [x0, y0, A, b, σ].
+/// Unknowns: x0, y0, A, b, σ, gx, gy.
+const N: usize = 7;
+type State = SVector<f64, N>;
+
+/// Normal equations and cost at a state.
 struct Sums {
-    normal: Matrix5<f64>,
-    gradient: Vector5<f64>,
+    normal: SMatrix<f64, N, N>,
+    gradient: State,
     cost: f64,
     n: usize,
 }
@@ -51,15 +56,16 @@ struct Sums {
 /// Largest half side of a window, px.
 const MOST: usize = 16;
 
-fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &Vector5<f64>) -> Sums {
+fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &State) -> Sums {
     let (x0, y0, a, b, s) = (p[0], p[1], p[2], p[3], p[4]);
+    let middle = [0.5 * (left + right) as f64, 0.5 * (top + bottom) as f64];
     let scale = -0.5 / (s * s);
     let mut gx = [0.0; 2 * MOST + 1];
     for (g, x) in gx.iter_mut().zip(left..=right) {
         *g = (scale * (x as f64 - x0).powi(2)).exp();
     }
-    let mut m = [0.0f64; 15];
-    let mut v = [0.0f64; 5];
+    let mut m = [0.0f64; N * (N + 1) / 2];
+    let mut v = [0.0f64; N];
     let (mut cost, mut n) = (0.0, 0);
     for y in top..=bottom {
         let dy = y as f64 - y0;
@@ -68,12 +74,13 @@ fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &Vector5<f64>) ->
             let dx = x as f64 - x0;
             let g = gx * gy;
             let ag = a * g / (s * s);
-            let j = [ag * dx, ag * dy, g, 1.0, ag * (dx * dx + dy * dy) / s];
-            let r = f64::from(pixel) - b - a * g;
+            let (sx, sy) = (x as f64 - middle[0], y as f64 - middle[1]);
+            let j = [ag * dx, ag * dy, g, 1.0, ag * (dx * dx + dy * dy) / s, sx, sy];
+            let r = f64::from(pixel) - b - p[5] * sx - p[6] * sy - a * g;
             let mut at = 0;
-            for i in 0..5 {
+            for i in 0..N {
                 v[i] += j[i] * r;
-                for k in i..5 {
+                for k in i..N {
                     m[at] += j[i] * j[k];
                     at += 1;
                 }
@@ -82,16 +89,16 @@ fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &Vector5<f64>) ->
             n += 1;
         }
     }
-    let mut normal = Matrix5::zeros();
+    let mut normal = SMatrix::<f64, N, N>::zeros();
     let mut at = 0;
-    for i in 0..5 {
-        for k in i..5 {
+    for i in 0..N {
+        for k in i..N {
             normal[(i, k)] = m[at];
             normal[(k, i)] = m[at];
             at += 1;
         }
     }
-    Sums { normal, gradient: Vector5::from(v), cost, n }
+    Sums { normal, gradient: State::from(v), cost, n }
 }
 
 /// Fits a spot on a level near a guess; `least_variance` is that of a pixel at least, counts². `None` if what is there is no spot.
@@ -104,12 +111,12 @@ pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot
         (cx + half).min(on.width - 1),
         (cy + half).min(on.height - 1),
     ];
-    let mut p = Vector5::new(guess.x, guess.y, guess.height, guess.ground, guess.sigma);
+    let mut p = State::from([guess.x, guess.y, guess.height, guess.ground, guess.sigma, 0.0, 0.0]);
     let mut now = sums(on, window, &p);
     let mut damping = 1e-3;
     for _ in 0..STEPS {
         let mut normal = now.normal;
-        for i in 0..5 {
+        for i in 0..N {
             normal[(i, i)] *= 1.0 + damping;
         }
         let step = normal.cholesky()?.solve(&now.gradient);
@@ -134,7 +141,7 @@ pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot
     if !near || !is_seen || !sized || p[2] * guess.height <= 0.0 || now.n < 12 {
         return None;
     }
-    let variance = (now.cost / (now.n - 5) as f64).max(least_variance);
+    let variance = (now.cost / (now.n - N) as f64).max(least_variance);
     let inverse = now.normal.cholesky()?.inverse();
     let cov = inverse.fixed_view::<2, 2>(0, 0) * variance;
     let cov = 0.5 * (cov + cov.transpose());
@@ -164,6 +171,21 @@ mod tests {
             assert!((spot.position - Vector2::new(x0, y0)).norm() < 1e-3, "{spot:?}");
             assert!((spot.sigma - sigma).abs() < 1e-2 && (spot.height - height).abs() < 0.1);
         }
+    }
+
+    #[test]
+    fn a_spot_on_a_slope_is_where_it_is() {
+        let value = |i: usize| {
+            let (x, y) = ((i % 21) as f64, (i / 21) as f64);
+            let spot = 40.0 * (-((x - 10.3).powi(2) + (y - 9.6).powi(2)) / (2.0 * 1.5 * 1.5)).exp();
+            100.0 + 4.0 * x - 2.5 * y + spot
+        };
+        let image = Image::from_vec(21, 21, (0..441).map(|i| value(i) as f32).collect()).unwrap();
+        let mut pyramid = Pyramid::default();
+        let on = &pyramid.fill(&image, 1)[0];
+        let guess = Guess { x: 11.0, y: 9.0, height: 25.0, ground: 115.0, sigma: 1.6 };
+        let spot = fit(on, &guess, 1e-6).unwrap();
+        assert!((spot.position - Vector2::new(10.3, 9.6)).norm() < 1e-3, "{spot:?}");
     }
 
     #[test]
