@@ -4,8 +4,9 @@
 //! ten thousand a second, has chosen the interval by what moves, and the frames are the same as those of another thing at another interval. So beyond [`SLOWEST_S`] and below
 //! [`FASTEST_S`] what is assumed in seconds is stretched as the interval is, and equal frames give equal tracks whatever the interval; between the two seconds are seconds.
 //! Symbols: τ seconds of the sequence that stand for one of video.
-//! Limits: what a person sets is in seconds and stays.
+//! Limits: what a person sets is in seconds and stays. Times are whole nanoseconds: from a frame in a microsecond on they are no longer even.
 
+use crate::Scan;
 #[cfg(any(feature = "draw", feature = "encode"))]
 use crate::Timestamp;
 
@@ -35,6 +36,11 @@ impl Tempo {
         let mut gaps: Vec<f64> = gaps.filter(|g| *g > 0.0).collect();
         gaps.sort_by(f64::total_cmp);
         Self::of(gaps.get(gaps.len() / 4).copied().unwrap_or(0.0))
+    }
+
+    /// The same of scans.
+    pub fn of_scans(scans: &[Scan]) -> Self {
+        Self::of_times(scans.iter().map(|s| s.time.as_secs_f64()))
     }
 
     /// The time that lasts as long here as that in video, s.

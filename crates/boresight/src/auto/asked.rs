@@ -5,7 +5,6 @@
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
 use super::second_look::Second;
-use super::stretch;
 use super::{carried, cells, colour, faint, moving, particles, spots, steadied, summed};
 use crate::tempo::Tempo;
 use crate::{Config, Error, ErrorKind, Frame, Result, SourceInfo};
@@ -34,12 +33,16 @@ pub fn configure(
     let tempo = Tempo::of(interval_s);
     match kind {
         DetectorKind::Isolated => {
-            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, reasons);
-            stretch::of_both(tempo, config);
+            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, tempo, info, config, reasons);
         }
         DetectorKind::Cfar => {
-            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
-            stretch::of_both(tempo, config);
+            spots::configure(
+                &spots::look(frames, &scene.ground, info, n_threads)?,
+                tempo,
+                info,
+                config,
+                &mut Vec::new(),
+            );
             faint::configure_asked(
                 &faint::better(faint::count(frames, &scene.ground, info, n_threads)?.0),
                 config,
@@ -47,23 +50,32 @@ pub fn configure(
             );
         }
         DetectorKind::Integrate => {
-            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
-            stretch::of_both(tempo, config);
+            spots::configure(
+                &spots::look(frames, &scene.ground, info, n_threads)?,
+                tempo,
+                info,
+                config,
+                &mut Vec::new(),
+            );
             summed::configure(scene, interval_s, config, reasons);
         }
         DetectorKind::Bernoulli => {
-            spots::configure(&spots::look(frames, &scene.ground, info, n_threads)?, info, config, &mut Vec::new());
-            stretch::of_both(tempo, config);
+            spots::configure(
+                &spots::look(frames, &scene.ground, info, n_threads)?,
+                tempo,
+                info,
+                config,
+                &mut Vec::new(),
+            );
             carried::configure(scene, interval_s, info, config, reasons);
         }
         DetectorKind::Moving => {
             let explained = scene.explained(&second.or(frames), info, n_threads)?;
-            moving::configure(&seen_or_assumed(scene, info, reasons), explained, info, config, reasons);
-            stretch::of_both(tempo, config);
+            moving::configure(&seen_or_assumed(scene, info, reasons), explained, tempo, info, config, reasons);
         }
         DetectorKind::Steadied => steadied::configure_asked(frames, scene, tempo, info, config, reasons)?,
         DetectorKind::Spot => {
-            let seen = particles::count(frames, info, n_threads)?.0;
+            let seen = particles::count(frames, info, n_threads)?.seen;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
             particles::configure(&seen, info, interval_s, config, reasons);
         }
@@ -81,8 +93,7 @@ pub fn configure(
                 .at("--detector colour")
                 .hint("give the colour in a configuration: detector.threshold.colour.reference = [red, green, blue]"));
             };
-            colour::configure(&reference, info, config, reasons);
-            stretch::of_both(tempo, config);
+            colour::configure(&reference, tempo, info, config, reasons);
         }
     }
     Ok(())

@@ -11,7 +11,6 @@ use super::request::Request;
 use super::scene::{self, Camera, Scene};
 use super::second_look::Second;
 use super::spread::growing;
-use super::stretch;
 use super::whole_tracks::report_whole;
 use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
 use crate::io::Colour;
@@ -145,18 +144,17 @@ pub(super) fn choose_looked(
         Some(_) => None,
     };
     // Who asks for grey gets grey.
+    let mut counted = None;
     let coloured = base.input.colour != Colour::Gray;
     if let Some(kind) = request.detector {
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
-        colour::configure(&reference, info, &mut config, &mut reasons);
-        stretch::of_both(tempo, &mut config);
+        colour::configure(&reference, tempo, info, &mut config, &mut reasons);
     } else if scene.camera == Camera::Fixed
         && let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)?
     {
-        moving::configure(scene, explained, info, &mut config, &mut reasons);
-        stretch::of_both(tempo, &mut config);
-    } else if let Some(seen) = particles::look(frames, scene, info, n_threads)? {
+        moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
+    } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
         particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
     } else {
         let cells = cells::look(frames, info, n_threads)?;
@@ -175,7 +173,7 @@ pub(super) fn choose_looked(
             None => None,
         };
         let spots_for_cells = match &cells {
-            Some(_) => particles::look_in_place_of_cells(frames, info, n_threads)?,
+            Some(_) => counted.map_or_else(|| particles::count(frames, info, n_threads), Ok)?.in_place_of_cells(),
             None => None,
         };
         if let Some(seen) = spots_for_cells {
@@ -185,8 +183,7 @@ pub(super) fn choose_looked(
         } else {
             let steadied = steadied::look_beside(&evidence, frames, scene, tempo, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
-            spots::configure(&evidence, info, &mut config, &mut reasons);
-            stretch::of_both(tempo, &mut config);
+            spots::configure(&evidence, tempo, info, &mut config, &mut reasons);
             gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
             if (evidence.is_poor() || !evidence.moves() || evidence.many_faint().is_some())
                 && let Some(seen) = faint::look(frames, &scene.ground, &evidence, info, n_threads)?
@@ -196,8 +193,7 @@ pub(super) fn choose_looked(
                 gain = seen.chains.gain().max(f64::MIN_POSITIVE);
             }
             if let (Some(seen), Some(mut first)) = (steadied, seen_so_far) {
-                steadied::configure(&seen, info, &mut first.config, &mut first.reasons);
-                stretch::of_both(tempo, &mut first.config);
+                steadied::configure(&seen, tempo, info, &mut first.config, &mut first.reasons);
                 gain = seen.chains.gain();
                 runner_up = Some(Box::new(Choice::alone(config, reasons)));
                 Choice { config, reasons, .. } = first;

@@ -2,8 +2,10 @@
 
 use super::digits::round;
 use super::scene::{Camera, Scene};
+use super::stretch;
 use crate::camera::CameraConfig;
 use crate::io::Colour;
+use crate::tempo::Tempo;
 use crate::track::{ConfirmationConfig, InitiationConfig, MOfNConfig, OnePointConfig};
 use crate::vision::colour::{ColourMatchConfig, Reference, choose_reference};
 use crate::vision::config::DetectorConfig;
@@ -39,7 +41,13 @@ pub fn look(frames: &[&Frame], scene: &Scene, info: &SourceInfo) -> Option<Refer
 }
 
 /// Writes detector and tracker.
-pub fn configure(reference: &Reference, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(
+    reference: &Reference,
+    tempo: Tempo,
+    info: &SourceInfo,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
     let [r, g, b] = reference.rgb;
     let side = reference.area_px.sqrt();
     reasons.push(format!(
@@ -66,6 +74,7 @@ pub fn configure(reference: &Reference, info: &SourceInfo, config: &mut Config, 
     let velocity_std_px_per_s = round(tracker.max_speed_px_per_s / 3.0);
     tracker.initiation = InitiationConfig::OnePoint(OnePointConfig { velocity_std_px_per_s });
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
+    stretch::of_tracker(tempo, tracker);
 }
 
 #[cfg(test)]
@@ -145,7 +154,7 @@ mod tests {
         let reference = look(&frames.iter().collect::<Vec<_>>(), &scene, &info).unwrap();
         assert!(reference.n_frames > scene.n_moving, "{reference:?}");
         let (mut config, mut reasons) = (Config::default(), Vec::new());
-        configure(&reference, &info, &mut config, &mut reasons);
+        configure(&reference, Tempo::VIDEO, &info, &mut config, &mut reasons);
         assert!(reasons[0].contains(&format!("in {} of the frames looked at", reference.n_frames)), "{reasons:?}");
         assert_eq!(shares("in 3 of 2 frames"), [(3, 2)]);
         for reason in &reasons {

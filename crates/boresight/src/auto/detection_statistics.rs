@@ -109,7 +109,7 @@ pub fn learn(
         return Ok(found);
     }
     let interval_s = over_s / (n_scans - 1) as f64;
-    let tempo = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9));
+    let tempo = Tempo::of_scans(scans);
     for _ in 0..PASSES {
         let (tracks, held) = run(scans, config)?;
         let targets = || tracks.values().filter(|t| t.confirmed);

@@ -8,7 +8,6 @@
 use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::moving;
 use super::scene::{Camera, Scene};
-use super::stretch;
 use crate::tempo::Tempo;
 use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
 
@@ -27,8 +26,7 @@ pub fn look(
         return Ok(None);
     }
     let Some(explained) = moving::look(frames, scene, info, n_threads)? else { return Ok(None) };
-    moving::configure(scene, explained, info, &mut config, &mut reasons);
-    stretch::of_both(tempo, &mut config);
+    moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     Ok(Some((config, reasons)))
 }
 

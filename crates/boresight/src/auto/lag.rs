@@ -30,7 +30,7 @@ const LEAST_WAYS: usize = 20;
 pub(super) fn longer(scans: &[Scan], shown: &Evidence, lag_s: f64, size_px: [f64; 2]) -> Option<(f64, String)> {
     let longer_s = round(2.0 * lag_s);
     let lasts_s = scans.last()?.time.seconds_since(scans[0].time);
-    let longest_s = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9)).stretched(LONGEST_S);
+    let longest_s = Tempo::of_scans(scans).stretched(LONGEST_S);
     if longer_s > longest_s
         || lasts_s < LEAST_LAGS * longer_s
         || covered(scans, SECOND_LAG * longer_s, size_px) < LEAST_COVERED

@@ -5,7 +5,9 @@ use super::digits::round;
 use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::scene::{Camera, Scene};
 use super::sightings::Sighting;
+use super::stretch;
 use crate::camera::CameraConfig;
+use crate::tempo::Tempo;
 use crate::track::{
     ConfirmationConfig, InitiationConfig, MOfNConfig, MergedMeasurementsConfig, OnePointConfig, Report, TrackerConfig,
 };
@@ -75,7 +77,14 @@ fn fits(scene: &Scene, info: &SourceInfo) -> bool {
 }
 
 /// Writes detector and tracker.
-pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(
+    scene: &Scene,
+    explained: f64,
+    tempo: Tempo,
+    info: &SourceInfo,
+    config: &mut Config,
+    reasons: &mut Vec<String>,
+) {
     let [w, h] = scene.size_px;
     let camera = match scene.camera {
         Camera::Fixed => "Fixed camera",
@@ -110,6 +119,7 @@ pub fn configure(scene: &Scene, explained: f64, info: &SourceInfo, config: &mut 
     config.tracker.report = Report::Moving;
     // People walk side by side for seconds.
     config.tracker.merged_measurements.max_secondary_s = 8.0;
+    stretch::of_both(tempo, config);
     reasons.push(format!(
         "Regions of {least} px or more count, parts nearer than {} px are one. What stands long becomes background \
          (detector.threshold.moving.standing-time-s); a track is reported once it has moved farther than its covariance and the wander of its \

@@ -55,41 +55,48 @@ pub struct Particles {
     pub step: f64,
 }
 
-/// Particles, if the frames are full of them.
+/// Blobs in the frames, and what they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Counted {
+    /// What was seen.
+    pub seen: Particles,
+    /// Whether they are of one size, and of one sign.
+    alike: bool,
+    /// Whether they are that, many, and all over the frame.
+    fills: bool,
+}
+
+impl Counted {
+    /// What is there of bright pieces that pass for cells, if at half of their height they are spots, of one size: how large a piece is that is cut at some deviations of the noise tells
+    /// how bright a spot is.
+    pub fn in_place_of_cells(self) -> Option<Particles> {
+        let are_spots = self.seen.polarity == Polarity::Bright && DIAMETER_PER_WIDTH * self.seen.width_px < SPOT_PX;
+        (are_spots && self.alike).then_some(self.seen)
+    }
+}
+
+/// Particles, if the frames are full of them; what was counted for that is left in `counted`.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<Particles>> {
+pub fn look(
+    frames: &[Frame],
+    scene: &Scene,
+    info: &SourceInfo,
+    n_threads: usize,
+    counted: &mut Option<Counted>,
+) -> Result<Option<Particles>> {
     // What stands before a fixed camera is scenery.
     if scene.camera == Camera::Fixed && scene.regions < LEAST {
         return Ok(None);
     }
-    let (seen, kind) = count(frames, info, n_threads)?;
-    Ok(kind.fills.then_some(seen))
-}
-
-/// What is there of bright pieces that pass for cells, if at half of their height they are spots, of one size: how large a piece is that is cut at some deviations of the noise tells how
-/// bright a spot is.
-/// # Errors
-/// Frames of more than one size or pixel type.
-pub fn look_in_place_of_cells(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Particles>> {
-    let (seen, kind) = count(frames, info, n_threads)?;
-    let are_spots = seen.polarity == Polarity::Bright && DIAMETER_PER_WIDTH * seen.width_px < SPOT_PX;
-    Ok((are_spots && kind.alike).then_some(seen))
-}
-
-/// What blobs in the frames are.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Kind {
-    /// Of one size, and of one sign.
-    alike: bool,
-    /// That, many, and all over the frame.
-    fills: bool,
+    let found = counted.insert(count(frames, info, n_threads)?);
+    Ok(found.fills.then_some(found.seen))
 }
 
 /// The blobs of the polarity of which there are more of one size all over the frame, else of which there are more; what they are.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Particles, Kind)> {
+pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Counted> {
     let step = value_step(frames);
     let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX, step };
     let (mut best, mut most, mut most_alike, mut counts) = (None::<Particles>, none, false, [0.0; 2]);
@@ -128,9 +135,8 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(P
     // Texture, and what a codec makes of noise, is as often dark as bright.
     let other = counts[0].min(counts[1]);
     let best = best.filter(|b| b.per_frame >= MOST_SIDED * other && b.per_frame - other >= LEAST);
-    let kind =
-        Kind { alike: best.is_some() || (most_alike && most.per_frame >= MOST_SIDED * other), fills: best.is_some() };
-    Ok((best.unwrap_or(most), kind))
+    let alike = best.is_some() || (most_alike && most.per_frame >= MOST_SIDED * other);
+    Ok(Counted { seen: best.unwrap_or(most), alike, fills: best.is_some() })
 }
 
 /// Threshold in standard deviations of the smoothed noise at which [`FALSE_SHARE`] of a frame's detections is expected to be noise: one independent look for
@@ -186,8 +192,9 @@ pub fn configure(
 #[cfg(test)]
 mod tests {
     use super::super::choose;
+    use super::super::in_memory::described;
     use super::*;
-    use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};
+    use crate::{FrameIndex, Image, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -209,16 +216,7 @@ mod tests {
             Frame { index: FrameIndex(k), time: Timestamp::from_secs_f64(0.1 * k as f64), pixels }
         };
         let frames: Vec<Frame> = (0..12).map(&mut frame).collect();
-        let info = SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width: SIZE,
-            height: SIZE,
-            kind: PixelKind::Gray16,
-            n_frames: Some(12),
-            rate_hz: Some(10.0),
-            true_times: true,
-        };
+        let (frames, info) = described(frames);
         choose(&frames, &info, &Config::default()).unwrap().config.detector.threshold
     }
 

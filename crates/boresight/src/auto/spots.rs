@@ -5,7 +5,9 @@ use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
 use super::spread::growing;
+use super::stretch;
 use crate::camera::CameraConfig;
+use crate::tempo::Tempo;
 use crate::track::{MergedMeasurementsConfig, Report, TrackerConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
@@ -188,7 +190,7 @@ const WEAK_INITIATION_SCORE: f64 = 4.0;
 const MOST_FAINT: f64 = 0.25;
 
 /// Writes detector and tracker for isolated targets.
-pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let polarity = evidence.polarity();
     let seen = if polarity == Polarity::Dark { &evidence.dark } else { &evidence.bright };
     let per_frame = match polarity {
@@ -233,6 +235,7 @@ pub fn configure(evidence: &Seen, info: &SourceInfo, config: &mut Config, reason
         MergedMeasurementsConfig { max_secondary_s: tracker.coast_s, ..MergedMeasurementsConfig::default() };
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.min_initiation_score = INITIATION_SCORE;
+    stretch::of_tracker(tempo, tracker);
     let n_moving = evidence.bright.chains.moving.len() + evidence.dark.chains.moving.len();
     let few_move = evidence.moves() && (n_moving as f64) < FEW_MOVE * per_frame;
     if per_frame > MANY && !few_move {
@@ -299,7 +302,7 @@ mod tests {
         let report = |per_frame: f64, step_px: f64| {
             let bright = side(per_frame, 20.0, 50.0, 50.0, step_px);
             let (mut config, mut reasons) = (Config::default(), Vec::new());
-            configure(&Seen { bright, dark: Side::default() }, &info, &mut config, &mut reasons);
+            configure(&Seen { bright, dark: Side::default() }, Tempo::VIDEO, &info, &mut config, &mut reasons);
             config.tracker.report
         };
         assert_eq!(report(44.0, 4.0), Report::Moving, "stars and a satellite");

@@ -172,7 +172,7 @@ fn look(frames: &[Frame], scene: &Scene, tempo: Tempo, info: &SourceInfo) -> Res
 }
 
 /// Writes detector and tracker.
-pub fn configure(seen: &Seen, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
+pub fn configure(seen: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     config.detector = detector(seen.lag_s, info);
     config.detector.camera = CameraConfig::Moving;
     let tracker = &mut config.tracker;
@@ -182,6 +182,7 @@ pub fn configure(seen: &Seen, info: &SourceInfo, config: &mut Config, reasons: &
     // Rims come and go: velocities are known from two of them, not from the size.
     tracker.initiation = InitiationConfig::TwoPoint(TwoPointConfig::default());
     tracker.confirmation = ConfirmationConfig::MOfN(MOfNConfig { hits: 3, scans: 5, ..MOfNConfig::default() });
+    stretch::of_tracker(tempo, tracker);
     reasons.push(format!(
         "{} frames {} s and {} s ago, steadied, {:.1} regions a frame move by themselves, median side {:.0} px, {}: so those are \
          detected (detector.threshold.steadied). What stands on the ground is not.",
@@ -206,7 +207,6 @@ pub fn configure_asked(
     reasons: &mut Vec<String>,
 ) -> Result<()> {
     let seen = if frames.is_empty() { Seen::default() } else { look(frames, scene, tempo, info)? };
-    configure(&Seen { camera: scene.camera, lag_s: lag_s(tempo), ..seen }, info, config, reasons);
-    stretch::of_both(tempo, config);
+    configure(&Seen { camera: scene.camera, lag_s: lag_s(tempo), ..seen }, tempo, info, config, reasons);
     Ok(())
 }

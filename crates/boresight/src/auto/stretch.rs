@@ -51,11 +51,11 @@ pub fn of_tracker(tempo: Tempo, t: &mut TrackerConfig) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::in_memory::InMemory;
+    use super::super::in_memory::{InMemory, described};
     use super::super::{choose, learn};
     use crate::auto::Request;
     use crate::io::Replay;
-    use crate::{Config, Error, Frame, FrameIndex, Image, PixelKind, Pixels, Scan, SourceInfo, Timestamp};
+    use crate::{Config, Error, Frame, FrameIndex, Image, Pixels, Scan, SourceInfo, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -84,17 +84,7 @@ mod tests {
                 Frame { index: FrameIndex(k), time, pixels: Pixels::Gray16(image) }
             })
             .collect();
-        let info = SourceInfo {
-            label: String::new(),
-            reader: String::new(),
-            width: SIZE,
-            height: SIZE,
-            kind: PixelKind::Gray16,
-            n_frames: Some(40),
-            rate_hz: Some(1.0 / interval_s),
-            true_times: true,
-        };
-        (frames, info)
+        described(frames)
     }
 
     /// Id and place of every reported track in every frame, as chosen and learnt.

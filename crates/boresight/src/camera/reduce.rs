@@ -14,7 +14,6 @@ pub(super) fn factor(width: usize) -> usize {
 pub(super) fn reduce(pixels: &Pixels, out: &mut Image<f32>, sums: &mut Vec<f32>) {
     let factor = factor(pixels.width());
     match pixels {
-        Pixels::Gray8(i) if (2..=MOST_ROWS).contains(&factor) => blocks_of_bytes(i, factor, out),
         Pixels::Gray8(i) => blocks(i, factor, out, sums, f32::from),
         Pixels::Gray16(i) => blocks(i, factor, out, sums, f32::from),
         Pixels::GrayF32(i) => blocks(i, factor, out, sums, |p| p),
@@ -73,59 +72,27 @@ pub(super) fn blocks<T: Copy>(
         for row in (y * factor..(y + 1) * factor).map(|y| image.row(y)) {
             add_row(row, sums, &value);
         }
-        for (o, block) in out.row_mut(y).iter_mut().zip(sums.chunks_exact(factor)) {
-            *o = scale * block.iter().sum::<f32>();
-        }
-    }
-}
-
-/// Rows of bytes whose sum 16 bits hold.
-const MOST_ROWS: usize = 257;
-/// Pixels of a row that are summed at once.
-const TILE_PX: usize = 2048;
-
-/// As [`blocks`], to the bit, since sums of bytes are exact in either type.
-fn blocks_of_bytes(image: &Image<u8>, factor: usize, out: &mut Image<f32>) {
-    let (w, h) = (image.width() / factor, image.height() / factor);
-    out.reset(w, h, 0.0);
-    let scale = 1.0 / (factor * factor) as f32;
-    let mut sums = [0u16; TILE_PX];
-    for y in 0..h {
-        let mut first = 0;
-        for tile in out.row_mut(y).chunks_mut(TILE_PX / factor) {
-            let n = tile.len() * factor;
-            sums[..n].fill(0);
-            for row in (y * factor..(y + 1) * factor).map(|y| image.row(y)) {
-                add_bytes(&row[first..first + n], &mut sums[..n]);
-            }
-            let of_tile = &sums[..n];
-            match factor {
-                2 => across::<2>(of_tile, scale, tile),
-                3 => across::<3>(of_tile, scale, tile),
-                4 => across::<4>(of_tile, scale, tile),
-                6 => across::<6>(of_tile, scale, tile),
-                12 => across::<12>(of_tile, scale, tile),
-                _ => {
-                    for (o, block) in tile.iter_mut().zip(of_tile.chunks_exact(factor)) {
-                        *o = scale * block.iter().map(|s| u32::from(*s)).sum::<u32>() as f32;
-                    }
+        let row = out.row_mut(y);
+        // Frames of up to 640, 960, 1280, 1920 and 3840 px.
+        match factor {
+            2 => across::<2>(sums, scale, row),
+            3 => across::<3>(sums, scale, row),
+            4 => across::<4>(sums, scale, row),
+            6 => across::<6>(sums, scale, row),
+            12 => across::<12>(sums, scale, row),
+            _ => {
+                for (o, block) in row.iter_mut().zip(sums.chunks_exact(factor)) {
+                    *o = scale * block.iter().sum::<f32>();
                 }
             }
-            first += n;
         }
     }
 }
 
-/// Means of so many sums each: the blocks of the usual widths, up to 640, 960, 1280, 1920 and 3840 px, without a loop.
-fn across<const N: usize>(sums: &[u16], scale: f32, out: &mut [f32]) {
+/// Means of so many sums each: without a loop within the block.
+fn across<const N: usize>(sums: &[f32], scale: f32, out: &mut [f32]) {
     for (o, block) in out.iter_mut().zip(sums.as_chunks::<N>().0) {
-        *o = scale * block.iter().map(|s| u32::from(*s)).sum::<u32>() as f32;
-    }
-}
-
-widest! {
-    fn add_bytes(row: &[u8], sums: &mut [u16]) {
-        sums.iter_mut().zip(row).for_each(|(s, &p)| *s += u16::from(p));
+        *o = scale * block.iter().sum::<f32>();
     }
 }
 
@@ -158,19 +125,6 @@ fn add_small<const N: usize, T: Copy>(row: &[T], sums: &mut [f32], value: &impl 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bytes_are_summed_in_whole_numbers_as_in_floats_to_the_bit() {
-        // Beyond a tile, and with columns and rows that fill no block; the largest values, too.
-        for (width, height) in [(641, 5), (1920, 13), (2900, 30), (9001, 60)] {
-            let values = (0..width * height).map(|i| if i % 5 == 0 { 255 } else { (i * 7919 % 251) as u8 });
-            let image = Image::from_vec(width, height, values.collect()).unwrap();
-            let (mut whole, mut floats) = (Image::default(), Image::default());
-            blocks(&image, factor(width), &mut floats, &mut Vec::new(), f32::from);
-            reduce(&Pixels::Gray8(image), &mut whole, &mut Vec::new());
-            assert_eq!(whole, floats, "{width}");
-        }
-    }
 
     #[test]
     fn a_wide_frame_becomes_the_means_of_its_blocks() {

@@ -109,9 +109,14 @@ fn every_detector_gives_positions_at_the_bound_with_honest_covariances() {
         assert!(n > 570.0 && fitted[3] / n > 0.99, "{threshold:?}: {fitted:?}");
         // 588 spots: the rms to 2 %, the NEES to 4 %, each at 3 deviations; the bound is that of unlimited windows.
         assert!(sd(&fitted) < 1.1 * bound, "{threshold:?}: {} {bound}", sd(&fitted));
-        // A detector whose own position is at the bound already, as that of `cfar` with its sloping ground, cannot be bettered.
-        let bettered = sd(&fitted) < sd(&plain) || sd(&plain) < 1.06 * bound;
-        assert!(bettered, "{threshold:?}: {} {} {bound}", sd(&plain), sd(&fitted));
+        match threshold {
+            // Its own positions come from a fit with a sloping ground: they are at the bound themselves, and as honest.
+            ThresholdConfig::Cfar(_) => {
+                assert!(sd(&plain) < 1.03 * bound, "{} {bound}", sd(&plain));
+                assert!((plain[1] / plain[2] - 2.0).abs() < 0.25, "{}", plain[1] / plain[2]);
+            }
+            _ => assert!(sd(&fitted) < sd(&plain), "{threshold:?}: {} {}", sd(&fitted), sd(&plain)),
+        }
         assert!((fitted[1] / n - 2.0).abs() < 0.25, "{threshold:?}: {}", fitted[1] / n);
     }
 }

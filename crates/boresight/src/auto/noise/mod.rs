@@ -107,7 +107,7 @@ pub fn learn(
         return Ok(());
     }
     let every = n_steps.div_ceil(MOST_STEPS);
-    let tempo = Tempo::of_times(scans.iter().map(|s| s.time.ns as f64 * 1e-9));
+    let tempo = Tempo::of_scans(scans);
     let least_density = tempo.density(fit::LEAST);
     let size_std = deviation(&mut size_wander(&tracks, tempo.stretched(MERGED_S)));
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();

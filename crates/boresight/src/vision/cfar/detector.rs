@@ -3,7 +3,7 @@
 //! Kept are candidates of which fewer than the number asked for are expected; the rarest come first, and what lies in the region
 //! or within 2.5 level pixels of a rarer one is part of it. Score: -log10 of that number. Position: a fitted Gaussian for targets up to
 //! 9 px, else the region's centroid with the covariance 2 σ²/z² of a matched filter plus the rounding of the level's pixels.
-//! Limits: frames with a side below 7 px have no detections. Cost: a few ns a pixel, about 5 µs a detection.
+//! Limits: frames with a side below 7 px have no detections. Cost: a few ns a pixel; 115 000 instructions a fitted detection (callgrind, spots of deviation 1.6 px).
 
 use super::config::CfarConfig;
 use super::contrast::Contrast;

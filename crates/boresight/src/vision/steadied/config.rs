@@ -13,7 +13,7 @@ pub struct SteadiedConfig {
     /// Standard deviations of the ground's own difference that make a pixel moving, from both earlier frames, 1 to 50. Lower finds fainter and slower targets
     /// and more false ones.
     pub threshold_sd: f32,
-    /// Time to the first of the two earlier frames, s, 1e-6 to 1e6; the second is three times as long ago. A target shows once it has moved by about its own
+    /// Time to the first of the two earlier frames, s, 1e-9 to 1e6; the second is three times as long ago. A target shows once it has moved by about its own
     /// size; longer finds slower ones and more of what parallax moves.
     pub lag_s: f64,
     /// Smallest difference that counts, counts, 0... .
@@ -37,9 +37,9 @@ impl SteadiedConfig {
             let hint = "4 leaves few false targets";
             return Err(wrong(at, "threshold-sd", self.threshold_sd, "a number from 1 to 50", hint));
         }
-        if !(1e-6..=1e6).contains(&self.lag_s) {
+        if !(1e-9..=1e6).contains(&self.lag_s) {
             let hint = "the time in which a target moves by its own size";
-            return Err(wrong(at, "lag-s", self.lag_s, "a time of 1e-6 to 1e6 s", hint));
+            return Err(wrong(at, "lag-s", self.lag_s, "a time of 1e-9 to 1e6 s", hint));
         }
         if !(self.min_difference >= 0.0 && self.min_difference.is_finite()) {
             let hint = "0 leaves it to the noise";
