@@ -175,6 +175,15 @@ fn smoothing_sharpens_tracks_fills_gaps_and_takes_tables_from_elsewhere() {
     let (lagged, _) = smooth(&run.join("tracks.csv"), &["--lag", "5"]);
     let lagged = deviation(&longest(&lagged, &truth));
     assert!(deviation(&after) < lagged && lagged < deviation(&before));
+    // Fragments are joined by the motion of the same configuration.
+    let stitched = dir.path().join("stitched.csv");
+    let stitch = |more: &[&str]| {
+        let table = run.join("tracks.csv");
+        let args = [&["stitch", table.to_str().unwrap(), "-o", stitched.to_str().unwrap()], more].concat();
+        text(&boresight(&args).stderr)
+    };
+    assert!(stitch(&[]).contains("config.toml"), "{}", stitch(&[]));
+    assert!(!stitch(&["--acceleration-density", "50"]).contains("config.toml"));
     // Every fifth row is taken out of a MOTChallenge table; --fill puts one in for each.
     let mot = std::fs::read_to_string(run.join("mot.txt")).unwrap();
     let holed = dir.path().join("holed.txt");

@@ -23,5 +23,6 @@ pub mod simulate;
 pub mod smooth;
 pub mod stitch;
 mod stop;
+mod table_motion;
 pub mod track;
 mod video_scale;

@@ -1,10 +1,11 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
+use super::table_motion::TableMotion;
 use crate::console::say;
 use boresight::io::{TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod};
 use boresight::track::{AccelerationNoise, smooth_table};
-use boresight::{Config, Scan, Sink, View};
+use boresight::{Scan, Sink, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -109,30 +110,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// The smoother's settings: as on the command line, else as in the configuration that the tracks were made with.
 fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
-    let mut config = SmoothConfig::default();
-    let beside = args.tracks.with_file_name("config.toml");
-    if let Some(std) = args.acceleration {
-        config.acceleration = AccelerationNoise::Discrete(std);
-    } else if let Some(density) = args.acceleration_density {
-        config.acceleration = AccelerationNoise::Continuous(density);
-    } else if own && beside.is_file() {
-        let tracker = Config::from_file(&beside)?.tracker;
-        config.acceleration = tracker.acceleration_noise(0.0);
-        config.density_per_height2_per_s3 = tracker.acceleration_density_per_height2_per_s3;
-        say!("{}, from {}", config.acceleration, beside.display());
-        if !tracker.filter.is_constant_velocity() {
-            say!(
-                "note: these tracks are of another model than constant velocity; their covariances become approximate"
-            );
-        }
-    } else {
-        say!("{}, the tracker's default (--acceleration-density)", config.acceleration);
-    }
-    config.method = match (args.lag, args.method) {
+    let asked = args.acceleration.map(AccelerationNoise::Discrete);
+    let asked = asked.or(args.acceleration_density.map(AccelerationNoise::Continuous));
+    let TableMotion { acceleration, density_per_height2_per_s3, forgetting, .. } =
+        TableMotion::of(asked, &args.tracks, own)?;
+    let method = match (args.lag, args.method) {
         (Some(lag), _) => SmoothMethod::FixedLag(lag),
         (None, Method::Rts) => SmoothMethod::Rts,
         (None, Method::SquareRoot) => SmoothMethod::SquareRoot,
     };
+    let config = SmoothConfig { acceleration, density_per_height2_per_s3, forgetting, method };
     config.validate("smooth")?;
     Ok(config)
 }

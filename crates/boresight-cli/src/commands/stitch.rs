@@ -1,5 +1,6 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
+use super::table_motion::TableMotion;
 use crate::console::say;
 use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::{AccelerationNoise, StitchConfig, join, with_empty_frames};
@@ -12,7 +13,8 @@ use std::process::ExitCode;
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:
   boresight stitch flight.tracks/tracks.csv -o stitched.csv
-      fragments at most 2 s apart that fit each other get one id; rows stay as they are
+      fragments at most 2 s apart that fit each other get one id; rows stay as they are; targets move as in
+      flight.tracks/config.toml
   boresight stitch tracks.csv --smooth -o smooth.csv
       also fills the gaps and gives every row the estimate of the whole track
   boresight stitch mot.txt --max-gap 1 --acceleration 100 -o mot_stitched.txt
@@ -32,15 +34,15 @@ pub struct Args {
     /// Fragments may overlap by this much, s.
     #[arg(long, default_value_t = StitchConfig::default().max_overlap_s)]
     max_overlap: f64,
-    /// Power density of the targets' white acceleration, px²/s³; as in the tracker.
-    #[arg(long, default_value_t = StitchConfig::default().acceleration.density(1.0))]
-    acceleration_density: f64,
+    /// Power density of the targets' white acceleration, px²/s³; the motion in config.toml beside the table if absent.
+    #[arg(long, value_name = "PX2/S3")]
+    acceleration_density: Option<f64>,
     /// Discrete noise instead: standard deviation of an acceleration that is constant during a gap, px/s².
-    #[arg(long, conflicts_with = "acceleration_density")]
+    #[arg(long, value_name = "PX/S2", conflicts_with = "acceleration_density")]
     acceleration: Option<f64>,
-    /// Largest speed, px/s.
-    #[arg(long, default_value_t = StitchConfig::default().max_speed_px_per_s)]
-    max_speed: f64,
+    /// Largest speed, px/s; that of config.toml beside the table if absent, else 300.
+    #[arg(long, value_name = "PX/S")]
+    max_speed: Option<f64>,
     /// Probability that true fragments pass the gate, in (0, 1).
     #[arg(long, default_value_t = StitchConfig::default().gate_probability)]
     gate_probability: f64,
@@ -51,22 +53,25 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let config = StitchConfig {
-        max_gap_s: args.max_gap,
-        max_overlap_s: args.max_overlap,
-        acceleration: args
-            .acceleration
-            .map_or(AccelerationNoise::Continuous(args.acceleration_density), AccelerationNoise::Discrete),
-        max_speed_px_per_s: args.max_speed,
-        gate_probability: args.gate_probability,
-    };
-    config.validate("stitch")?;
     refuse_to_overwrite(&args.tracks, [args.output.as_path()])?;
     let table = read_tracks(&args.tracks, &TableOptions { rate_hz: args.rate_hz, ..TableOptions::default() })?;
     table.warnings.iter().for_each(|w| say!("warning: {}: {w}", args.tracks.display()));
     if table.frames.is_empty() {
         say!("warning: {}: the table has no rows", args.tracks.display());
     }
+    let asked = args.acceleration.map(AccelerationNoise::Discrete);
+    let asked = asked.or(args.acceleration_density.map(AccelerationNoise::Continuous));
+    let motion = TableMotion::of(asked, &args.tracks, table.has_states)?;
+    let usual_speed = motion.tracker.as_ref().map(|t| t.max_speed_px_per_s);
+    let config = StitchConfig {
+        max_gap_s: args.max_gap,
+        max_overlap_s: args.max_overlap,
+        acceleration: motion.of_middle_height(&table.frames),
+        forgetting: motion.forgetting,
+        max_speed_px_per_s: args.max_speed.or(usual_speed).unwrap_or(StitchConfig::default().max_speed_px_per_s),
+        gate_probability: args.gate_probability,
+    };
+    config.validate("stitch")?;
     // Frames without any track have no rows in a table; a gap needs them.
     let mut scans =
         if args.smooth { with_empty_frames(table.frames, args.max_gap, table.rate_hz) } else { table.frames };

@@ -6,7 +6,7 @@
 //! Derivation of τ: n weighted innovations in two axes tell a variance to √(2 / 2n) of itself, and n = 2 r τ for r innovations a second. For 10 % with one target at
 //! 2 scans a second n = 100, τ = 25 s; [`MEMORY_S`] is the next round number. With less than [`LEAST_WEIGHT`] nothing is changed.
 //! All times are those of the scans. Nothing changes before τ has passed: until then the first choice knows more.
-//! Limits: constant velocity, without several hypotheses and without the discrete noise; clutter only where the field is known; at most [`MOST_TRACKS`] tracks
+//! Limits: R and q of constant velocity only, without several hypotheses and without the discrete noise; clutter only where the field is known; at most [`MOST_TRACKS`] tracks
 //! and [`MOST_STEPS`] detections are looked at, so many targets at a high rate are remembered for less than τ.
 
 use super::digits::round;
@@ -14,7 +14,7 @@ use super::first_scans::Shares;
 use super::noise::fit::{Noise, Step, fit_factors};
 use super::noise::{assumed, is_copy};
 use crate::camera::SteadyGround;
-use crate::track::{TrackerConfig, TrackerParameters};
+use crate::track::{ModelConfig, TrackerConfig, TrackerParameters};
 use crate::{Scan, Timestamp, TrackState, TrackStatus};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -104,12 +104,14 @@ pub struct Adaptation {
 impl Adaptation {
     /// Begins with what was chosen; `None` where the tracker is of a kind that is not followed.
     pub fn of(chosen: &TrackerConfig) -> Option<Self> {
-        let suits =
-            chosen.filter.is_constant_velocity() && chosen.mht.is_none() && chosen.acceleration_std_px_per_s2.is_none();
+        // R and q are those of constant velocity; of a velocity that is forgotten they stay as the first choice learnt them.
+        let driven = chosen.filter.is_constant_velocity();
+        let forgetful = matches!(chosen.filter.model, ModelConfig::OrnsteinUhlenbeck(_));
+        let suits = (driven || forgetful) && chosen.mht.is_none() && chosen.acceleration_std_px_per_s2.is_none();
         suits.then(|| Self {
             first: TrackerParameters::of(chosen),
             now: TrackerParameters::of(chosen),
-            frozen: Frozen::default(),
+            frozen: Frozen { measurement: !driven, motion: !driven, ..Frozen::default() },
             factors: [1.0; 2],
             speed_std: chosen.max_speed_px_per_s / 3.0,
             field_px2: chosen.field_px.map(|[w, h]| w * h).filter(|a| *a > 0.0),

@@ -9,6 +9,7 @@ use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
 use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
+use super::noise::Motions;
 use super::request::Request;
 use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, pieces, speed};
 use crate::camera::{CameraConfig, CameraPath};
@@ -287,8 +288,10 @@ fn statistics(
     false_tracks_per_hour: Option<f64>,
     choice: &mut Choice,
 ) -> Result<Option<Found>> {
-    noise::learn(scans, area_px2, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons)?;
-    if !is_of_points(&choice.config.detector.threshold) && pieces::are_pieces(scans, area_px2) {
+    let of_points = is_of_points(&choice.config.detector.threshold);
+    let motions = if of_points { Motions::DrivenOrForgetful } else { Motions::Driven };
+    noise::learn(scans, area_px2, LengthUnit::Pixel, motions, &mut choice.config, &mut choice.reasons)?;
+    if !of_points && pieces::are_pieces(scans, area_px2) {
         if false_tracks_per_hour.is_some() {
             choice.reasons.push(RATE_WITHOUT_EFFECT.to_string());
         }

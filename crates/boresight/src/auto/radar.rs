@@ -74,7 +74,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
     // A radar that measures well sees fast targets move far between its turns.
     speed::learn(&Evidence::of_scans(scans, area), unit, config, &mut told);
     let n_assumed = told.len();
-    let _ = noise::learn(scans, area, unit, config, &mut told);
+    let _ = noise::learn(scans, area, unit, noise::Motions::Driven, config, &mut told);
     if let Some(speeds) = speeds(scans, config) {
         let t = &mut config.tracker;
         t.max_speed_px_per_s = round((SPEED_RESERVE * speeds.fastest).max(1.0));
@@ -84,7 +84,7 @@ pub fn for_radar(scans: &[Scan], turn_s: f64, unit: LengthUnit, config: &mut Con
             speeds.n_tracks, speeds.fastest, speeds.rms, t.max_speed_px_per_s
         ));
         let mut again = Vec::new();
-        let _ = noise::learn(scans, area, unit, config, &mut again);
+        let _ = noise::learn(scans, area, unit, noise::Motions::Driven, config, &mut again);
         if !again.is_empty() {
             told.remove(n_assumed);
             told.extend(again);

@@ -37,7 +37,11 @@ type Row = (usize, TrackState);
 /// A configuration value outside its range; scans out of order; an id twice in a scan; a covariance that no filter makes.
 pub fn join(scans: &mut [TrackFrame], config: &StitchConfig, smooth: bool) -> Result<Joined> {
     config.validate("stitch")?;
-    let model = SmoothConfig { acceleration: config.acceleration, ..SmoothConfig::default() };
+    let model = SmoothConfig {
+        acceleration: config.acceleration,
+        forgetting: config.forgetting.clone(),
+        ..SmoothConfig::default()
+    };
     let mut tracks = by_track(scans)?;
     let mut done = Joined { before: tracks.len(), ..Joined::default() };
     let still = |s: &TrackState| s.kinematics.mean[1] == 0.0 && s.kinematics.mean[3] == 0.0;

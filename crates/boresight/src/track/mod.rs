@@ -47,7 +47,8 @@ pub use confirm::motion_test::{MotionTestConfig, Report};
 pub use confirm::rule::ConfirmationConfig;
 pub use confirm::sprt::SprtConfig;
 pub use filter::{
-    AccelerationNoise, FilterConfig, FormConfig, InnovationConfig, ModelConfig, PRESETS, Preset, TrackFilter,
+    AccelerationNoise, FilterConfig, FormConfig, InnovationConfig, ModelConfig, OrnsteinUhlenbeckConfig, PRESETS,
+    Preset, TrackFilter,
 };
 pub use gaps::with_empty_frames;
 pub use initial_tracks::InitialTrackConfig;

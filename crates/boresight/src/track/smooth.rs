@@ -3,19 +3,20 @@
 //! Source: H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3(8), 1965; the recursions are in
 //! `boresight_filters::smooth`. The rows of a tracker are filtered beliefs, which is all a smoother needs: measurements are
 //! not looked at again. Rows without velocity (tables from elsewhere) are positions: [`filter_track`] comes first.
-//! Symbols: state `[x, vx, y, vy]` (px, px/s). Model: constant velocity with white acceleration, as in the tracker.
+//! Symbols: state `[x, vx, y, vy]` (px, px/s). Model: constant velocity with white acceleration, or a velocity that is forgotten, as in the tracker (`motion.rs`).
 //! A row that does not follow from the one before (`cut.rs`) begins a part of its own: a track that was lost and found again, or whose camera moved, is smoothed in between only.
 //! Limits: tracks of another model (acceleration states, turns, IMM) are smoothed by this one: the position is still
 //! better than the filtered one, its covariance is approximate. A missed frame counts as one long step.
 
 mod cut;
+pub(in crate::track) mod motion;
 
-use super::filter::AccelerationNoise;
+use super::filter::{AccelerationNoise, OrnsteinUhlenbeckConfig};
 use crate::validate::{check, not_negative};
 use crate::{Error, ErrorKind, Result, Timestamp};
-use boresight_filters::model::ConstantVelocity;
 use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};
 use boresight_filters::{Gaussian, GaussianFilter, Measurement, Start, Ud};
+use motion::TableMotion;
 use nalgebra::{Matrix2, Vector2};
 
 /// How tracks are smoothed.
@@ -25,6 +26,8 @@ pub struct SmoothConfig {
     pub acceleration: AccelerationNoise,
     /// Density added to a continuous one in proportion to the square of a track's box, 1/s³, 0 or more.
     pub density_per_height2_per_s3: f64,
+    /// Velocities that are forgotten, in the place of the acceleration.
+    pub forgetting: Option<OrnsteinUhlenbeckConfig>,
     /// Which rows tell of which.
     pub method: SmoothMethod,
 }
@@ -43,7 +46,12 @@ pub enum SmoothMethod {
 
 impl Default for SmoothConfig {
     fn default() -> Self {
-        Self { acceleration: AccelerationNoise::default(), density_per_height2_per_s3: 0.0, method: SmoothMethod::Rts }
+        Self {
+            acceleration: AccelerationNoise::default(),
+            density_per_height2_per_s3: 0.0,
+            forgetting: None,
+            method: SmoothMethod::Rts,
+        }
     }
 }
 
@@ -55,6 +63,7 @@ impl SmoothConfig {
         self.acceleration.validate(at)?;
         let per_height2 = self.density_per_height2_per_s3;
         not_negative(at, "acceleration-density-per-height2-per-s3", per_height2, "as in the tracker")?;
+        self.forgetting.as_ref().map_or(Ok(()), |c| c.validate(&format!("{at}.forgetting")))?;
         match self.method {
             SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
             _ => Ok(()),
@@ -72,8 +81,8 @@ impl SmoothConfig {
         Self { acceleration, density_per_height2_per_s3: 0.0, ..self.clone() }
     }
 
-    fn model(&self) -> Result<ConstantVelocity> {
-        Ok(self.acceleration.constant_velocity(1.0)?)
+    fn model(&self) -> Result<TableMotion> {
+        TableMotion::of(self.acceleration, self.forgetting.as_ref())
     }
 }
 

@@ -4,10 +4,11 @@
 //! taken with the covariance of its first estimate; d² of the difference in position and velocity (4 numbers) must pass
 //! the gate. The cost is −ln of the density of that difference, so that sharp fits win over vague ones; all joins of a
 //! track table are chosen together (sparse assignment: each end joins at most one start), then chains are followed.
-//! Limits: constant velocity over the gap. Nothing is filled in between: rows stay as they are, only ids change; the
+//! Limits: one law of motion for all, over the gap too. Nothing is filled in between: rows stay as they are, only ids change; the
 //! smoother fills gaps.
 
-use super::filter::AccelerationNoise;
+use super::filter::{AccelerationNoise, OrnsteinUhlenbeckConfig};
+use super::smooth::motion::TableMotion;
 use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, UniformGrid};
 use crate::validate::{not_negative, positive, probability};
 use crate::{Result, Timestamp, TrackId};
@@ -24,6 +25,8 @@ pub struct StitchConfig {
     pub max_overlap_s: f64,
     /// The white acceleration during the gap, above 0.
     pub acceleration: AccelerationNoise,
+    /// Velocities that are forgotten, in the place of the acceleration.
+    pub forgetting: Option<OrnsteinUhlenbeckConfig>,
     /// Largest speed, px/s, above 0.
     pub max_speed_px_per_s: f64,
     /// Probability that true fragments pass the gate, in (0, 1).
@@ -36,6 +39,7 @@ impl Default for StitchConfig {
             max_gap_s: 2.0,
             max_overlap_s: 0.0,
             acceleration: AccelerationNoise::default(),
+            forgetting: None,
             max_speed_px_per_s: 300.0,
             gate_probability: 0.99,
         }
@@ -50,6 +54,7 @@ impl StitchConfig {
         positive(at, "max-gap-s", self.max_gap_s, "2 s bridges a lamp post")?;
         not_negative(at, "max-overlap-s", self.max_overlap_s, "0 if tracks end when their target does")?;
         self.acceleration.validate(at)?;
+        self.forgetting.as_ref().map_or(Ok(()), |c| c.validate(&format!("{at}.forgetting")))?;
         positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "as in the tracker")?;
         probability(at, "gate-probability", self.gate_probability, "0.99 joins 99 % of true fragments")
     }
@@ -143,7 +148,7 @@ fn finite(v: f64) -> f64 {
 /// d² and ln det S of the end of `a`, moved over the gap, against the start of `b`.
 fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Option<(f64, f64)> {
     // Backwards in time the noise grows as forwards.
-    let model = config.acceleration.constant_velocity(1.0).ok()?;
+    let model = TableMotion::of(config.acceleration, config.forgetting.as_ref()).ok()?;
     let (phi, noise) = (model.transition(gap_s, &a.last.mean), model.process_noise(gap_s.abs()));
     let s = phi * a.last.cov * phi.transpose() + noise + b.first.cov;
     let difference: Vector4<f64> = b.first.mean - phi * a.last.mean;

@@ -198,3 +198,30 @@ fn a_key_is_known_by_its_whole_name() {
     let all = Frozen { measurement: true, motion: true, detection: true, clutter: true };
     assert_eq!(frozen_by("tracker"), all);
 }
+
+#[test]
+fn of_velocities_that_are_forgotten_noise_and_motion_stay_and_the_counts_are_followed() {
+    let model = ModelConfig::OrnsteinUhlenbeck(crate::track::OrnsteinUhlenbeckConfig {
+        speed_std_px_per_s: 6.0,
+        memory_s: 0.5,
+    });
+    let config = TrackerConfig { filter: crate::track::FilterConfig { model, ..Default::default() }, ..config() };
+    let (mut world, mut tracker) = (World::new(4), build(&config).unwrap());
+    let mut adaptation = Adaptation::of(&config).unwrap();
+    let mut last = TrackerParameters::of(&config);
+    for _ in 0..1000 {
+        // Three times the deviation stated, and more false detections than assumed.
+        let scan = world.scan(3.0, 0.9, 6);
+        let states = tracker.step(&scan).unwrap();
+        last = adaptation.step(&scan, states).unwrap_or(last);
+    }
+    let first = TrackerParameters::of(&config);
+    assert!(last.clutter_density_per_px2 > 1.5 * first.clutter_density_per_px2, "{last:?}");
+    let kept = TrackerParameters {
+        detection_probability: first.detection_probability,
+        redetection_probability: first.redetection_probability,
+        clutter_density_per_px2: first.clutter_density_per_px2,
+        ..last
+    };
+    assert_eq!(kept, first);
+}

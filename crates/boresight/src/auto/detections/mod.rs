@@ -9,7 +9,7 @@ mod scores;
 
 use super::detection_statistics::{self, RATE_WITHOUT_EFFECT};
 use super::digits::round;
-use super::noise;
+use super::noise::{self, Motions};
 use super::stretch;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
@@ -44,7 +44,8 @@ pub fn for_detections(
     let of_boxes = assumed(scans, rate_hz, unit, config, reasons);
     // What the scans hold that a tracker refuses is said by the run itself.
     let area_px2 = area_px2(scans);
-    let _ = noise::learn(scans, area_px2, unit, config, reasons);
+    let motions = if of_boxes { Motions::Driven } else { Motions::DrivenOrForgetful };
+    let _ = noise::learn(scans, area_px2, unit, motions, config, reasons);
     if of_boxes {
         if false_tracks_per_hour.is_some() {
             reasons.push(RATE_WITHOUT_EFFECT.to_string());

@@ -1,7 +1,8 @@
 //! Measurement and process noise by maximum likelihood: which R and q make the innovations of given tracks most probable.
 //!
 //! Source: R. K. Mehra, *IEEE Trans. AC* 15, 1970 (noise from innovations); the likelihood of a linear model is that of its innovations
-//! (Bar-Shalom, Li, Kirubarajan 2001, 5.2). Each series of positions is filtered by a constant-velocity model, axis by axis.
+//! (Bar-Shalom, Li, Kirubarajan 2001, 5.2). Each series of positions is filtered by a model of its motion, axis by axis: constant velocity driven by a white acceleration here, one that is
+//! forgotten in [`super::persistence`].
 //! R = c × stated variance + e² + (f h)², q = a + b h² (a continuous density), h the height of the box: five numbers for all series together, found
 //! by a compass search on their logarithms, which needs no derivative and ends at a step of 5 %.
 //! Departures: an innovation is, with the probability [`STRANGE`], anywhere in the field (another thing's detection, or a turn that no model has), so that a
@@ -10,6 +11,7 @@
 //! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of c, e, f, a, b.
 //! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest.
 
+use super::persistence::{Passed, Persistence};
 use crate::track::AccelerationNoise;
 use crate::track::filter::constant_velocity::{Axis, step_noise};
 
@@ -43,13 +45,13 @@ pub struct Noise {
 /// Probability that an innovation is another thing's.
 const STRANGE: f64 = 0.01;
 /// One deviation of the prior is this factor, around what was assumed before.
-const PRIOR_FACTOR: f64 = 10.0;
+pub(super) const PRIOR_FACTOR: f64 = 10.0;
 /// First and last step of the search, in logarithms.
-const STEPS: [f64; 2] = [2.0, 0.05];
+pub(super) const STEPS: [f64; 2] = [2.0, 0.05];
 /// The same where factors are followed that were known a moment ago.
 const FACTOR_STEPS: [f64; 2] = [0.4, 0.02];
 /// One deviation of the prior of the factor on stated variances: they are known better than the rest.
-const SCALE_PRIOR_FACTOR: f64 = 2.0;
+pub(super) const SCALE_PRIOR_FACTOR: f64 = 2.0;
 /// Least value of any of the five numbers: nothing beside a pixel and a second of video.
 pub const LEAST: f64 = 1e-6;
 /// Innovations that every series gives before they count: its velocity is not known at first.
@@ -63,7 +65,8 @@ pub fn fit(series: &[Vec<Step>], before: Noise, least_density: f64, speed_std: f
     let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
     let cost = |x: &[f64; 5]| {
         let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
-        0.5 * prior - log_likelihood(series, &noise_of(x), speed_std, area_px2)
+        let noise = noise_of(x);
+        0.5 * prior - log_likelihood(series, &noise, Motion::Accelerated(speed_std), area_px2)
     };
     noise_of(&search(start, STEPS, [least, [f64::INFINITY; 5]], cost))
 }
@@ -83,7 +86,7 @@ pub fn fit_factors(
     let start = from.map(|f| f.ln().clamp(-edge, edge));
     let cost = |x: &[f64; 2]| {
         let prior: f64 = (0..2).map(|i| (x[i] / edge).powi(2) + ((x[i] - start[i]) / drift_std[i]).powi(2)).sum();
-        0.5 * prior - log_likelihood(series, &noise.times(x.map(f64::exp)), speed_std, area_px2)
+        0.5 * prior - log_likelihood(series, &noise.times(x.map(f64::exp)), Motion::Accelerated(speed_std), area_px2)
     };
     search(start, FACTOR_STEPS, [[-edge; 2], [edge; 2]], cost).map(f64::exp)
 }
@@ -101,8 +104,17 @@ impl Noise {
     }
 }
 
+/// How a target moves between two detections.
+#[derive(Clone, Copy, Debug)]
+pub enum Motion {
+    /// As the noise's density says, with a velocity of this deviation at first, px/s.
+    Accelerated(f64),
+    /// With a velocity that is forgotten.
+    Persistent(Persistence),
+}
+
 /// Least cost by a compass search from `at`, with the first and the last step and the lowest and highest values of each number.
-fn search<const N: usize>(
+pub(super) fn search<const N: usize>(
     mut at: [f64; N],
     steps: [f64; 2],
     [low, high]: [[f64; N]; 2],
@@ -136,8 +148,14 @@ fn noise_of(x: &[f64; 5]) -> Noise {
 }
 
 /// Logarithm of the likelihood of all series.
-fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2: f64) -> f64 {
+pub(super) fn log_likelihood(series: &[Vec<Step>], noise: &Noise, motion: Motion, area_px2: f64) -> f64 {
     let strange = STRANGE / area_px2;
+    let speed_std = match motion {
+        Motion::Accelerated(std) => std,
+        Motion::Persistent(p) => p.speed_std_px_per_s,
+    };
+    // Most scans are as far apart as the two before.
+    let mut passed = Passed::NEVER;
     let mut sum = 0.0;
     for steps in series {
         let Some(first) = steps.first() else { continue };
@@ -157,9 +175,19 @@ fn log_likelihood(series: &[Vec<Step>], noise: &Noise, speed_std: f64, area_px2:
         for (k, s) in steps.iter().enumerate().skip(1) {
             let t = s.dt_s;
             let (mut nis, mut det) = (0.0, 1.0);
-            let step = step_noise(AccelerationNoise::Continuous(q), t);
+            match motion {
+                Motion::Accelerated(_) => {
+                    let step = step_noise(AccelerationNoise::Continuous(q), t);
+                    axes.iter_mut().for_each(|axis| axis.predict(t, &step));
+                }
+                Motion::Persistent(p) => {
+                    if passed.dt_s != t {
+                        passed = p.after(t);
+                    }
+                    axes.iter_mut().for_each(|axis| passed.predict(axis));
+                }
+            }
             for (a, axis) in axes.iter_mut().enumerate() {
-                axis.predict(t, &step);
                 let (nu, var) = (s.position[a] - axis.x, axis.xx + r(s, a));
                 nis += nu * nu / var;
                 det *= var;

@@ -2,18 +2,21 @@
 //!
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
 //! series whose innovations are made as probable as possible.
-//! Limits: constant velocity only, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before ([`COPY`]); with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
+//! Where the caller allows it, targets whose velocity is forgotten ([`persistence`]) get the model of such a motion.
+//! Limits: a filter that is not of constant velocity at first keeps what is assumed, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before ([`COPY`]); with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 pub(super) mod fit;
+mod persistence;
 
 use super::digits::round;
 use super::first_scans::{Shares, first};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
-use crate::track::TrackerParameters;
+use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
+use persistence::Persistence;
 use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
@@ -27,6 +30,8 @@ const COPY: f64 = 0.02;
 const GATE_PROBABILITY: f64 = 0.9999;
 /// How long targets are one detection when they pass each other, s of video.
 const MERGED_S: f64 = 1.0;
+/// How often targets whose velocity is forgotten are followed again: each time the steps that were lost are nearer to none.
+const MOST_ROUNDS: usize = 6;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
 
@@ -39,6 +44,15 @@ pub(super) fn assumed(p: &TrackerParameters) -> Noise {
         density: p.acceleration_density_px2_per_s3,
         density_per_height2: p.acceleration_density_per_height2_per_s3,
     }
+}
+
+/// The motions that targets may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motions {
+    /// Constant velocity, changed by a white acceleration.
+    Driven,
+    /// That, or a velocity that is forgotten: points, whose places are what is measured of them. Boxes and regions wander about their target.
+    DrivenOrForgetful,
 }
 
 /// What is known of one track of the first pass.
@@ -59,6 +73,7 @@ pub fn learn(
     scans: &[Scan],
     area_px2: f64,
     unit: LengthUnit,
+    motions: Motions,
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) -> Result<()> {
@@ -66,11 +81,69 @@ pub fn learn(
         reasons.push("The filter is not of constant velocity: noise and motion stay as assumed.".to_string());
         return Ok(());
     }
-    let mut tracker = crate::track::build(&config.tracker)?;
+    let scans = first(scans);
+    let tracks = follow(scans, &config.tracker)?;
+    let n_steps: usize = tracks.values().map(|t| t.steps.len()).sum();
+    if n_steps < LEAST_STEPS {
+        reasons.push(format!(
+            "{n_steps} detections of confirmed tracks in the first pass: noise and motion stay as assumed."
+        ));
+        return Ok(());
+    }
+    let every = n_steps.div_ceil(MOST_STEPS);
+    let tempo = Tempo::of_scans(scans);
+    let least_density = tempo.density(fit::LEAST);
+    let size_std = deviation(&mut size_wander(&tracks, tempo.stretched(MERGED_S)));
+    let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
+    let t = &mut config.tracker;
+    let before = assumed(&TrackerParameters::of(t));
+    let speed_std = t.max_speed_px_per_s / 3.0;
+    let mut found = fit(&series, before, least_density, speed_std, area_px2);
+    let mut motion = None;
+    // A filter that was named has the model that it was named with.
+    if motions == Motions::DrivenOrForgetful && t.filter == FilterConfig::default() {
+        let assume = persistence::Assumed { noise: before, least_density, speed_std, area_px2 };
+        if let Some((noise, forgets)) = forgetful(&series, scans, assume, t)? {
+            found = Noise { density: found.density, density_per_height2: found.density_per_height2, ..noise };
+            t.filter.model = forgets.model();
+            motion = Some(forgets);
+        }
+    }
+    t.merged_measurements.edge_std_px = round(size_std);
+    put(&found, least_density, t);
+    // Points have no boxes.
+    let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
+    let px = unit.sign();
+    let moves = match motion {
+        Some(p) => format!(
+            "velocities of {:.3} {px}/s that are forgotten in {:.3} s (diffusion {:.3} {px}²/s an axis)",
+            p.speed_std_px_per_s,
+            p.memory_s,
+            p.diffusion_px2_per_s()
+        ),
+        None => format!(
+            "acceleration density {:.3} {px}²/s³{}",
+            t.acceleration_density_px2_per_s3,
+            part(t.acceleration_density_per_height2_per_s3, " heights²/s³")
+        ),
+    };
+    reasons.push(format!(
+        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} {px}{} beyond them, {moves}.",
+        series.len(),
+        scans.len(),
+        t.detection_covariance_scale,
+        t.extra_noise_px,
+        part(t.extra_noise_per_height, " of a box height"),
+    ));
+    Ok(())
+}
+
+/// Runs the tracker over `scans` and returns what it confirmed.
+fn follow(scans: &[Scan], config: &TrackerConfig) -> Result<BTreeMap<u64, Followed>> {
+    let mut tracker = crate::track::build(config)?;
     let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
     let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
     let mut shares = Shares::default();
-    let scans = first(scans);
     for scan in scans {
         let states = tracker.step(scan)?;
         ground = ground.after(scan);
@@ -99,42 +172,43 @@ pub fn learn(
         }
     }
     tracks.retain(|_, t| t.confirmed);
-    let n_steps: usize = tracks.values().map(|t| t.steps.len()).sum();
-    if n_steps < LEAST_STEPS {
-        reasons.push(format!(
-            "{n_steps} detections of confirmed tracks in the first pass: noise and motion stay as assumed."
-        ));
-        return Ok(());
+    Ok(tracks)
+}
+
+/// Noise and motion of targets whose velocity is forgotten, if the series are of such ones. What was assumed before has lost them at their longer steps, and those that are left look like noise
+/// around a course: they are followed again with the simplest motion found, until that stays, and only then another may explain more.
+fn forgetful(
+    series: &[Vec<Step>],
+    scans: &[Scan],
+    assume: persistence::Assumed,
+    config: &TrackerConfig,
+) -> Result<Option<(Noise, Persistence)>> {
+    let mut found = persistence::better(series, assume);
+    let mut config = config.clone();
+    for _ in 0..MOST_ROUNDS {
+        let Some((noise, motion)) = found.first() else { break };
+        put(noise, assume.least_density, &mut config);
+        config.filter.model = motion.model();
+        let again: Vec<Vec<Step>> = follow(scans, &config)?.into_values().map(|t| t.steps).collect();
+        let next = persistence::better(&again, assume);
+        let Some((_, other)) = next.first() else { break };
+        let settled = other.is_nearly(motion);
+        found = next;
+        if settled {
+            break;
+        }
     }
-    let every = n_steps.div_ceil(MOST_STEPS);
-    let tempo = Tempo::of_scans(scans);
-    let least_density = tempo.density(fit::LEAST);
-    let size_std = deviation(&mut size_wander(&tracks, tempo.stretched(MERGED_S)));
-    let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
-    let t = &mut config.tracker;
-    let before = assumed(&TrackerParameters::of(t));
-    let found = fit(&series, before, least_density, t.max_speed_px_per_s / 3.0, area_px2);
-    t.merged_measurements.edge_std_px = round(size_std);
+    Ok(found.pop())
+}
+
+/// Writes noise and motion into the tracker's configuration.
+fn put(found: &Noise, least_density: f64, t: &mut TrackerConfig) {
     t.gate_probability = GATE_PROBABILITY;
     t.detection_covariance_scale = round(found.scale);
     t.extra_noise_px = or_none(found.extra_px, fit::LEAST);
     t.extra_noise_per_height = or_none(found.extra_per_height, fit::LEAST);
     t.acceleration_density_px2_per_s3 = round(found.density);
     t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2, least_density);
-    // Points have no boxes.
-    let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
-    let px = unit.sign();
-    reasons.push(format!(
-        "Learnt from {n_steps} detections of {} tracks in {} scans: noise {:.2} times the stated variances, {:.3} {px}{} beyond them, acceleration density {:.3} {px}²/s³{}.",
-        series.len(),
-        scans.len(),
-        t.detection_covariance_scale,
-        t.extra_noise_px,
-        part(t.extra_noise_per_height, " of a box height"),
-        t.acceleration_density_px2_per_s3,
-        part(t.acceleration_density_per_height2_per_s3, " heights²/s³"),
-    ));
-    Ok(())
 }
 
 /// Whether a position is a copy of the one before.
@@ -183,6 +257,7 @@ fn deviation(magnitudes: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::track::ModelConfig;
     use crate::{Detection, FrameIndex, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -204,7 +279,7 @@ mod tests {
             })
             .collect();
         let mut config = Config::default();
-        learn(&scans, 1e4, LengthUnit::Pixel, &mut config, &mut Vec::new()).unwrap();
+        learn(&scans, 1e4, LengthUnit::Pixel, Motions::Driven, &mut config, &mut Vec::new()).unwrap();
         let t = &config.tracker;
         (0.01 * t.detection_covariance_scale + t.extra_noise_px.powi(2)).sqrt()
     }
@@ -215,5 +290,37 @@ mod tests {
             let found = learnt(std, digits);
             assert!((found / std).ln().abs() < 0.3, "{found} px, {std} is the truth");
         }
+    }
+
+    #[test]
+    fn particles_that_diffuse_are_followed_again_until_what_is_learnt_stays() {
+        // Twelve far from each other with steps of 1.2 px an axis, of which what is assumed at first loses one in three.
+        let mut rng = ChaCha8Rng::seed_from_u64(31);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let mut at: Vec<[f64; 2]> =
+            (0..12).map(|i| [100.0 + 200.0 * f64::from(i % 4), 100.0 + 200.0 * f64::from(i / 4)]).collect();
+        let scans: Vec<Scan> = (0..150_u64)
+            .map(|k| {
+                at.iter_mut().flatten().for_each(|v| *v += 1.2 * normal());
+                let seen = at.iter().map(|p| p.map(|v| v + 0.1 * normal()));
+                let detections = seen.map(|p| Detection::at(p.into(), nalgebra::Matrix2::identity() * 0.01)).collect();
+                let time = Timestamp::from_secs_f64(k as f64 * 0.04);
+                Scan { detections, ..Scan::at(FrameIndex(k), time) }
+            })
+            .collect();
+        let learnt = |motions| {
+            let mut config = Config::default();
+            config.tracker.acceleration_density_px2_per_s3 = 100.0;
+            config.tracker.max_speed_px_per_s = 150.0;
+            learn(&scans, 6e5, LengthUnit::Pixel, motions, &mut config, &mut Vec::new()).unwrap();
+            config.tracker
+        };
+        let tracker = learnt(Motions::DrivenOrForgetful);
+        let ModelConfig::OrnsteinUhlenbeck(c) = &tracker.filter.model else { panic!("{:?}", tracker.filter) };
+        let grows = 2.0 * c.speed_std_px_per_s.powi(2) * c.memory_s;
+        assert!((grows / 36.0).ln().abs() < 0.1, "1.2² px² in 0.04 s: {grows} px²/s");
+        let std = (0.01 * tracker.detection_covariance_scale + tracker.extra_noise_px.powi(2)).sqrt();
+        assert!(std < 0.25, "0.1 px is the truth: {std}");
+        assert!(learnt(Motions::Driven).filter.is_constant_velocity());
     }
 }

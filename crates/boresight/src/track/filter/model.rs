@@ -103,6 +103,16 @@ pub struct OrnsteinUhlenbeckConfig {
     pub memory_s: f64,
 }
 
+impl OrnsteinUhlenbeckConfig {
+    /// Checks all values; `at` names the place in the configuration.
+    /// # Errors
+    /// The first value outside its range.
+    pub fn validate(&self, at: &str) -> Result<()> {
+        positive(at, "speed-std-px-per-s", self.speed_std_px_per_s, "a third of the largest speed")?;
+        positive(at, "memory-s", self.memory_s, "1 s suits pedestrians in video")
+    }
+}
+
 impl Default for OrnsteinUhlenbeckConfig {
     fn default() -> Self {
         Self { speed_std_px_per_s: 50.0, memory_s: 1.0 }
@@ -149,11 +159,7 @@ impl ModelConfig {
                 hold("nearly-constant-turn", c.hold_s)
             }
             Self::Singer(c) => positive(&format!("{at}.singer"), "manoeuvre-s", c.manoeuvre_s, "2 s is a slow turn"),
-            Self::OrnsteinUhlenbeck(c) => {
-                let at = format!("{at}.ornstein-uhlenbeck");
-                positive(&at, "speed-std-px-per-s", c.speed_std_px_per_s, "a third of the largest speed")?;
-                positive(&at, "memory-s", c.memory_s, "1 s suits pedestrians in video")
-            }
+            Self::OrnsteinUhlenbeck(c) => c.validate(&format!("{at}.ornstein-uhlenbeck")),
             Self::RandomWalk(c) => {
                 positive(&format!("{at}.random-walk"), "diffusion-px2-per-s", c.diffusion_px2_per_s, "50 is usual")
             }

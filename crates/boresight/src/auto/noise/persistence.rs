@@ -1,0 +1,274 @@
+//! Motion with a velocity that is forgotten: particles that diffuse, cells that wander.
+//!
+//! Source: an Ornstein-Uhlenbeck velocity (`boresight_filters::model::OrnsteinUhlenbeck`), whose limit for a memory shorter than the interval is diffusion: D = σ² τ (px²/s) an axis. R, σ and τ by the
+//! likelihood of the innovations as in [`super::fit`], from the same series; the model is taken if they are far more probable with it than with constant velocity ([`LEAST_GAIN`]).
+//! Departures: the memory is [`SHORTEST`] of an interval at least: what is shorter shows only in D, and a velocity of infinite variance in no table.
+//! Symbols: σ deviation of the velocity per axis (px/s), τ its memory (s), a = Δt / τ.
+//! Limits: one law for all targets; where some diffuse and others go somewhere, the one that explains more of the steps.
+
+use super::super::digits::round;
+use super::fit::{self, Motion, Noise, PRIOR_FACTOR, SCALE_PRIOR_FACTOR, STEPS, Step, log_likelihood, search};
+use crate::track::ModelConfig;
+use crate::track::filter::OrnsteinUhlenbeckConfig;
+use crate::track::filter::constant_velocity::Axis;
+use boresight_filters::model::{Model, OrnsteinUhlenbeck};
+use nalgebra::SVector;
+
+/// Logarithm of the factor by which the innovations must be more probable: very strong evidence, 150 to 1 (R. E. Kass, A. E. Raftery, *J. Am. Stat. Assoc.* 90, 1995, 3.2).
+const LEAST_GAIN: f64 = 5.0;
+/// Least memory in intervals: the steps of a twentieth are correlated by 3 %.
+const SHORTEST: f64 = 0.05;
+/// Longest memory that is looked for, in intervals.
+const LONGEST: f64 = 1000.0;
+/// Memories in intervals from which the search begins, and the longest that it may find. A memory of about an interval and noise in the measurement are hard to tell from one another: no memory
+/// is tried first, by itself.
+const BEGINNINGS: [[f64; 2]; 3] = [[SHORTEST, SHORTEST], [1.0, LONGEST], [10.0, LONGEST]];
+/// What is remembered for more intervals is a course, and for the time that a track goes unseen constant velocity says as much; how fast targets are in the mean of all times, which the
+/// other model needs, some tracks of some memories each do not tell.
+const COURSE: f64 = 10.0;
+/// Steps that decide between the models: some hundred would.
+const COMPARED: usize = 2000;
+
+/// See the head of the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Persistence {
+    /// Deviation of the velocity per axis, px/s.
+    pub speed_std_px_per_s: f64,
+    /// How long a velocity is remembered, s.
+    pub memory_s: f64,
+}
+
+/// What a time does to an axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Passed {
+    pub dt_s: f64,
+    /// Response of position and velocity to the velocity before.
+    from_v: [f64; 2],
+    /// Process covariance.
+    q: [f64; 3],
+}
+
+impl Persistence {
+    /// What it grows by over times that are longer than its memory: D = σ² τ, px²/s an axis, half the growth of the variance.
+    pub fn diffusion_px2_per_s(&self) -> f64 {
+        self.speed_std_px_per_s * self.speed_std_px_per_s * self.memory_s
+    }
+
+    /// Its model in a configuration, with three digits.
+    pub fn model(&self) -> ModelConfig {
+        let (speed_std_px_per_s, memory_s) = (round(self.speed_std_px_per_s), round(self.memory_s));
+        ModelConfig::OrnsteinUhlenbeck(OrnsteinUhlenbeckConfig { speed_std_px_per_s, memory_s })
+    }
+
+    /// Whether another differs by no more than the search tells apart.
+    pub fn is_nearly(&self, other: &Self) -> bool {
+        let near = |a: f64, b: f64| (a / b).ln().abs() <= STEPS[1];
+        near(self.diffusion_px2_per_s(), other.diffusion_px2_per_s()) && near(self.memory_s, other.memory_s)
+    }
+
+    /// What so many seconds do; nothing where the two numbers are none of a model.
+    pub fn after(&self, dt_s: f64) -> Passed {
+        let Ok(model) = OrnsteinUhlenbeck::new(self.speed_std_px_per_s, self.memory_s) else {
+            return Passed { dt_s, from_v: [dt_s, 1.0], q: [0.0; 3] };
+        };
+        let (phi, q) = (model.transition(dt_s, &SVector::zeros()), model.process_noise(dt_s));
+        Passed { dt_s, from_v: [phi[(0, 1)], phi[(1, 1)]], q: [q[(0, 0)], q[(0, 1)], q[(1, 1)]] }
+    }
+}
+
+impl Passed {
+    /// What no time has done.
+    pub const NEVER: Self = Self { dt_s: f64::NAN, from_v: [0.0; 2], q: [0.0; 3] };
+
+    /// Predicts an axis.
+    pub fn predict(&self, axis: &mut Axis) {
+        let [p, v] = self.from_v;
+        axis.x += p * axis.v;
+        axis.xx += p * (2.0 * axis.xv + p * axis.vv) + self.q[0];
+        axis.xv = v * (axis.xv + p * axis.vv) + self.q[1];
+        axis.vv = v * v * axis.vv + self.q[2];
+        axis.v *= v;
+    }
+}
+
+/// What was assumed before: noise, the least density of an acceleration, the deviation of speeds (px/s) and the area of the field.
+#[derive(Clone, Copy, Debug)]
+pub struct Assumed {
+    pub noise: Noise,
+    pub least_density: f64,
+    pub speed_std: f64,
+    pub area_px2: f64,
+}
+
+/// What explains the series better than constant velocity does, the simplest first: noise and motion.
+pub fn better(series: &[Vec<Step>], assumed: Assumed) -> Vec<(Noise, Persistence)> {
+    let Assumed { noise: before, least_density, speed_std, area_px2 } = assumed;
+    let some = lasting(series);
+    let Some(usual) = Usual::of(&some) else { return Vec::new() };
+    let within = |noise: &Noise, motion| log_likelihood(&some, noise, motion, area_px2);
+    let driven = fit::fit(&some, before, least_density, speed_std, area_px2);
+    let mut most = within(&driven, Motion::Accelerated(speed_std));
+    let mut found = Vec::new();
+    for [memory, longest] in BEGINNINGS {
+        let (noise, motion) = fit_memory(&some, &before, usual.moving(memory), &usual, longest, area_px2);
+        let gain = within(&noise, Motion::Persistent(motion));
+        // Another one has to say much more than a simpler one.
+        if gain >= most + LEAST_GAIN && motion.memory_s <= COURSE * usual.interval_s {
+            most = gain;
+            found.push((noise, motion));
+        }
+    }
+    found
+}
+
+/// The longest series that hold half of all steps, of many some: what false detections made does not last, and would be taken for noise.
+fn lasting(series: &[Vec<Step>]) -> Vec<Vec<Step>> {
+    let n: usize = series.iter().map(Vec::len).sum();
+    let mut longest: Vec<&Vec<Step>> = series.iter().collect();
+    longest.sort_by_key(|t| std::cmp::Reverse(t.len()));
+    let mut left = n.div_ceil(2);
+    let take = |t: &&Vec<Step>| (left > 0, left = left.saturating_sub(t.len())).0;
+    longest.into_iter().take_while(take).step_by((n / 2).div_ceil(COMPARED).max(1)).cloned().collect()
+}
+
+/// The usual interval of the series, s, and the deviation of the speed between two of its positions per axis, px/s.
+#[derive(Debug)]
+struct Usual {
+    interval_s: f64,
+    speed_std: f64,
+}
+
+impl Usual {
+    fn of(series: &[Vec<Step>]) -> Option<Self> {
+        let steps = || series.iter().flat_map(|t| t.windows(2)).filter(|pair| pair[1].dt_s > 0.0);
+        let speed = |pair: &[Step], a: usize| (pair[1].position[a] - pair[0].position[a]).abs() / pair[1].dt_s;
+        let interval_s = at_share(0.5, steps().map(|pair| pair[1].dt_s).collect())?;
+        // The deviation by the 68.3 % point, as strangers do not count.
+        let speed_std = at_share(0.683, steps().flat_map(|pair| [speed(pair, 0), speed(pair, 1)]).collect())?;
+        (speed_std > 0.0).then_some(Self { interval_s, speed_std })
+    }
+
+    /// A motion with such steps whose velocity is remembered for so many intervals.
+    fn moving(&self, memory: f64) -> Persistence {
+        let forgets = f64::max(1.0, 0.5 / memory).sqrt();
+        Persistence { speed_std_px_per_s: self.speed_std * forgets, memory_s: memory * self.interval_s }
+    }
+}
+
+/// The value that this share is below.
+fn at_share(share: f64, mut values: Vec<f64>) -> Option<f64> {
+    let at = (share * values.len() as f64) as usize;
+    (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
+}
+
+/// The most probable noise and motion with a memory of so many intervals at most; the prior of the noise is around what was assumed before, that of the motion around where it begins.
+fn fit_memory(
+    series: &[Vec<Step>],
+    before: &Noise,
+    began: Persistence,
+    usual: &Usual,
+    longest: f64,
+    area_px2: f64,
+) -> (Noise, Persistence) {
+    let interval_s = usual.interval_s;
+    let parts = |x: &[f64; 5]| {
+        let [scale, extra_px, extra_per_height, diffusion, memory_s] = x.map(f64::exp);
+        let speed_std_px_per_s = (diffusion / memory_s).sqrt();
+        (Noise { scale, extra_px, extra_per_height, ..*before }, Persistence { speed_std_px_per_s, memory_s })
+    };
+    let least = fit::LEAST;
+    let diffusion = began.diffusion_px2_per_s();
+    let start = [before.scale, before.extra_px, before.extra_per_height, diffusion, began.memory_s];
+    let low = [least, least, least, least * least / interval_s, SHORTEST * interval_s].map(f64::ln);
+    let high = [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY, (longest * interval_s).ln()];
+    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().clamp(low[i], high[i]));
+    let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
+    let cost = |x: &[f64; 5]| {
+        let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
+        let (noise, motion) = parts(x);
+        0.5 * prior - log_likelihood(series, &noise, Motion::Persistent(motion), area_px2)
+    };
+    parts(&search(start, STEPS, [low, high], cost))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// Ten targets of a hundred scans with an exact law of motion and a noise of 0.1 px.
+    fn series(mut next: impl FnMut(&mut [f64; 2], &mut dyn FnMut() -> f64)) -> Vec<Vec<Step>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(17);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        (0..10)
+            .map(|_| {
+                let mut axes = [[50.0, 3.0 * normal()], [50.0, 3.0 * normal()]];
+                let step = |_| {
+                    axes.iter_mut().for_each(|axis| next(axis, &mut normal));
+                    let position = [0, 1].map(|a| axes[a][0] + 0.1 * normal());
+                    Step { dt_s: 0.1, position, variance: [0.01; 2], height_px: 5.0, weight: 1.0 }
+                };
+                (0..100).map(step).collect()
+            })
+            .collect()
+    }
+
+    fn found(series: &[Vec<Step>]) -> Option<(Noise, Persistence)> {
+        let before =
+            Noise { scale: 1.0, extra_px: 0.3, extra_per_height: 0.0, density: 100.0, density_per_height2: 0.0 };
+        better(series, Assumed { noise: before, least_density: fit::LEAST, speed_std: 50.0, area_px2: 1e5 }).pop()
+    }
+
+    #[test]
+    fn what_diffuses_is_told_with_its_coefficient() {
+        // Steps of 1.2 px an axis in 0.1 s: 2 D = 14.4 px²/s.
+        let found = found(&series(|axis, normal| axis[0] += 1.2 * normal()));
+        let (noise, p) = found.expect("a diffusion");
+        let grows = 2.0 * p.speed_std_px_per_s.powi(2) * p.memory_s;
+        assert!((grows / 14.4).ln().abs() < 0.12, "{grows} px²/s: {p:?}");
+        assert!(p.memory_s < 0.02, "{p:?}");
+        assert!(noise.extra_px < 0.4, "{noise:?}");
+    }
+
+    #[test]
+    fn a_velocity_that_is_forgotten_in_some_scans_is_told_with_its_memory() {
+        let model = OrnsteinUhlenbeck::new(12.0, 0.4).unwrap();
+        let (phi, q) = (model.transition(0.1, &SVector::zeros()), model.process_noise(0.1));
+        let l00 = f64::sqrt(q[(0, 0)]);
+        let l10 = q[(0, 1)] / l00;
+        let l11 = f64::sqrt(q[(1, 1)] - l10 * l10);
+        let found = found(&series(|axis, normal| {
+            let (a, b) = (normal(), normal());
+            axis[0] += phi[(0, 1)] * axis[1] + l00 * a;
+            axis[1] = phi[(1, 1)] * axis[1] + l10 * a + l11 * b;
+        }));
+        let (_, p) = found.expect("a memory of four scans");
+        assert!((p.memory_s / 0.4).ln().abs() < 0.3 && (p.speed_std_px_per_s / 12.0).ln().abs() < 0.15, "{p:?}");
+    }
+
+    #[test]
+    fn what_goes_somewhere_keeps_its_velocity() {
+        let found = found(&series(|axis, normal| {
+            axis[0] += 0.1 * axis[1];
+            axis[1] += 0.3 * normal();
+        }));
+        assert_eq!(found, None);
+    }
+
+    #[test]
+    fn a_step_of_the_series_is_a_step_of_the_model() {
+        let p = Persistence { speed_std_px_per_s: 3.0, memory_s: 0.2 };
+        let model = OrnsteinUhlenbeck::new(3.0, 0.2).unwrap();
+        let mut axis = Axis { x: 1.0, v: 2.0, xx: 0.5, xv: 0.1, vv: 4.0 };
+        let (phi, q) = (model.transition(0.3, &SVector::zeros()), model.process_noise(0.3));
+        let (phi, q) = (phi.fixed_view::<2, 2>(0, 0), q.fixed_view::<2, 2>(0, 0));
+        let (mean, cov) = (phi * Vector2::new(1.0, 2.0), phi * Matrix2::new(0.5, 0.1, 0.1, 4.0) * phi.transpose() + q);
+        p.after(0.3).predict(&mut axis);
+        let of_axis = [axis.x, axis.v, axis.xx, axis.xv, axis.vv];
+        let of_model = [mean[0], mean[1], cov[(0, 0)], cov[(0, 1)], cov[(1, 1)]];
+        assert!(of_axis.iter().zip(of_model).all(|(a, b)| (a - b).abs() < 1e-12), "{of_axis:?} {of_model:?}");
+    }
+}
