@@ -9,14 +9,14 @@ pub(super) mod fit;
 mod persistence;
 
 use super::digits::round;
-use super::first_scans::{Shares, first};
+use super::first_scans::{PROBE_FRAMES, Shares, first};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
 use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
-use persistence::Persistence;
+use persistence::{Persistence, Which};
 use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
@@ -183,22 +183,25 @@ fn forgetful(
     assume: persistence::Assumed,
     config: &TrackerConfig,
 ) -> Result<Option<(Noise, Persistence)>> {
-    let mut found = persistence::better(series, assume);
+    let Some(mut found) = persistence::better(series, assume, Which::Simplest) else { return Ok(None) };
     let mut config = config.clone();
-    for _ in 0..MOST_ROUNDS {
-        let Some((noise, motion)) = found.first() else { break };
-        put(noise, assume.least_density, &mut config);
-        config.filter.model = motion.model();
+    // Steps are looked at, not whose they are after a gap, and those of some scans say enough where targets are many.
+    config.reidentification.max_gap_s = 0.0;
+    let mut n = 0;
+    let enough = scans.iter().take_while(|s| (n < MOST_STEPS, n += s.detections.len()).0).count();
+    let scans = &scans[..enough.max(PROBE_FRAMES).min(scans.len())];
+    for round in 1.. {
+        put(&found.0, assume.least_density, &mut config);
+        config.filter.model = found.1.model();
         let again: Vec<Vec<Step>> = follow(scans, &config)?.into_values().map(|t| t.steps).collect();
-        let next = persistence::better(&again, assume);
-        let Some((_, other)) = next.first() else { break };
-        let settled = other.is_nearly(motion);
+        let Some(next) = persistence::better(&again, assume, Which::Simplest) else { break };
+        let settled = next.1.is_nearly(&found.1);
         found = next;
-        if settled {
-            break;
+        if settled || round == MOST_ROUNDS {
+            return Ok(persistence::better(&again, assume, Which::Best).or(Some(found)));
         }
     }
-    Ok(found.pop())
+    Ok(Some(found))
 }
 
 /// Writes noise and motion into the tracker's configuration.

@@ -27,7 +27,7 @@ const BEGINNINGS: [[f64; 2]; 3] = [[SHORTEST, SHORTEST], [1.0, LONGEST], [10.0, 
 /// other model needs, some tracks of some memories each do not tell.
 const COURSE: f64 = 10.0;
 /// Steps that decide between the models: some hundred would.
-const COMPARED: usize = 2000;
+const COMPARED: usize = 1000;
 
 /// See the head of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,22 +100,34 @@ pub struct Assumed {
     pub area_px2: f64,
 }
 
-/// What explains the series better than constant velocity does, the simplest first: noise and motion.
-pub fn better(series: &[Vec<Step>], assumed: Assumed) -> Vec<(Noise, Persistence)> {
+/// Which of the motions that explain more than constant velocity does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// The first of them that does.
+    Simplest,
+    /// One that explains much more than those before.
+    Best,
+}
+
+/// What explains the series better than constant velocity does: the first such noise and motion, as simple as may be, or the one that explains most.
+pub fn better(series: &[Vec<Step>], assumed: Assumed, which: Which) -> Option<(Noise, Persistence)> {
     let Assumed { noise: before, least_density, speed_std, area_px2 } = assumed;
     let some = lasting(series);
-    let Some(usual) = Usual::of(&some) else { return Vec::new() };
+    let usual = Usual::of(&some)?;
     let within = |noise: &Noise, motion| log_likelihood(&some, noise, motion, area_px2);
     let driven = fit::fit(&some, before, least_density, speed_std, area_px2);
     let mut most = within(&driven, Motion::Accelerated(speed_std));
-    let mut found = Vec::new();
+    let mut found = None;
     for [memory, longest] in BEGINNINGS {
         let (noise, motion) = fit_memory(&some, &before, usual.moving(memory), &usual, longest, area_px2);
         let gain = within(&noise, Motion::Persistent(motion));
         // Another one has to say much more than a simpler one.
         if gain >= most + LEAST_GAIN && motion.memory_s <= COURSE * usual.interval_s {
             most = gain;
-            found.push((noise, motion));
+            found = Some((noise, motion));
+            if which == Which::Simplest {
+                break;
+            }
         }
     }
     found
@@ -217,9 +229,10 @@ mod tests {
     }
 
     fn found(series: &[Vec<Step>]) -> Option<(Noise, Persistence)> {
-        let before =
+        let noise =
             Noise { scale: 1.0, extra_px: 0.3, extra_per_height: 0.0, density: 100.0, density_per_height2: 0.0 };
-        better(series, Assumed { noise: before, least_density: fit::LEAST, speed_std: 50.0, area_px2: 1e5 }).pop()
+        let assumed = Assumed { noise, least_density: fit::LEAST, speed_std: 50.0, area_px2: 1e5 };
+        better(series, assumed, Which::Best)
     }
 
     #[test]
