@@ -2,16 +2,21 @@
 //!
 //! Source: our own. A sink counts while the run goes on; the first of these that holds is said:
 //! nothing was detected; nothing was tracked; only things at rest were tracked; the boxes are as large as a ground; tracks last for moments; the innovations
-//! are not as large as the filter says; the run is too short to know a background. Otherwise the tracks are believed, and their covariances called right if the innovations are as large as stated and each is
+//! are not as large as the filter says; tracks come and go in the middle of the field; the run is too short to know a background. Otherwise the tracks are believed, and their covariances called right if the innovations are as large as stated and each is
 //! a surprise: of a filter that lags, or of errors that last, they are alike from scan to scan, whatever their size.
 //! Limits: it sees no truth. What moves like a target and is none (a branch, a reflection) is believed.
 
+mod next;
+mod within;
+
 use crate::pipeline::Summary;
-use crate::track::{ConfirmationConfig, Report, TrackerConfig};
+use crate::track::{ConfirmationConfig, Report};
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Result, Sink, TrackStatus, View};
 use nalgebra::Vector2;
+use next::{another_detector, is_of_spots, more_sensitive, noise_scaled};
 use std::collections::BTreeMap;
+use within::{Passage, Within};
 
 /// A thing that was followed for so many detections and never reported stands still, or nearly.
 const FOLLOWED_HITS: u32 = 10;
@@ -48,6 +53,7 @@ struct Life {
     seen_at: u64,
     /// Innovation in the frame `seen_at`, in its deviations.
     innovation: Option<Vector2<f64>>,
+    passage: Passage,
 }
 
 /// What is counted of a run beside its [`Summary`], in memory that does not grow with it.
@@ -61,8 +67,9 @@ pub struct Observed {
     followed: u64,
     rows: u64,
     large_rows: u64,
-    /// Area of a frame, px², where there are frames.
-    frame_px2: Option<f64>,
+    /// Size of a frame, px, where there are frames.
+    frame_px: Option<[f64; 2]>,
+    within: Within,
     /// Products of innovations in a row and squares, both axes, in their deviations; number of the products.
     products: f64,
     squares: f64,
@@ -128,7 +135,7 @@ pub struct ObservedSink<'a>(&'a mut Observed);
 impl Observed {
     /// Of frames of this size, px.
     pub fn of_frames(width: usize, height: usize) -> Self {
-        Self { frame_px2: Some((width * height) as f64), ..Self::default() }
+        Self { frame_px: Some([width as f64, height as f64]), ..Self::default() }
     }
 
     /// The sink through which a run is seen.
@@ -139,7 +146,7 @@ impl Observed {
     fn put(&mut self, view: &View<'_>) {
         let now = view.scan.time.ns;
         self.frames += 1;
-        let frame_px2 = self.frame_px2;
+        let frame_px = self.frame_px;
         // Scores say only why there is no track.
         if self.frames_with_tracks == 0 {
             view.scan.detections.iter().for_each(|d| self.scores.put(d.score));
@@ -166,7 +173,10 @@ impl Observed {
             life.last_ns = now;
             self.rows += 1;
             let box_px2 = t.extent.width_px * t.extent.height_px;
-            self.large_rows += u64::from(frame_px2.is_some_and(|area| box_px2 > LARGE_SHARE * area));
+            if let Some([width, height]) = frame_px {
+                self.large_rows += u64::from(box_px2 > LARGE_SHARE * width * height);
+                life.passage.note(self.frames, t, [width, height]);
+            }
         }
         self.frames_with_tracks += u64::from(is_there);
         let seen_at = self.frames;
@@ -175,6 +185,7 @@ impl Observed {
             let lives = life.seen_at == seen_at;
             if !lives {
                 self.end(life);
+                self.within.end(&life.passage);
             }
             lives
         });
@@ -271,6 +282,10 @@ impl Observed {
                 Some(noise_scaled(&config.tracker, nis / 2.0)),
             );
         }
+        if let Some(words) = all.within.doubt() {
+            let next = another_detector(config).filter(|_| !is_of_spots(config));
+            return doubt(format!("{}, but {words}.", self.found(mean_s, summary)), next);
+        }
         if let ThresholdConfig::Moving(background) = &config.detector.threshold
             && summary.duration_s < LEAST_STARTS * background.start_s
         {
@@ -332,56 +347,9 @@ impl Sink for ObservedSink<'_> {
     }
 }
 
-/// What finds more than this detector.
-fn more_sensitive(config: &Config) -> Option<String> {
-    Some(match &config.detector.threshold {
-        ThresholdConfig::Cfar(c) => {
-            format!("--set detector.threshold.cfar.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
-        }
-        ThresholdConfig::Integrate(c) => {
-            format!("--set detector.threshold.integrate.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
-        }
-        ThresholdConfig::Bernoulli(c) => {
-            format!("--set detector.threshold.bernoulli.false-alarms-per-frame={}", 10.0 * c.false_alarms_per_frame)
-        }
-        ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
-            "--detector isolated".to_string()
-        }
-        _ => "--detector cfar".to_string(),
-    })
-}
-
-/// What looks for something else than this detector.
-fn another_detector(config: &Config) -> Option<String> {
-    let option = match &config.detector.threshold {
-        ThresholdConfig::Moving(_) | ThresholdConfig::Difference(_) | ThresholdConfig::Colour(_) => {
-            "--detector isolated"
-        }
-        ThresholdConfig::Isolated(_) | ThresholdConfig::Cfar(_) => "--detector moving",
-        _ => "--detector cfar",
-    };
-    Some(option.to_string())
-}
-
 /// A number with its thing, in the plural where it is not one.
 fn counted(n: u64, thing: &str) -> String {
     format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
-}
-
-/// The options that multiply the covariance of every measurement by that factor: what the detector states and what is added to it, if that is more than nothing.
-fn noise_scaled(tracker: &TrackerConfig, factor: f64) -> String {
-    const NOTHING: f64 = 1e-3;
-    let digits = |v: f64| if v < 0.1 { format!("{v:.2e}") } else { format!("{v:.3}") };
-    let mut options =
-        format!("--set tracker.detection-covariance-scale={}", digits(tracker.detection_covariance_scale * factor));
-    for (key, std) in
-        [("extra-noise-px", tracker.extra_noise_px), ("extra-noise-per-height", tracker.extra_noise_per_height)]
-    {
-        if std > NOTHING {
-            options += &format!(" --set tracker.{key}={}", digits(std * factor.sqrt()));
-        }
-    }
-    options
 }
 
 #[cfg(test)]

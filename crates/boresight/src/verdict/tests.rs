@@ -165,3 +165,40 @@ fn detections_too_faint_to_start_a_track_are_named_as_the_cause() {
     assert!((scores.reached_by(0.75) / 2.5 - 1.0).abs() < 0.1, "{}", scores.reached_by(0.75));
     assert!((scores.share_from(5.0) - 0.5).abs() < 0.05, "{}", scores.share_from(5.0));
 }
+
+#[test]
+fn what_comes_and_goes_in_the_middle_of_the_field_is_doubted_and_what_crosses_it_is_not() {
+    // Twenty things a second of 3 s each, at rest or on their way from one border to the other.
+    let said = |crosses: bool| {
+        let mut seen = Observed::of_frames(200, 150);
+        for k in 0..600_u64 {
+            let (first, last) = ((k.saturating_sub(59)).div_ceil(10), k / 10);
+            let tracks: Vec<TrackState> = (first..=last)
+                .map(|id| {
+                    let age = (k - 10 * id) as f64;
+                    let x = if crosses { 1.0 + 3.3 * age } else { 100.0 };
+                    let at = Vector2::new(x, 20.0 + (id % 12) as f64 * 10.0);
+                    let mut mean = SVector::zeros();
+                    (mean[0], mean[2]) = (at.x, at.y);
+                    TrackState {
+                        id: TrackId(id),
+                        status: TrackStatus::Confirmed,
+                        kinematics: Gaussian { mean, cov: SMatrix::identity() },
+                        extent: Extent::around(at, 4.0, 4.0),
+                        detection: Some(0),
+                        innovation: None,
+                        score: 1.0,
+                    }
+                })
+                .collect();
+            let scan = Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.05 * k as f64));
+            seen.put(&View { frame: None, scan: &scan, tracks: &tracks });
+        }
+        let summary = Summary { frames: 600, duration_s: 30.0, detections: 3600, ..Summary::default() };
+        seen.verdict(&isolated(Report::All), &summary)
+    };
+    let glitter = said(false);
+    assert!(glitter.is_doubtful && glitter.sentence.contains("in the middle of the field"), "{glitter:?}");
+    assert_eq!(glitter.next.as_deref(), Some("--detector moving"));
+    assert!(!said(true).is_doubtful, "{:?}", said(true));
+}

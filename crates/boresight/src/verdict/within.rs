@@ -1,0 +1,65 @@
+//! Tracks that come from nowhere and go nowhere: begun and ended in the middle of the field.
+//!
+//! Source: our own. A target comes and goes over the border of the field, or by way of something that hides it; what flares up and vanishes (glitter, waves, noise that a codec repeats, what goes out of
+//! focus) does so anywhere, and of a target that is lost again and again there is a track for each time. Of a field whose rim is a twentieth of its shorter side 81 % and more are middle.
+//! Limits: a track of the first or last [`AT_THE_ENDS`] frames may have come or gone outside the run and is not counted; doors and trees are the middle of the field too.
+
+use super::counted;
+use crate::TrackState;
+
+/// Share of the shorter side that is the rim.
+const RIM: f64 = 0.05;
+/// A target is seen first, or last, so long after or before it crosses the border, s.
+const CONFIRMED_S: f64 = 0.5;
+/// Frames at the beginning in which tracks are those of targets that were there before, most of the time that confirmation takes.
+const AT_THE_ENDS: u64 = 10;
+/// Fewer tracks that came and went say nothing.
+const LEAST: u64 = 10;
+
+/// Where a track was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Passage {
+    /// Frame in which it was reported first, and whether that was within the field.
+    began: Option<(u64, bool)>,
+    /// Whether it is there now.
+    is_within: bool,
+}
+
+impl Passage {
+    /// Takes the next row of the track, in a field of that size, px.
+    pub fn note(&mut self, frame: u64, track: &TrackState, [width, height]: [f64; 2]) {
+        let [x, vx, y, vy] = [0, 1, 2, 3].map(|i| track.kinematics.mean[i]);
+        let half = 0.5 * track.extent.width_px.max(track.extent.height_px);
+        let rim = RIM * width.min(height) + CONFIRMED_S * vx.hypot(vy) + half;
+        self.is_within = x.min(y).min(width - x).min(height - y) > rim;
+        self.began.get_or_insert((frame, self.is_within));
+    }
+}
+
+/// How many of the tracks that came and went did so within the field.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Within {
+    all: u64,
+    within: u64,
+}
+
+impl Within {
+    /// Counts a track that has ended before the run did.
+    pub fn end(&mut self, passage: &Passage) {
+        if let Some((_, began_within)) = passage.began.filter(|(frame, _)| *frame > AT_THE_ENDS) {
+            self.all += 1;
+            self.within += u64::from(began_within && passage.is_within);
+        }
+    }
+
+    /// What is to be said if that is most of them.
+    pub fn doubt(&self) -> Option<String> {
+        (self.all >= LEAST && 2 * self.within > self.all).then(|| {
+            format!(
+                "{} of {} that came and went did so in the middle of the field: things that flare up and vanish (glitter, waves, what blinks or goes out of focus), or targets that are lost again and again",
+                self.within,
+                counted(self.all, "track")
+            )
+        })
+    }
+}
