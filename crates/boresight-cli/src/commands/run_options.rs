@@ -183,6 +183,13 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
             .at("--units m")
             .into());
     }
+    let columns = args.columns.as_ref().map(|c| format!("--columns {c}"));
+    let of_tables = columns.or(args.skip_bad_rows.then(|| "--skip-bad-rows".to_string()));
+    // What is not there is told as that.
+    if let Some(option) = of_tables.filter(|_| Path::new(&args.input).exists()) {
+        let e = Error::new(ErrorKind::Config, "frames have neither columns nor rows, only tables do");
+        return Err(e.at(option).hint(format!("leave it out: {} is frames", args.input.display())).into());
+    }
     if let Some(frames) = frames {
         return Err(Error::new(ErrorKind::Config, "only a table of detections needs pictures beside it")
             .at(format!("--frames {}", frames.display()))

@@ -330,9 +330,12 @@ fn a_word_sets_the_least_score_the_unit_and_what_the_tables_hold() {
         .map(|l| l.rsplit(',').next().unwrap().parse::<f64>().unwrap())
         .fold(f64::INFINITY, f64::min);
     assert!((9.0..40.0).contains(&least), "{least}");
-    for (options, says) in
-        [(["--detector", "cfar"], "which has no least score"), (["--units", "m"], "only tables can be in metres")]
-    {
+    for (options, says) in [
+        (["--detector", "cfar"], "which has no least score"),
+        (["--units", "m"], "only tables can be in metres"),
+        (["--columns", "x=cx"], "frames have neither columns nor rows"),
+        (["--skip-bad-rows", "--quiet"], "frames have neither columns nor rows"),
+    ] {
         let mut args = vec!["track".as_ref(), video.as_os_str(), "--min-score".as_ref(), "9".as_ref()];
         args.extend(options.map(std::ffi::OsStr::new));
         let out = run(args);

@@ -42,18 +42,26 @@ opaque_debug!(Opened);
 /// An input that cannot be opened, or whose first frames differ in size or pixel type.
 pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Request) -> Result<(Replay, Choice)> {
     let input = input.as_ref();
+    let mut base = base.clone();
+    let given = base.input.sensor.clone();
     let on_disk = second_look::can_be_opened_twice(input);
     let beside = (on_disk && base.input.colour != Colour::Rgb).then(second_look::beside);
-    let read = |config: &Config, colours_beside: Option<ColoursBeside>| -> Result<Replay> {
+    let read = |config: &mut Config, colours_beside: Option<ColoursBeside>| -> Result<(Replay, usize)> {
         let options = OpenOptions { colours_beside, ..config.input.open_options() };
-        let source = config.input.mend(crate::io::open(input, &options)?)?;
+        let mut source = config.input.mend(crate::io::open(input, &options)?)?;
         // A stream waits for nothing longer than the choice needs.
         let most = if on_disk { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, MOST_BYTES);
+        let mut n_bad = 0;
+        if !config.input.sensor.is_active() && config.input.sensor.bad_pixels.is_none() {
+            (source, n_bad) = crate::sensor::if_bad_pixels(source, n)?;
+            config.input.sensor.bad_pixels = (n_bad > 0).then_some(true);
+        }
         // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
-        Ok(Replay::new(source, n.min(PROBE_FRAMES)).up_to(n))
+        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n), n_bad))
     };
-    let mut frames = read(base, beside.clone())?;
+    let (mut frames, n_bad) = read(&mut base, beside.clone())?;
+    let base = &base;
     let anew = || Read::All(second_look::frames(input, base, PROBE_FRAMES));
     let second = |frames: &mut Replay, wanted: Wanted| match (wanted, &beside) {
         (Wanted::None, beside) => {
@@ -69,7 +77,16 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         choice.report_whole(rate_hz);
     }
     if choice.config.input.colour != base.input.colour {
-        frames = read(&choice.config, None)?;
+        // Frames in colour are no sensor's.
+        choice.config.input.sensor = given;
+        frames = read(&mut choice.config, None)?.0;
+    } else if n_bad > 0 {
+        let pixels = if n_bad == 1 { "One pixel is" } else { "pixels are" };
+        let n = if n_bad == 1 { String::new() } else { format!("{n_bad} ") };
+        choice.reasons.insert(
+            0,
+            format!("{n}{pixels} always unlike all around, as no optics makes them: bad ones of the sensor, filled from these (--set input.sensor.bad-pixels=false)."),
+        );
     }
     Ok((frames, choice))
 }

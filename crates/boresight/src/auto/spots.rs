@@ -110,11 +110,16 @@ impl Seen {
         if dark.gain() > bright.gain() { (Polarity::Dark, dark) } else { (Polarity::Bright, bright) }
     }
 
-    /// The polarity of the targets: that of what stands clear and, of what hardly does, that of what moves; both if the lesser one's moves beside the greater
-    /// one's and not with it.
+    /// The polarity of the targets: that of what stands clear and surely moves where only one of them moves and neither is many; else that of what stands clear and, of what hardly does, that of what
+    /// moves; both if the lesser one's moves beside the greater one's and not with it.
     pub fn polarity(&self) -> Polarity {
         let weight = |s: &Side| s.per_frame * s.mean_score;
-        let dark_weighs = match self.is_poor() && self.moves() {
+        // Things at rest, however clear, are scenery or dead pixels. Of many it is not told which of them move.
+        let moves_clearly = |s: &Side| s.per_frame >= POOR && s.chains.is_sure();
+        let by_motion = self.bright.chains.is_sure() != self.dark.chains.is_sure()
+            && (moves_clearly(&self.bright) || moves_clearly(&self.dark))
+            && self.bright.per_frame.max(self.dark.per_frame) <= MANY;
+        let dark_weighs = match by_motion || (self.is_poor() && self.moves()) {
             true => self.dark.chains.gain() > self.bright.chains.gain(),
             false => weight(&self.dark) > 2.0 * weight(&self.bright),
         };
@@ -322,5 +327,8 @@ mod tests {
         // What stands clear decides where there is any.
         assert_eq!(seen(moving(50.0), side(1.0, 20.0, 90.0, 150.0, 0.0)), Polarity::Dark);
         assert_eq!(seen(still(), still()), Polarity::Bright);
+        // Unless something else is clear in some frames and moves: dead pixels are clearest.
+        assert_eq!(seen(side(0.9, 9.0, 50.0, 50.0, 4.0), side(1.8, 28.0, 90.0, 150.0, 0.0)), Polarity::Bright);
+        assert_eq!(seen(side(0.9, 9.0, 50.0, 50.0, 0.0), side(1.8, 28.0, 90.0, 150.0, 0.0)), Polarity::Dark);
     }
 }

@@ -14,8 +14,9 @@ pub struct SensorConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<String>,
     /// Whether pixels unlike their neighbours are looked for, in the dark frames or else in the first 32, and filled from these. A point sharper than half a pixel
-    /// that never moves is taken for one.
-    pub bad_pixels: bool,
+    /// that never moves is taken for one. Left out: where a configuration is chosen, in grey frames that are no coded video; where one is given, not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bad_pixels: Option<bool>,
     /// Whether fixed offsets of columns are looked for, in the dark frames or else in the first 32, and taken off. An upright edge longer than half the
     /// frame's height that never moves is taken for one.
     pub column_noise: bool,
@@ -24,6 +25,11 @@ pub struct SensorConfig {
 impl SensorConfig {
     /// Whether anything is mended.
     pub fn is_active(&self) -> bool {
-        self.dark.is_some() || self.flat.is_some() || self.bad_pixels || self.column_noise
+        self.dark.is_some() || self.flat.is_some() || self.fills() || self.column_noise
+    }
+
+    /// Whether bad pixels are filled.
+    pub fn fills(&self) -> bool {
+        self.bad_pixels == Some(true)
     }
 }

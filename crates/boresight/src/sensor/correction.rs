@@ -32,6 +32,8 @@ pub struct Correction {
     /// Bad pixels and the good ones that fill them: offsets into the frame.
     bad: Vec<(usize, Vec<usize>)>,
     level: f32,
+    /// Whether nothing but bad pixels is mended, each of which has good ones around it.
+    only_bad: bool,
     scratch: Vec<f32>,
 }
 
@@ -75,15 +77,34 @@ impl Correction {
             off.chunks_exact_mut(w.max(1))
                 .for_each(|row| row.iter_mut().zip(&defects.columns).for_each(|(o, c)| *o += c));
         }
-        if config.bad_pixels {
+        if config.fills() {
             for [x, y] in &defects.pixels {
                 if (*x as usize) < w && (*y as usize) < h {
                     is_bad[*y as usize * w + *x as usize] = true;
                 }
             }
         }
-        let bad = (0..w * h).filter(|&i| is_bad[i]).map(|i| (i, fillers(&is_bad, w, h, i))).collect();
-        Ok(Self { width: w, height: h, off, times, bad, level, scratch: Vec::new() })
+        let bad: Vec<(usize, Vec<usize>)> =
+            (0..w * h).filter(|&i| is_bad[i]).map(|i| (i, fillers(&is_bad, w, h, i))).collect();
+        let only_bad = level == 0.0
+            && off.iter().all(|o| *o == 0.0)
+            && times.iter().all(|t| *t == 1.0)
+            && bad.iter().all(|(_, from)| !from.is_empty());
+        Ok(Self { width: w, height: h, off, times, bad, level, only_bad, scratch: Vec::new() })
+    }
+
+    /// Nothing is done.
+    pub(super) fn none() -> Self {
+        Self {
+            width: 0,
+            height: 0,
+            off: Vec::new(),
+            times: Vec::new(),
+            bad: Vec::new(),
+            level: 0.0,
+            only_bad: true,
+            scratch: Vec::new(),
+        }
     }
 
     /// Number of pixels that are filled.
@@ -111,6 +132,15 @@ impl Correction {
     }
 
     fn mend<T: Copy>(&mut self, image: &mut Image<T>, get: impl Fn(T) -> f32, put: impl Fn(f32) -> T, full: f32) {
+        if self.only_bad {
+            // Those that fill are good ones and stay, so nothing else is touched.
+            let pixels = image.as_mut_slice();
+            for (i, from) in &self.bad {
+                let sum: f32 = from.iter().map(|j| get(pixels[*j])).sum();
+                pixels[*i] = put(sum / from.len() as f32);
+            }
+            return;
+        }
         self.scratch.clear();
         let mended = image.as_slice().iter().zip(&self.off).zip(&self.times).map(|((v, o), t)| {
             let v = get(*v);
@@ -174,7 +204,7 @@ mod tests {
     #[test]
     fn bad_pixels_are_filled_and_full_ones_stay_full() {
         let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [99, 9]], columns: vec![1.0; 8] };
-        let config = SensorConfig { bad_pixels: true, column_noise: true, ..Default::default() };
+        let config = SensorConfig { bad_pixels: Some(true), column_noise: true, ..Default::default() };
         let mut c = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
         let mut image = Image::filled(8, 6, 41u8);
         image.row_mut(2)[3] = 250;
@@ -200,5 +230,24 @@ mod tests {
         let dark = e(Calibration { dark: Some(Image::filled(4, 4, 1.0)), flat: None });
         assert!(dark.contains("input.sensor.dark") && dark.contains("found 4 x 4"), "{dark}");
         assert!(e(Calibration { dark: None, flat: Some(Image::filled(8, 6, 0.0)) }).contains("no brighter"));
+    }
+
+    #[test]
+    fn bad_pixels_alone_are_filled_as_they_are_beside_all_else() {
+        let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [7, 5]], columns: Vec::new() };
+        let config = SensorConfig { bad_pixels: Some(true), ..Default::default() };
+        let mut alone = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
+        assert!(alone.only_bad);
+        let mut whole = Correction { only_bad: false, ..alone.clone() };
+        let value = |x: usize, y: usize| 30 + (7 * x + 13 * y + x * y) % 50;
+        let image = column(8, 6, |x, y| value(x, y) as f32);
+        let bytes = Image::from_vec(8, 6, image.as_slice().iter().map(|v| *v as u8).collect()).unwrap();
+        for frame in [Pixels::GrayF32(image), Pixels::Gray8(bytes)] {
+            let (mut a, mut b) = (frame.clone(), frame.clone());
+            alone.apply(&mut a);
+            whole.apply(&mut b);
+            assert_eq!(a, b);
+            assert_ne!(a, frame);
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Pixels and columns unlike their neighbours, from the mean and the variance of each pixel over frames.
 //!
 //! A bad pixel is one of: brighter or darker than the median of its eight neighbours by five times their spread (the largest and the smallest left out, at least the rounding) and
-//! by eight deviations of its mean; it never changes while its neighbours do in most frames; it is twenty times as noisy as they. An optical spot is wider than a pixel: one of
+//! by eight deviations of its mean; it never changes while its neighbours do in most frames; it is twenty times as noisy as they, and in many frames. An optical spot is wider than a pixel: one of
 //! deviation 0.5 px stands 4.7 times the spread of its neighbours above them, so that it is none. Over a scene that moves the mean is smooth, and defects stand out.
 //! A column's offset is the sum of the median differences of neighbouring columns, less a line through [`SPAN`] columns by medians: what is wider is shading.
 //! They count if their spread is twice what noise alone makes of it and steps have the same sign in the upper and the lower half of the rows.
@@ -21,6 +21,8 @@ const ALIKE: f32 = 0.5;
 const FRAMES: u32 = 12;
 /// Times the neighbours' variance above which a pixel is bad.
 const NOISY: f32 = 20.0;
+/// Share of the frames over which the unrest of a noisy pixel is spread, at least: what passes over a pixel, or flashes, is no noise.
+const OFTEN: f32 = 0.25;
 /// Share of the frames in which all neighbours change, so that one that does not, or much more, tells anything.
 const RESTLESS: f32 = 0.5;
 /// Columns over which offsets are compared.
@@ -68,7 +70,7 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
             let is_off = off > SPREADS * spread && off > DEVIATIONS * sd && n > 1;
             let tells = n >= FRAMES && neighbours(&changes, x, y, |_, v| v).low > RESTLESS;
             let is_still = tells && changes.row(y)[x] == 0.0;
-            let is_noisy = tells && own_noise > NOISY * noise.high;
+            let is_noisy = tells && own_noise > NOISY * noise.high && frames.spread_of_changes(y * w + x) > OFTEN;
             if is_off || is_still || is_noisy || !own.is_finite() {
                 pixels.push([x as u32, y as u32]);
             }

@@ -16,6 +16,8 @@ pub struct MeanMap {
     before: Vec<f32>,
     /// Frames in which a pixel was not what it was in the one before.
     changes: Vec<u16>,
+    /// Sums of the magnitudes and of the squares of these changes.
+    moved: Vec<[f32; 2]>,
     step: f32,
 }
 
@@ -36,12 +38,16 @@ impl MeanMap {
             self.mean.resize(w * h, 0.0);
             self.spread.resize(w * h, 0.0);
             self.changes.resize(w * h, 0);
+            self.moved.resize(w * h, [0.0; 2]);
         }
         if (w, h) != (self.width, self.height) {
             return wrong(format!("expected {} x {} px, found {w} x {h}", self.width, self.height));
         }
-        for ((c, now), before) in self.changes.iter_mut().zip(&self.now).zip(&self.before) {
+        let changed = self.changes.iter_mut().zip(&mut self.moved);
+        for (((c, moved), now), before) in changed.zip(&self.now).zip(&self.before) {
+            let by = (now - before).abs();
             *c = c.saturating_add(u16::from(now != before));
+            *moved = [moved[0] + by, moved[1] + by * by];
         }
         self.before.clone_from(&self.now);
         self.n += 1;
@@ -80,6 +86,12 @@ impl MeanMap {
         let frames = f32::from(u16::try_from(self.n.max(2) - 1).unwrap_or(u16::MAX));
         let shares = self.changes.iter().map(|c| f32::from(*c) / frames).collect();
         Image::from_vec(self.width, self.height, shares).unwrap_or_default()
+    }
+
+    /// Over how many of its changes, as a share of all, a pixel's unrest is spread: (Σ|d|)² / (n Σd²), 2/π of normal noise, 2/n of what came and went once.
+    pub(super) fn spread_of_changes(&self, pixel: usize) -> f32 {
+        let [sum, squares] = self.moved[pixel];
+        sum * sum / (squares * (self.n.max(2) - 1) as f32).max(f32::MIN_POSITIVE)
     }
 
     fn image(&self, values: &[f64], scale: f64) -> Image<f32> {
