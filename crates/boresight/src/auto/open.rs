@@ -16,6 +16,7 @@ use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera, Scene};
 use super::second_look::{self, Read};
 use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
+use crate::sensor::{Found, if_defective};
 use crate::track::Tracking;
 use crate::vision::Detector;
 use crate::{Config, Error, Frame, FrameSource, Result};
@@ -46,21 +47,21 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
     let given = base.input.sensor.clone();
     let on_disk = second_look::can_be_opened_twice(input);
     let beside = (on_disk && base.input.colour != Colour::Rgb).then(second_look::beside);
-    let read = |config: &mut Config, colours_beside: Option<ColoursBeside>| -> Result<(Replay, usize)> {
+    let read = |config: &mut Config, colours_beside: Option<ColoursBeside>| -> Result<(Replay, Found)> {
         let options = OpenOptions { colours_beside, ..config.input.open_options() };
         let mut source = config.input.mend(crate::io::open(input, &options)?)?;
         // A stream waits for nothing longer than the choice needs.
         let most = if on_disk { first_scans::MOST_SCANS } else { PROBE_FRAMES };
         let n = frames_ahead(source.info(), most, MOST_BYTES);
-        let mut n_bad = 0;
-        if !config.input.sensor.is_active() && config.input.sensor.bad_pixels.is_none() {
-            (source, n_bad) = crate::sensor::if_bad_pixels(source, n)?;
-            config.input.sensor.bad_pixels = (n_bad > 0).then_some(true);
-        }
+        let found;
+        (source, found) = if_defective(source, n, &config.input.sensor)?;
+        let sensor = &mut config.input.sensor;
+        sensor.bad_pixels = sensor.bad_pixels.or((found.n_bad > 0).then_some(true));
+        sensor.column_noise = sensor.column_noise.or((found.column_rms > 0.0).then_some(true));
         // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
-        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n), n_bad))
+        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n), found))
     };
-    let (mut frames, n_bad) = read(&mut base, beside.clone())?;
+    let (mut frames, found) = read(&mut base, beside.clone())?;
     let base = &base;
     let anew = || Read::All(second_look::frames(input, base, PROBE_FRAMES));
     let second = |frames: &mut Replay, wanted: Wanted| match (wanted, &beside) {
@@ -80,15 +81,29 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         // Frames in colour are no sensor's.
         choice.config.input.sensor = given;
         frames = read(&mut choice.config, None)?.0;
-    } else if n_bad > 0 {
-        let pixels = if n_bad == 1 { "One pixel is" } else { "pixels are" };
-        let n = if n_bad == 1 { String::new() } else { format!("{n_bad} ") };
-        choice.reasons.insert(
-            0,
-            format!("{n}{pixels} always unlike all around, as no optics makes them: bad ones of the sensor, filled from these (--set input.sensor.bad-pixels=false)."),
-        );
+    } else {
+        choice.reasons.splice(0..0, words(&found));
     }
     Ok((frames, choice))
+}
+
+/// What is mended of a sensor's frames unasked, and how not to.
+fn words(found: &Found) -> Vec<String> {
+    let mut out = Vec::new();
+    if found.n_bad > 0 {
+        let pixels = if found.n_bad == 1 { "pixel is" } else { "pixels are" };
+        out.push(format!(
+            "{} {pixels} always unlike all around, as no optics makes them: bad ones of the sensor, or drawn on the picture; they are filled from their neighbours (--set input.sensor.bad-pixels=false).",
+            found.n_bad
+        ));
+    }
+    if found.column_rms > 0.0 {
+        out.push(format!(
+            "The columns have offsets of {:.2} counts rms that stay while the scene moves over them: they are taken off (--set input.sensor.column-noise=false).",
+            found.column_rms
+        ));
+    }
+    out
 }
 
 /// As [`open_and_choose`], for frames that the caller has: `again` hands out the same frames anew, if they can be had a second time.

@@ -18,14 +18,20 @@ pub struct SensorConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bad_pixels: Option<bool>,
     /// Whether fixed offsets of columns are looked for, in the dark frames or else in the first 32, and taken off. An upright edge longer than half the
-    /// frame's height that never moves is taken for one.
-    pub column_noise: bool,
+    /// frame's height that never moves is taken for one. Left out: as bad pixels, where the scene moves over the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column_noise: Option<bool>,
 }
 
 impl SensorConfig {
     /// Whether anything is mended.
     pub fn is_active(&self) -> bool {
-        self.dark.is_some() || self.flat.is_some() || self.fills() || self.column_noise
+        self.dark.is_some() || self.flat.is_some() || self.fills() || self.levels_columns()
+    }
+
+    /// Whether offsets of columns are taken off.
+    pub fn levels_columns(&self) -> bool {
+        self.column_noise == Some(true)
     }
 
     /// Whether bad pixels are filled.

@@ -73,7 +73,7 @@ impl Correction {
                 *t = if *bad { 1.0 } else { 1.0 / response };
             }
         }
-        if config.column_noise && known.dark.is_none() && defects.columns.len() == w {
+        if config.levels_columns() && known.dark.is_none() && defects.columns.len() == w {
             off.chunks_exact_mut(w.max(1))
                 .for_each(|row| row.iter_mut().zip(&defects.columns).for_each(|(o, c)| *o += c));
         }
@@ -91,20 +91,6 @@ impl Correction {
             && times.iter().all(|t| *t == 1.0)
             && bad.iter().all(|(_, from)| !from.is_empty());
         Ok(Self { width: w, height: h, off, times, bad, level, only_bad, scratch: Vec::new() })
-    }
-
-    /// Nothing is done.
-    pub(super) fn none() -> Self {
-        Self {
-            width: 0,
-            height: 0,
-            off: Vec::new(),
-            times: Vec::new(),
-            bad: Vec::new(),
-            level: 0.0,
-            only_bad: true,
-            scratch: Vec::new(),
-        }
     }
 
     /// Number of pixels that are filled.
@@ -204,7 +190,7 @@ mod tests {
     #[test]
     fn bad_pixels_are_filled_and_full_ones_stay_full() {
         let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [99, 9]], columns: vec![1.0; 8] };
-        let config = SensorConfig { bad_pixels: Some(true), column_noise: true, ..Default::default() };
+        let config = SensorConfig { bad_pixels: Some(true), column_noise: Some(true), ..Default::default() };
         let mut c = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
         let mut image = Image::filled(8, 6, 41u8);
         image.row_mut(2)[3] = 250;

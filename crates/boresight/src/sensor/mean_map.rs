@@ -3,6 +3,9 @@
 use super::grey::{range, values};
 use crate::{Error, ErrorKind, Image, Pixels, Result};
 
+/// Over 32 frames the ratio of white noise is 1 ± 0.18, and half of the pixels have to be above this. Light that drifts counts as well.
+const DRIFTS: f64 = 2.0;
+
 /// Running mean and variance of each pixel.
 #[derive(Clone, Debug, Default)]
 pub struct MeanMap {
@@ -92,6 +95,13 @@ impl MeanMap {
     pub(super) fn spread_of_changes(&self, pixel: usize) -> f32 {
         let [sum, squares] = self.moved[pixel];
         sum * sum / (squares * (self.n.max(2) - 1) as f32).max(f32::MIN_POSITIVE)
+    }
+
+    /// Whether what the pixels see changes slowly, so that the scene moves over them: the variance of most is more than [`DRIFTS`] times half of their mean squared change (J. von Neumann, *Ann. Math.
+    /// Stat.* 12, 367 (1941)), which it equals where only noise changes them.
+    pub(super) fn is_of_a_moving_scene(&self) -> bool {
+        let drifts = |(spread, [_, squares]): (&f64, &[f32; 2])| *spread > DRIFTS * 0.5 * f64::from(*squares);
+        2 * self.spread.iter().zip(&self.moved).filter(|p| drifts(*p)).count() > self.spread.len()
     }
 
     fn image(&self, values: &[f64], scale: f64) -> Image<f32> {

@@ -18,5 +18,5 @@ pub use defects::{Defects, find_defects};
 pub use line::Line;
 pub use mean_map::MeanMap;
 pub use source::MendedSource;
-pub(crate) use source::if_bad_pixels;
+pub(crate) use source::{Found, if_defective};
 pub use transfer::{Level, PhotonTransfer, TransferCurve};

@@ -1,6 +1,6 @@
 //! A source whose frames are mended on their way.
 //!
-//! Nobody need ask for bad pixels of frames that no codec has smeared ([`if_bad_pixels`]): they are mended if there are any.
+//! Nobody need ask for bad pixels, and columns, of frames that no codec has smeared ([`if_defective`]): they are mended if there are any.
 //! Where defects are to be found and there are no dark frames, the first [`LEARN`] frames are read ahead and looked at; they are handed out mended as all others.
 
 use super::config::SensorConfig;
@@ -16,26 +16,68 @@ pub(super) const LEARN: usize = 32;
 /// A larger share of the pixels is no sensor's: it is how such frames are made.
 const MOST_BAD: f64 = 0.01;
 
-/// The source with its bad pixels mended and how many there are, if it is of grey frames as a sensor gives them, `ahead` of them may be read ahead, and they have any; else itself, and 0.
+/// What is mended unasked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Found {
+    pub n_bad: usize,
+    /// Root mean square of the columns' offsets, counts; 0 where they are left.
+    pub column_rms: f64,
+}
+
+/// The source with its bad pixels and its columns mended, and what was found, if it is of grey frames as a sensor gives them, `ahead` of them may be read ahead, and there is anything of which the
+/// configuration does not say whether it is mended; else itself, and nothing. Columns only where the scene moves over them: else they may be the scene's, and at rest they do no harm.
 /// # Errors
 /// A first frame that cannot be read.
-pub(crate) fn if_bad_pixels(source: Box<dyn FrameSource>, ahead: usize) -> Result<(Box<dyn FrameSource>, usize)> {
+pub(crate) fn if_defective(
+    source: Box<dyn FrameSource>,
+    ahead: usize,
+    asked: &SensorConfig,
+) -> Result<(Box<dyn FrameSource>, Found)> {
     let info = source.info().clone();
     // Video in the usual sense is coded in blocks, which smear a single pixel, and looking costs as much as decoding.
     let is_coded = ["H.264", "ffmpeg"].iter().any(|coded| info.reader.starts_with(coded));
-    if is_coded || info.kind == PixelKind::Rgb8 || ahead < LEARN || info.n_frames.is_some_and(|n| n < LEARN as u64) {
-        return Ok((source, 0));
+    let is_short = ahead < LEARN || info.n_frames.is_some_and(|n| n < LEARN as u64);
+    if is_coded || is_short || info.kind == PixelKind::Rgb8 || asked.is_active() {
+        return Ok((source, Found::default()));
     }
-    let config = SensorConfig { bad_pixels: Some(true), ..SensorConfig::default() };
-    let mut mended = MendedSource::new(source, &config, &Calibration::default(), None)?;
-    let n = mended.correction.n_bad();
-    let is_sensors = mended.ahead.len() >= LEARN && n as f64 <= MOST_BAD * (info.width * info.height) as f64;
-    if n == 0 || !is_sensors {
-        mended.info = info;
-        mended.correction = Correction::none();
-        return Ok((Box::new(mended), 0));
+    let looked_at = LookedAt::of(source);
+    let defects = find_defects(&looked_at.map);
+    let n_bad = defects.pixels.len();
+    let is_sensors = looked_at.ahead.len() >= LEARN && n_bad as f64 <= MOST_BAD * (info.width * info.height) as f64;
+    let fills = is_sensors && n_bad > 0 && asked.bad_pixels.is_none();
+    let moves = || looked_at.map.is_of_a_moving_scene();
+    let levels = is_sensors && asked.column_noise.is_none() && !defects.columns.is_empty() && moves();
+    let config = SensorConfig { bad_pixels: Some(fills), column_noise: Some(levels), ..SensorConfig::default() };
+    let found =
+        Found { n_bad: if fills { n_bad } else { 0 }, column_rms: if levels { defects.column_rms() } else { 0.0 } };
+    let mended = MendedSource::put_together(looked_at, &config, &Calibration::default(), &defects)?;
+    Ok((Box::new(mended), found))
+}
+
+/// A source of which frames were read ahead, and their map.
+struct LookedAt {
+    inner: Box<dyn FrameSource>,
+    ahead: VecDeque<Frame>,
+    broken: Option<Error>,
+    map: MeanMap,
+}
+
+impl LookedAt {
+    fn of(mut inner: Box<dyn FrameSource>) -> Self {
+        let (mut ahead, mut broken, mut map) = (VecDeque::new(), None, MeanMap::default());
+        while ahead.len() < LEARN && broken.is_none() {
+            match inner.next_frame() {
+                Ok(Some(frame)) => {
+                    // A frame of another size is the detector's to refuse.
+                    let _ = map.push(&frame.pixels);
+                    ahead.push_back(frame);
+                }
+                Ok(None) => break,
+                Err(e) => broken = Some(e),
+            }
+        }
+        Self { inner, ahead, broken, map }
     }
-    Ok((Box::new(mended), n))
 }
 
 /// Mends the frames of a source.
@@ -55,45 +97,47 @@ impl MendedSource {
     /// # Errors
     /// Colour frames; dark or flat frames that do not go with the source's; a first frame that cannot be read.
     pub fn new(
-        mut inner: Box<dyn FrameSource>,
+        inner: Box<dyn FrameSource>,
         config: &SensorConfig,
         known: &Calibration,
         dark: Option<&MeanMap>,
     ) -> Result<Self> {
-        let mut info = inner.info().clone();
-        if info.kind == PixelKind::Rgb8 {
+        if inner.info().kind == PixelKind::Rgb8 {
             return Err(Error::new(ErrorKind::Config, "a sensor's frames are mended in grey only")
                 .at("input.sensor")
                 .hint("--set input.colour=gray"));
         }
-        let (mut ahead, mut broken) = (VecDeque::new(), None);
-        let defects = match dark {
-            _ if !(config.fills() || config.column_noise) => Defects::default(),
-            Some(dark) => find_defects(dark),
+        let nothing = |inner| LookedAt { inner, ahead: VecDeque::new(), broken: None, map: MeanMap::default() };
+        let (looked_at, defects) = match dark {
+            _ if !(config.fills() || config.levels_columns()) => (nothing(inner), Defects::default()),
+            Some(dark) => (nothing(inner), find_defects(dark)),
             None => {
-                let mut map = MeanMap::default();
-                while ahead.len() < LEARN && broken.is_none() {
-                    match inner.next_frame() {
-                        Ok(Some(frame)) => {
-                            // A frame of another size is the detector's to refuse.
-                            let _ = map.push(&frame.pixels);
-                            ahead.push_back(frame);
-                        }
-                        Ok(None) => break,
-                        Err(e) => broken = Some(e),
-                    }
-                }
-                find_defects(&map)
+                let looked_at = LookedAt::of(inner);
+                let defects = find_defects(&looked_at.map);
+                (looked_at, defects)
             }
         };
-        let correction = Correction::new((info.width, info.height), config, known, &defects)?;
+        Self::put_together(looked_at, config, known, &defects)
+    }
+
+    fn put_together(
+        looked_at: LookedAt,
+        config: &SensorConfig,
+        known: &Calibration,
+        defects: &Defects,
+    ) -> Result<Self> {
+        let LookedAt { inner, ahead, broken, .. } = looked_at;
+        let mut info = inner.info().clone();
+        let correction = Correction::new((info.width, info.height), config, known, defects)?;
         let mut done = Vec::new();
         done.extend(known.dark.is_some().then(|| "dark frame".to_string()));
         done.extend(known.flat.is_some().then(|| "flat frame".to_string()));
         done.extend((config.fills() || correction.n_bad() > 0).then(|| format!("{} bad pixels", correction.n_bad())));
-        let columns = known.dark.is_none() && config.column_noise;
+        let columns = known.dark.is_none() && config.levels_columns();
         done.extend(columns.then(|| format!("columns of {:.2} counts rms", defects.column_rms())));
-        info.reader = format!("{}; mended: {}", info.reader, done.join(", "));
+        if !done.is_empty() {
+            info.reader = format!("{}; mended: {}", info.reader, done.join(", "));
+        }
         Ok(Self { inner, info, ahead, correction, broken })
     }
 }
@@ -189,12 +233,12 @@ mod tests {
 
     /// How many are found, and all frames as they are handed out.
     fn mended(source: Box<dyn FrameSource>) -> (usize, Vec<Pixels>) {
-        let (mut source, n) = if_bad_pixels(source, LEARN).unwrap();
+        let (mut source, found) = if_defective(source, LEARN, &SensorConfig::default()).unwrap();
         let mut out = Vec::new();
         while let Some(frame) = source.next_frame().unwrap() {
             out.push(frame.pixels);
         }
-        (n, out)
+        (found.n_bad, out)
     }
 
     #[test]
@@ -226,5 +270,29 @@ mod tests {
         let slow = |k: u64, image: &mut Image<u16>| image.row_mut(11)[2 + k as usize / 12] = 3000;
         assert_eq!(mended(noise("TIFF pages", fast)).0, 0);
         assert_eq!(mended(noise("TIFF pages", slow)).0, 0);
+    }
+
+    #[test]
+    fn offsets_of_columns_are_taken_off_where_the_scene_moves_over_them() {
+        const COLUMN: f64 = 10.0;
+        /// Columns off by up to that many counts to either side, over waves that go to the right by so many pixels a frame.
+        fn frames<const SPEED: u64>(k: u64, image: &mut Image<u16>) {
+            for y in 0..SIZE {
+                for x in 0..SIZE {
+                    let way = x as f64 - (SPEED * k) as f64;
+                    let scene = 20.0 * (std::f64::consts::TAU / 16.0 * way + 0.2 * y as f64).sin();
+                    let column = COLUMN * 2.0 * ((12.9898 * x as f64).sin() * 43_758.545_3).rem_euclid(1.0) - COLUMN;
+                    let v = &mut image.row_mut(y)[x];
+                    *v = (f64::from(*v) + scene + column) as u16;
+                }
+            }
+        }
+        let looked = |change| if_defective(noise("TIFF pages", change), LEARN, &SensorConfig::default()).unwrap().1;
+        let rms = looked(frames::<2>).column_rms;
+        assert!((rms / (COLUMN / 3f64.sqrt()) - 1.0).abs() < 0.25, "{rms}: even within 10 counts");
+        assert_eq!(looked(frames::<0>), Found::default(), "they may be the scene's");
+        let left = SensorConfig { column_noise: Some(false), ..SensorConfig::default() };
+        let found = if_defective(noise("TIFF pages", frames::<2>), LEARN, &left).unwrap().1;
+        assert_eq!(found, Found::default(), "said to be left");
     }
 }
