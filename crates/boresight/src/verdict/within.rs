@@ -4,7 +4,6 @@
 //! focus) does so anywhere, and of a target that is lost again and again there is a track for each time. Of a field whose rim is a twentieth of its shorter side 81 % and more are middle.
 //! Limits: a track of the first or last [`AT_THE_ENDS`] frames may have come or gone outside the run and is not counted; doors and trees are the middle of the field too.
 
-use super::counted;
 use crate::TrackState;
 
 /// Share of the shorter side that is the rim.
@@ -56,9 +55,9 @@ impl Within {
     pub fn doubt(&self) -> Option<String> {
         (self.all >= LEAST && 2 * self.within > self.all).then(|| {
             format!(
-                "{} of {} that came and went did so in the middle of the field: things that flare up and vanish (glitter, waves, what blinks or goes out of focus), or targets that are lost again and again",
+                "{} of {} tracks that came and went did so in the middle of the field: things that flare up and vanish (glitter, waves, what blinks or goes out of focus), or targets that are lost again and again",
                 self.within,
-                counted(self.all, "track")
+                self.all
             )
         })
     }

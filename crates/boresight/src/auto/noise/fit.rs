@@ -2,7 +2,7 @@
 //!
 //! Source: R. K. Mehra, *IEEE Trans. AC* 15, 1970 (noise from innovations); the likelihood of a linear model is that of its innovations
 //! (Bar-Shalom, Li, Kirubarajan 2001, 5.2). Each series of positions is filtered by a model of its motion, axis by axis: constant velocity driven by a white acceleration here, one that is
-//! forgotten in [`super::persistence`].
+//! forgotten in [`super::forgotten`].
 //! R = c × stated variance + e² + (f h)², q = a + b h² (a continuous density), h the height of the box: five numbers for all series together, found
 //! by a compass search on their logarithms, which needs no derivative and ends at a step of 5 %.
 //! Departures: an innovation is, with the probability [`STRANGE`], anywhere in the field (another thing's detection, or a turn that no model has), so that a
@@ -11,7 +11,7 @@
 //! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of c, e, f, a, b.
 //! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest.
 
-use super::persistence::{Passed, Persistence};
+use super::forgotten::{Passed, Persistence};
 use crate::track::AccelerationNoise;
 use crate::track::filter::constant_velocity::{Axis, step_noise};
 

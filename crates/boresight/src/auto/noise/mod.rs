@@ -6,6 +6,7 @@
 //! Limits: a filter that is not of constant velocity at first keeps what is assumed, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before ([`COPY`]); with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 pub(super) mod fit;
+mod forgotten;
 mod persistence;
 
 use super::digits::round;
@@ -16,7 +17,8 @@ use crate::tempo::Tempo;
 use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
-use persistence::{Persistence, Which};
+use forgotten::Persistence;
+use persistence::Which;
 use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
