@@ -163,6 +163,10 @@ pub trait FrameSource: Send {
     fn entries(&self) -> Vec<u64> {
         Vec::new()
     }
+    /// Whether the frames are decoded from lossy video: single pixels are not as the sensor gave them.
+    fn is_coded(&self) -> bool {
+        false
+    }
     /// Whether it reads on a thread of its own already, ahead of the caller.
     fn reads_ahead(&self) -> bool {
         false

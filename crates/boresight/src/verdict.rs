@@ -60,6 +60,8 @@ struct Life {
 #[derive(Clone, Debug, Default)]
 pub struct Observed {
     frames: u64,
+    /// Time of the first frame.
+    began_ns: Option<i64>,
     frames_with_tracks: u64,
     lives: BTreeMap<u64, Life>,
     ended: u64,
@@ -145,6 +147,8 @@ impl Observed {
 
     fn put(&mut self, view: &View<'_>) {
         let now = view.scan.time.ns;
+        let began = *self.began_ns.get_or_insert(now);
+        let interval_s = now.saturating_sub(began) as f64 * 1e-9 / self.frames.max(1) as f64;
         self.frames += 1;
         let frame_px = self.frame_px;
         // Scores say only why there is no track.
@@ -175,7 +179,7 @@ impl Observed {
             let box_px2 = t.extent.width_px * t.extent.height_px;
             if let Some([width, height]) = frame_px {
                 self.large_rows += u64::from(box_px2 > LARGE_SHARE * width * height);
-                life.passage.note(self.frames, t, [width, height]);
+                life.passage.note(self.frames, t, [width, height], interval_s);
             }
         }
         self.frames_with_tracks += u64::from(is_there);

@@ -185,8 +185,9 @@ pub fn plan(args: &InputArgs, tracker: &TrackerArgs, frames: Option<&OsStr>) -> 
     }
     let columns = args.columns.as_ref().map(|c| format!("--columns {c}"));
     let of_tables = columns.or(args.skip_bad_rows.then(|| "--skip-bad-rows".to_string()));
-    // What is not there is told as that.
-    if let Some(option) = of_tables.filter(|_| Path::new(&args.input).exists()) {
+    // A file that is not there is told as that, and may have been a table; a pattern or a stream is none.
+    let names_a_file = !args.input.to_string_lossy().contains(['*', '?', '%']) && args.input != "-";
+    if let Some(option) = of_tables.filter(|_| !names_a_file || Path::new(&args.input).exists()) {
         let e = Error::new(ErrorKind::Config, "frames have neither columns nor rows, only tables do");
         return Err(e.at(option).hint(format!("leave it out: {} is frames", args.input.display())).into());
     }

@@ -1,6 +1,6 @@
 //! `boresight smooth`: tracks of a whole run, each row told of all the others.
 
-use super::table_motion::TableMotion;
+use super::table_motion;
 use crate::console::say;
 use boresight::io::{TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::smooth::{SmoothConfig, SmoothMethod};
@@ -112,8 +112,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     let asked = args.acceleration.map(AccelerationNoise::Discrete);
     let asked = asked.or(args.acceleration_density.map(AccelerationNoise::Continuous));
-    let TableMotion { acceleration, density_per_height2_per_s3, forgetting, .. } =
-        TableMotion::of(asked, &args.tracks, own)?;
+    let maker = if asked.is_none() { table_motion::maker(&args.tracks, own)? } else { None };
+    let (acceleration, forgetting) = table_motion::of(asked, maker.as_ref(), 0.0);
+    let density_per_height2_per_s3 = maker.map_or(0.0, |(t, _)| t.acceleration_density_per_height2_per_s3);
     let method = match (args.lag, args.method) {
         (Some(lag), _) => SmoothMethod::FixedLag(lag),
         (None, Method::Rts) => SmoothMethod::Rts,

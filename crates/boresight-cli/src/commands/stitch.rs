@@ -1,10 +1,10 @@
 //! `boresight stitch`: fragments of one target become one track; gaps filled and all smoothed if asked for.
 
-use super::table_motion::TableMotion;
+use super::table_motion;
 use crate::console::say;
 use boresight::io::{MotWriter, TableOptions, TracksCsv, read_tracks, refuse_to_overwrite};
 use boresight::track::{AccelerationNoise, StitchConfig, join, with_empty_frames};
-use boresight::{Scan, Sink, View};
+use boresight::{Scan, Sink, TrackFrame, View};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -61,14 +61,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let asked = args.acceleration.map(AccelerationNoise::Discrete);
     let asked = asked.or(args.acceleration_density.map(AccelerationNoise::Continuous));
-    let motion = TableMotion::of(asked, &args.tracks, table.has_states)?;
-    let usual_speed = motion.tracker.as_ref().map(|t| t.max_speed_px_per_s);
+    let is_said = asked.is_some() && args.max_speed.is_some();
+    let maker = if is_said { None } else { table_motion::maker(&args.tracks, table.has_states)? };
+    let (acceleration, forgetting) = table_motion::of(asked, maker.as_ref(), middle_height_px(&table.frames));
+    let usual_speed = maker.map_or(StitchConfig::default().max_speed_px_per_s, |(t, _)| t.max_speed_px_per_s);
     let config = StitchConfig {
         max_gap_s: args.max_gap,
         max_overlap_s: args.max_overlap,
-        acceleration: motion.of_middle_height(&table.frames),
-        forgetting: motion.forgetting,
-        max_speed_px_per_s: args.max_speed.or(usual_speed).unwrap_or(StitchConfig::default().max_speed_px_per_s),
+        acceleration,
+        forgetting,
+        max_speed_px_per_s: args.max_speed.unwrap_or(usual_speed),
         gate_probability: args.gate_probability,
     };
     config.validate("stitch")?;
@@ -99,4 +101,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         args.output.display()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// The middle height of the boxes of a table, px: fragments move alike.
+fn middle_height_px(frames: &[TrackFrame]) -> f64 {
+    let mut heights: Vec<f64> = frames.iter().flat_map(|f| &f.tracks).map(|t| t.extent.height_px).collect();
+    heights.retain(|h| h.is_finite());
+    heights.sort_by(f64::total_cmp);
+    heights.get(heights.len() / 2).copied().unwrap_or(0.0)
 }

@@ -1,67 +1,45 @@
 //! How the tracks of a table move, for `smooth` and `stitch`: as said on the command line, else as in the configuration beside the table, which it was made with.
 
 use crate::console::say;
+use boresight::Config;
 use boresight::track::{AccelerationNoise, ModelConfig, OrnsteinUhlenbeckConfig, TrackerConfig};
-use boresight::{Config, TrackFrame};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// A white acceleration, with a part in squared box heights, or velocities that are forgotten.
-pub struct TableMotion {
-    pub acceleration: AccelerationNoise,
-    pub density_per_height2_per_s3: f64,
-    pub forgetting: Option<OrnsteinUhlenbeckConfig>,
-    /// The tracker's configuration, if that said it.
-    pub tracker: Option<TrackerConfig>,
+/// The tracker that made a table, and where its configuration stands.
+pub type Maker = (TrackerConfig, PathBuf);
+
+/// The tracker that made a table of its `own` making, by the configuration beside it.
+pub fn maker(table: &Path, own: bool) -> anyhow::Result<Option<Maker>> {
+    let beside = table.with_file_name("config.toml");
+    if !own || !beside.is_file() {
+        return Ok(None);
+    }
+    Ok(Some((Config::from_file(&beside)?.tracker, beside)))
 }
 
-impl TableMotion {
-    /// Takes what was `asked` for, else what stands beside a table that is the tracker's `own`, and says which.
-    pub fn of(asked: Option<AccelerationNoise>, table: &Path, own: bool) -> anyhow::Result<Self> {
-        let plain =
-            |acceleration| Self { acceleration, density_per_height2_per_s3: 0.0, forgetting: None, tracker: None };
-        if let Some(acceleration) = asked {
-            return Ok(plain(acceleration));
-        }
-        let beside = table.with_file_name("config.toml");
-        if !own || !beside.is_file() {
+/// The white acceleration of boxes of that height, px, or velocities that are forgotten: as `asked`, else as the table was made; says which where nothing was asked.
+pub fn of(
+    asked: Option<AccelerationNoise>,
+    maker: Option<&Maker>,
+    height_px: f64,
+) -> (AccelerationNoise, Option<OrnsteinUhlenbeckConfig>) {
+    let (tracker, beside) = match (asked, maker) {
+        (Some(acceleration), _) => return (acceleration, None),
+        (None, None) => {
             let usual = AccelerationNoise::default();
             say!("{usual}, the tracker's default (--acceleration-density)");
-            return Ok(plain(usual));
+            return (usual, None);
         }
-        let tracker = Config::from_file(&beside)?.tracker;
-        let acceleration = tracker.acceleration_noise(0.0);
-        let forgetting = match &tracker.filter.model {
-            ModelConfig::OrnsteinUhlenbeck(c) if tracker.filter.form.takes_a_model() => Some(c.clone()),
-            _ => None,
-        };
-        match &forgetting {
-            Some(c) => say!(
-                "velocities of {} px/s forgotten in {} s, from {}",
-                c.speed_std_px_per_s,
-                c.memory_s,
-                beside.display()
-            ),
-            None => say!("{acceleration}, from {}", beside.display()),
-        }
-        if forgetting.is_none() && !tracker.filter.is_constant_velocity() {
-            say!(
-                "note: these tracks are of another model than constant velocity; their covariances become approximate"
-            );
-        }
-        Ok(Self {
-            acceleration,
-            density_per_height2_per_s3: tracker.acceleration_density_per_height2_per_s3,
-            forgetting,
-            tracker: Some(tracker),
-        })
+        (None, Some((tracker, beside))) => (tracker, beside.display()),
+    };
+    let acceleration = tracker.acceleration_noise(height_px);
+    if let ModelConfig::OrnsteinUhlenbeck(c) = &tracker.filter.model {
+        say!("velocities of {} px/s forgotten in {} s, from {beside}", c.speed_std_px_per_s, c.memory_s);
+        return (acceleration, Some(c.clone()));
     }
-
-    /// The acceleration of boxes of the middle height in the table.
-    pub fn of_middle_height(&self, frames: &[TrackFrame]) -> AccelerationNoise {
-        let mut heights: Vec<f64> = frames.iter().flat_map(|f| &f.tracks).map(|t| t.extent.height_px).collect();
-        heights.retain(|h| h.is_finite());
-        heights.sort_by(f64::total_cmp);
-        let height = heights.get(heights.len() / 2).copied().unwrap_or(0.0);
-        self.tracker.as_ref().map_or(self.acceleration, |t| t.acceleration_noise(height))
+    say!("{acceleration}, from {beside}");
+    if !tracker.filter.is_constant_velocity() {
+        say!("note: these tracks are of another model than constant velocity; their covariances become approximate");
     }
+    (acceleration, None)
 }

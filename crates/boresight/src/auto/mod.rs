@@ -37,6 +37,7 @@ mod particles;
 mod pieces;
 #[cfg(feature = "report")]
 mod preview;
+mod quantile;
 mod radar;
 mod request;
 mod scene;

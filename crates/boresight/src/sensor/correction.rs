@@ -25,7 +25,7 @@ pub struct Calibration {
 pub struct Correction {
     width: usize,
     height: usize,
-    /// Taken off each pixel, counts.
+    /// Taken off each pixel, counts; empty like the next where only bad pixels are mended.
     off: Vec<f32>,
     /// Multiplied to each pixel.
     times: Vec<f32>,
@@ -90,6 +90,9 @@ impl Correction {
             && off.iter().all(|o| *o == 0.0)
             && times.iter().all(|t| *t == 1.0)
             && bad.iter().all(|(_, from)| !from.is_empty());
+        if only_bad {
+            (off, times) = (Vec::new(), Vec::new());
+        }
         Ok(Self { width: w, height: h, off, times, bad, level, only_bad, scratch: Vec::new() })
     }
 
@@ -224,7 +227,7 @@ mod tests {
         let config = SensorConfig { bad_pixels: Some(true), ..Default::default() };
         let mut alone = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
         assert!(alone.only_bad);
-        let mut whole = Correction { only_bad: false, ..alone.clone() };
+        let mut whole = Correction { only_bad: false, off: vec![0.0; 48], times: vec![1.0; 48], ..alone.clone() };
         let value = |x: usize, y: usize| 30 + (7 * x + 13 * y + x * y) % 50;
         let image = column(8, 6, |x, y| value(x, y) as f32);
         let bytes = Image::from_vec(8, 6, image.as_slice().iter().map(|v| *v as u8).collect()).unwrap();

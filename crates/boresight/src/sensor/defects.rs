@@ -61,16 +61,22 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
         for x in 0..w {
             let offset = |x: usize| columns.get(x).copied().unwrap_or(0.0);
             let level = neighbours(&mean, x, y, |x, v| v - offset(x));
-            let noise = neighbours(&variance, x, y, |_, v| v);
             let (own, own_noise) = (mean.row(y)[x] - offset(x), variance.row(y)[x]);
-            // One frame has no variance. Of light that comes rarely the middle neighbour may have seen none.
-            let sd = (noise.middle.max(own_noise) / n as f32).sqrt();
             let off = (own - level.middle).abs();
             let spread = (level.high - level.low).max(ROUNDED * step);
-            let is_off = off > SPREADS * spread && off > DEVIATIONS * sd && n > 1;
-            let tells = n >= FRAMES && neighbours(&changes, x, y, |_, v| v).low > RESTLESS;
-            let is_still = tells && changes.row(y)[x] == 0.0;
-            let is_noisy = tells && own_noise > NOISY * noise.high && frames.spread_of_changes(y * w + x) > OFTEN;
+            // One frame has no variance. Of light that comes rarely the middle neighbour may have seen none.
+            let sd = || (neighbours(&variance, x, y, |_, v| v).middle.max(own_noise) / n as f32).sqrt();
+            let is_off = n > 1 && off > SPREADS * spread && off > DEVIATIONS * sd();
+            let tells = || n >= FRAMES && neighbours(&changes, x, y, |_, v| v).low > RESTLESS;
+            let is_still = changes.row(y)[x] == 0.0 && tells();
+            // Of two neighbours one at least is no noisier than all but one of them.
+            let beside =
+                [variance.row(y)[if x == 0 { 1 } else { x - 1 }], variance.row(if y == 0 { 1 } else { y - 1 })[x]];
+            let may_be_noisy = own_noise > NOISY * beside[0].min(beside[1]);
+            let is_noisy = may_be_noisy
+                && own_noise > NOISY * neighbours(&variance, x, y, |_, v| v).high
+                && frames.spread_of_changes(y * w + x) > OFTEN
+                && tells();
             if is_off || is_still || is_noisy || !own.is_finite() {
                 pixels.push([x as u32, y as u32]);
             }

@@ -34,10 +34,9 @@ pub(crate) fn if_defective(
     asked: &SensorConfig,
 ) -> Result<(Box<dyn FrameSource>, Found)> {
     let info = source.info().clone();
-    // Video in the usual sense is coded in blocks, which smear a single pixel, and looking costs as much as decoding.
-    let is_coded = ["H.264", "ffmpeg"].iter().any(|coded| info.reader.starts_with(coded));
     let is_short = ahead < LEARN || info.n_frames.is_some_and(|n| n < LEARN as u64);
-    if is_coded || is_short || info.kind == PixelKind::Rgb8 || asked.is_active() {
+    let all_said = asked.bad_pixels.is_some() && asked.column_noise.is_some();
+    if all_said || source.is_coded() || is_short || info.kind == PixelKind::Rgb8 || asked.is_active() {
         return Ok((source, Found::default()));
     }
     let looked_at = LookedAt::of(source);
@@ -147,6 +146,10 @@ impl FrameSource for MendedSource {
         &self.info
     }
 
+    fn is_coded(&self) -> bool {
+        self.inner.is_coded()
+    }
+
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         let frame = match self.ahead.pop_front() {
             Some(frame) => Some(frame),
@@ -195,6 +198,7 @@ mod tests {
     /// Frames of noise in which pixels are changed.
     struct Noise {
         info: SourceInfo,
+        coded: bool,
         rng: ChaCha8Rng,
         given: u64,
         change: fn(u64, &mut Image<u16>),
@@ -203,6 +207,10 @@ mod tests {
     impl FrameSource for Noise {
         fn info(&self) -> &SourceInfo {
             &self.info
+        }
+
+        fn is_coded(&self) -> bool {
+            self.coded
         }
 
         fn next_frame(&mut self) -> Result<Option<Frame>> {
@@ -217,10 +225,10 @@ mod tests {
         }
     }
 
-    fn noise(reader: &str, change: fn(u64, &mut Image<u16>)) -> Box<dyn FrameSource> {
+    fn noise(coded: bool, change: fn(u64, &mut Image<u16>)) -> Box<dyn FrameSource> {
         let info = SourceInfo {
             label: String::new(),
-            reader: reader.to_string(),
+            reader: String::new(),
             width: SIZE,
             height: SIZE,
             kind: PixelKind::Gray16,
@@ -228,7 +236,7 @@ mod tests {
             rate_hz: None,
             true_times: true,
         };
-        Box::new(Noise { info, rng: ChaCha8Rng::seed_from_u64(6), given: 0, change })
+        Box::new(Noise { info, coded, rng: ChaCha8Rng::seed_from_u64(6), given: 0, change })
     }
 
     /// How many are found, and all frames as they are handed out.
@@ -247,20 +255,20 @@ mod tests {
             image.row_mut(7)[5] = 4000;
             image.row_mut(30)[21] = 0;
         };
-        let (n, frames) = mended(noise("TIFF pages", hot_and_dead));
+        let (n, frames) = mended(noise(false, hot_and_dead));
         assert_eq!((n, frames.len()), (2, 40));
         for pixels in &frames {
             let Pixels::Gray16(image) = pixels else { panic!() };
             assert!(image.as_slice().iter().all(|v| (900..1100).contains(v)), "all are as noise is");
         }
         let plain = |_: u64, _: &mut Image<u16>| {};
-        let (n, frames) = mended(noise("TIFF pages", plain));
-        let mut source = noise("TIFF pages", plain);
+        let (n, frames) = mended(noise(false, plain));
+        let mut source = noise(false, plain);
         assert_eq!((n, frames.len()), (0, 40));
         for pixels in frames {
             assert_eq!(pixels, source.next_frame().unwrap().unwrap().pixels);
         }
-        assert_eq!(mended(noise("H.264 in process", hot_and_dead)).0, 0, "coded video is not looked at");
+        assert_eq!(mended(noise(true, hot_and_dead)).0, 0, "coded video is not looked at");
     }
 
     #[test]
@@ -268,8 +276,8 @@ mod tests {
         // By three pixels a frame it is once on each; by one in twelve frames it stays a while.
         let fast = |k: u64, image: &mut Image<u16>| image.row_mut(11)[(3 * k as usize + 2) % SIZE] = 3000;
         let slow = |k: u64, image: &mut Image<u16>| image.row_mut(11)[2 + k as usize / 12] = 3000;
-        assert_eq!(mended(noise("TIFF pages", fast)).0, 0);
-        assert_eq!(mended(noise("TIFF pages", slow)).0, 0);
+        assert_eq!(mended(noise(false, fast)).0, 0);
+        assert_eq!(mended(noise(false, slow)).0, 0);
     }
 
     #[test]
@@ -287,12 +295,12 @@ mod tests {
                 }
             }
         }
-        let looked = |change| if_defective(noise("TIFF pages", change), LEARN, &SensorConfig::default()).unwrap().1;
+        let looked = |change| if_defective(noise(false, change), LEARN, &SensorConfig::default()).unwrap().1;
         let rms = looked(frames::<2>).column_rms;
         assert!((rms / (COLUMN / 3f64.sqrt()) - 1.0).abs() < 0.25, "{rms}: even within 10 counts");
         assert_eq!(looked(frames::<0>), Found::default(), "they may be the scene's");
         let left = SensorConfig { column_noise: Some(false), ..SensorConfig::default() };
-        let found = if_defective(noise("TIFF pages", frames::<2>), LEARN, &left).unwrap().1;
+        let found = if_defective(noise(false, frames::<2>), LEARN, &left).unwrap().1;
         assert_eq!(found, Found::default(), "said to be left");
     }
 }

@@ -16,7 +16,7 @@ use crate::validate::{check, not_negative};
 use crate::{Error, ErrorKind, Result, Timestamp};
 use boresight_filters::smooth::{Filtered, rts, rts_square_root, rts_step};
 use boresight_filters::{Gaussian, GaussianFilter, Measurement, Start, Ud};
-use motion::TableMotion;
+use motion::RowModel;
 use nalgebra::{Matrix2, Vector2};
 
 /// How tracks are smoothed.
@@ -81,8 +81,8 @@ impl SmoothConfig {
         Self { acceleration, density_per_height2_per_s3: 0.0, ..self.clone() }
     }
 
-    fn model(&self) -> Result<TableMotion> {
-        TableMotion::of(self.acceleration, self.forgetting.as_ref())
+    fn model(&self) -> Result<RowModel> {
+        RowModel::of(self.acceleration, self.forgetting.as_ref())
     }
 }
 

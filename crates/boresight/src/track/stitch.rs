@@ -8,7 +8,7 @@
 //! smoother fills gaps.
 
 use super::filter::{AccelerationNoise, OrnsteinUhlenbeckConfig};
-use super::smooth::motion::TableMotion;
+use super::smooth::motion::RowModel;
 use crate::associate::{Assignment, AssociatorConfig, Gates, Pair, Prior, UniformGrid};
 use crate::validate::{not_negative, positive, probability};
 use crate::{Result, Timestamp, TrackId};
@@ -148,7 +148,7 @@ fn finite(v: f64) -> f64 {
 /// d² and ln det S of the end of `a`, moved over the gap, against the start of `b`.
 fn misfit(a: &Fragment, b: &Fragment, gap_s: f64, config: &StitchConfig) -> Option<(f64, f64)> {
     // Backwards in time the noise grows as forwards.
-    let model = TableMotion::of(config.acceleration, config.forgetting.as_ref()).ok()?;
+    let model = RowModel::of(config.acceleration, config.forgetting.as_ref()).ok()?;
     let (phi, noise) = (model.transition(gap_s, &a.last.mean), model.process_noise(gap_s.abs()));
     let s = phi * a.last.cov * phi.transpose() + noise + b.first.cov;
     let difference: Vector4<f64> = b.first.mean - phi * a.last.mean;

@@ -2,16 +2,14 @@
 //!
 //! Source: our own. A target comes and goes over the border of the field, or by way of something that hides it; what flares up and vanishes (glitter, waves, noise that a codec repeats, what goes out of
 //! focus) does so anywhere, and of a target that is lost again and again there is a track for each time. Of a field whose rim is a twentieth of its shorter side 81 % and more are middle.
-//! Limits: a track of the first or last [`AT_THE_ENDS`] frames may have come or gone outside the run and is not counted; doors and trees are the middle of the field too.
+//! Limits: a track of the first [`CONFIRMING`] frames may have come before the run, and one that is there at its end goes after it: they are not counted; doors and trees are the middle of the field too.
 
 use crate::TrackState;
 
 /// Share of the shorter side that is the rim.
 const RIM: f64 = 0.05;
-/// A target is seen first, or last, so long after or before it crosses the border, s.
-const CONFIRMED_S: f64 = 0.5;
-/// Frames at the beginning in which tracks are those of targets that were there before, most of the time that confirmation takes.
-const AT_THE_ENDS: u64 = 10;
+/// Frames that a target takes to be a track, and to be missed: so long before or after it is seen it may have crossed the border, and so long a run takes to find those that were there before.
+const CONFIRMING: u64 = 10;
 /// Fewer tracks that came and went say nothing.
 const LEAST: u64 = 10;
 
@@ -25,11 +23,11 @@ pub(super) struct Passage {
 }
 
 impl Passage {
-    /// Takes the next row of the track, in a field of that size, px.
-    pub fn note(&mut self, frame: u64, track: &TrackState, [width, height]: [f64; 2]) {
+    /// Takes the next row of the track, in a field of that size, px; frames come at that interval, s.
+    pub fn note(&mut self, frame: u64, track: &TrackState, [width, height]: [f64; 2], interval_s: f64) {
         let [x, vx, y, vy] = [0, 1, 2, 3].map(|i| track.kinematics.mean[i]);
         let half = 0.5 * track.extent.width_px.max(track.extent.height_px);
-        let rim = RIM * width.min(height) + CONFIRMED_S * vx.hypot(vy) + half;
+        let rim = RIM * width.min(height) + CONFIRMING as f64 * interval_s * vx.hypot(vy) + half;
         self.is_within = x.min(y).min(width - x).min(height - y) > rim;
         self.began.get_or_insert((frame, self.is_within));
     }
@@ -45,7 +43,7 @@ pub(super) struct Within {
 impl Within {
     /// Counts a track that has ended before the run did.
     pub fn end(&mut self, passage: &Passage) {
-        if let Some((_, began_within)) = passage.began.filter(|(frame, _)| *frame > AT_THE_ENDS) {
+        if let Some((_, began_within)) = passage.began.filter(|(frame, _)| *frame > CONFIRMING) {
             self.all += 1;
             self.within += u64::from(began_within && passage.is_within);
         }

@@ -4,6 +4,7 @@
 //! A link joins two detections of neighbouring scans whose boxes overlap most of all, seen from both. False detections come and go; those
 //! of a target are linked on both sides. Limits: targets that move by more than half their box from scan to scan are not linked.
 
+use crate::auto::quantile::quantile;
 use crate::track::association_cost::iou;
 use crate::{Detection, Scan};
 
@@ -151,11 +152,6 @@ impl<'a> Links<'a> {
 /// Deviation of numbers of mean 0 of which one in twenty may be anything: their 95 % point over a normal one's.
 fn deviation(magnitudes: &mut [f64]) -> f64 {
     quantile(magnitudes, 0.95) / 1.96
-}
-
-fn quantile(v: &mut [f64], q: f64) -> f64 {
-    let at = ((v.len() as f64 * q) as usize).min(v.len().saturating_sub(1));
-    if v.is_empty() { 0.0 } else { *v.select_nth_unstable_by(at, f64::total_cmp).1 }
 }
 
 #[cfg(test)]

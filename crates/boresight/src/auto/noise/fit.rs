@@ -45,13 +45,13 @@ pub struct Noise {
 /// Probability that an innovation is another thing's.
 const STRANGE: f64 = 0.01;
 /// One deviation of the prior is this factor, around what was assumed before.
-pub(super) const PRIOR_FACTOR: f64 = 10.0;
+const PRIOR_FACTOR: f64 = 10.0;
 /// First and last step of the search, in logarithms.
-pub(super) const STEPS: [f64; 2] = [2.0, 0.05];
+const STEPS: [f64; 2] = [2.0, 0.05];
 /// The same where factors are followed that were known a moment ago.
 const FACTOR_STEPS: [f64; 2] = [0.4, 0.02];
 /// One deviation of the prior of the factor on stated variances: they are known better than the rest.
-pub(super) const SCALE_PRIOR_FACTOR: f64 = 2.0;
+const SCALE_PRIOR_FACTOR: f64 = 2.0;
 /// Least value of any of the five numbers: nothing beside a pixel and a second of video.
 pub const LEAST: f64 = 1e-6;
 /// Innovations that every series gives before they count: its velocity is not known at first.
@@ -59,16 +59,26 @@ const SETTLING: usize = 2;
 
 /// Finds the noise, from what was assumed before and the deviation of the targets' speeds (px/s) in a field of `area_px2`; densities are `least_density` at least.
 pub fn fit(series: &[Vec<Step>], before: Noise, least_density: f64, speed_std: f64, area_px2: f64) -> Noise {
-    let least = [LEAST, LEAST, LEAST, least_density, least_density].map(f64::ln);
+    let least = [LEAST, LEAST, LEAST, least_density, least_density];
     let start = [before.scale, before.extra_px, before.extra_per_height, before.density, before.density_per_height2];
-    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().max(least[i]));
+    let likelihood = |x| log_likelihood(series, &noise_of(x), Motion::Accelerated(speed_std), area_px2);
+    noise_of(most_probable(start, [least, [f64::INFINITY; 5]], likelihood))
+}
+
+/// The five numbers that make the logarithm of a likelihood and of the prior around `start` largest, between the lowest and the highest of each; the first is a factor on stated variances.
+pub(super) fn most_probable(
+    start: [f64; 5],
+    edges: [[f64; 5]; 2],
+    log_likelihood: impl Fn([f64; 5]) -> f64,
+) -> [f64; 5] {
+    let edges = edges.map(|edge| edge.map(f64::ln));
+    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().clamp(edges[0][i], edges[1][i]));
     let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
     let cost = |x: &[f64; 5]| {
         let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
-        let noise = noise_of(x);
-        0.5 * prior - log_likelihood(series, &noise, Motion::Accelerated(speed_std), area_px2)
+        0.5 * prior - log_likelihood(x.map(f64::exp))
     };
-    noise_of(&search(start, STEPS, [least, [f64::INFINITY; 5]], cost))
+    search(start, STEPS, edges, cost).map(f64::exp)
 }
 
 /// The factors on R and on q, both within `1 / most ..= most`, that make the innovations most probable; begun at `from`. One deviation of the prior, around
@@ -114,7 +124,7 @@ pub enum Motion {
 }
 
 /// Least cost by a compass search from `at`, with the first and the last step and the lowest and highest values of each number.
-pub(super) fn search<const N: usize>(
+fn search<const N: usize>(
     mut at: [f64; N],
     steps: [f64; 2],
     [low, high]: [[f64; N]; 2],
@@ -142,8 +152,7 @@ pub(super) fn search<const N: usize>(
     at
 }
 
-fn noise_of(x: &[f64; 5]) -> Noise {
-    let [scale, extra_px, extra_per_height, density, density_per_height2] = x.map(f64::exp);
+fn noise_of([scale, extra_px, extra_per_height, density, density_per_height2]: [f64; 5]) -> Noise {
     Noise { scale, extra_px, extra_per_height, density, density_per_height2 }
 }
 

@@ -11,6 +11,7 @@ mod persistence;
 
 use super::digits::round;
 use super::first_scans::{PROBE_FRAMES, Shares, first};
+use super::quantile::{WITHIN_ONE, quantile};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
@@ -18,7 +19,6 @@ use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use forgotten::Persistence;
-use persistence::Which;
 use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
@@ -95,7 +95,8 @@ pub fn learn(
     let every = n_steps.div_ceil(MOST_STEPS);
     let tempo = Tempo::of_scans(scans);
     let least_density = tempo.density(fit::LEAST);
-    let size_std = deviation(&mut size_wander(&tracks, tempo.stretched(MERGED_S)));
+    // The deviation by the point of the magnitudes: the tails, where a target came apart, do not count.
+    let size_std = quantile(&mut size_wander(&tracks, tempo.stretched(MERGED_S)), WITHIN_ONE);
     let series: Vec<Vec<Step>> = tracks.into_values().step_by(every).map(|t| t.steps).collect();
     let t = &mut config.tracker;
     let before = assumed(&TrackerParameters::of(t));
@@ -185,25 +186,27 @@ fn forgetful(
     assume: persistence::Assumed,
     config: &TrackerConfig,
 ) -> Result<Option<(Noise, Persistence)>> {
-    let Some(mut found) = persistence::better(series, assume, Which::Simplest) else { return Ok(None) };
+    let Some(mut found) = persistence::better(series, assume).next() else { return Ok(None) };
     let mut config = config.clone();
     // Steps are looked at, not whose they are after a gap, and those of some scans say enough where targets are many.
     config.reidentification.max_gap_s = 0.0;
     let mut n = 0;
     let enough = scans.iter().take_while(|s| (n < MOST_STEPS, n += s.detections.len()).0).count();
     let scans = &scans[..enough.max(PROBE_FRAMES).min(scans.len())];
-    for round in 1.. {
+    let mut round = 1;
+    loop {
         put(&found.0, assume.least_density, &mut config);
         config.filter.model = found.1.model();
         let again: Vec<Vec<Step>> = follow(scans, &config)?.into_values().map(|t| t.steps).collect();
-        let Some(next) = persistence::better(&again, assume, Which::Simplest) else { break };
-        let settled = next.1.is_nearly(&found.1);
-        found = next;
-        if settled || round == MOST_ROUNDS {
-            return Ok(persistence::better(&again, assume, Which::Best).or(Some(found)));
+        let mut ever_better = persistence::better(&again, assume);
+        // What is followed without loss and goes its way was lost before.
+        let Some(next) = ever_better.next() else { return Ok(None) };
+        if round == MOST_ROUNDS || next.1.is_nearly(&found.1) {
+            return Ok(Some(ever_better.last().unwrap_or(next)));
         }
+        found = next;
+        round += 1;
     }
-    Ok(Some(found))
 }
 
 /// Writes noise and motion into the tracker's configuration.
@@ -248,15 +251,6 @@ fn size_wander(tracks: &BTreeMap<u64, Followed>, merged_s: f64) -> Vec<f64> {
         }
     }
     out
-}
-
-/// Standard deviation by the 68.3 % point of magnitudes: the tails, where a target came apart, do not count.
-fn deviation(magnitudes: &mut [f64]) -> f64 {
-    if magnitudes.is_empty() {
-        return 0.0;
-    }
-    let at = (0.683 * magnitudes.len() as f64) as usize;
-    *magnitudes.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@
 //! Symbols: σ deviation of the velocity per axis (px/s), τ its memory (s); the law is [`super::forgotten`].
 //! Limits: one law for all targets; where some diffuse and others go somewhere, the one that explains more of the steps.
 
-use super::fit::{self, Motion, Noise, PRIOR_FACTOR, SCALE_PRIOR_FACTOR, STEPS, Step, log_likelihood, search};
+use super::super::quantile::{WITHIN_ONE, quantile};
+use super::fit::{self, LEAST, Motion, Noise, Step, log_likelihood, most_probable};
 use super::forgotten::Persistence;
 
 /// Logarithm of the factor by which the innovations must be more probable: very strong evidence, 150 to 1 (R. E. Kass, A. E. Raftery, *J. Am. Stat. Assoc.* 90, 1995, 3.2).
@@ -33,37 +34,24 @@ pub struct Assumed {
     pub area_px2: f64,
 }
 
-/// Which of the motions that explain more than constant velocity does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Which {
-    /// The first of them that does.
-    Simplest,
-    /// One that explains much more than those before.
-    Best,
-}
-
-/// What explains the series better than constant velocity does: the first such noise and motion, as simple as may be, or the one that explains most.
-pub fn better(series: &[Vec<Step>], assumed: Assumed, which: Which) -> Option<(Noise, Persistence)> {
+/// What explains the series better than constant velocity does, the simplest first and each much better than the one before: noise and motion, looked for as they are asked for.
+pub fn better(series: &[Vec<Step>], assumed: Assumed) -> impl Iterator<Item = (Noise, Persistence)> + use<> {
     let Assumed { noise: before, least_density, speed_std, area_px2 } = assumed;
     let some = lasting(series);
-    let usual = Usual::of(&some)?;
-    let within = |noise: &Noise, motion| log_likelihood(&some, noise, motion, area_px2);
-    let driven = fit::fit(&some, before, least_density, speed_std, area_px2);
-    let mut most = within(&driven, Motion::Accelerated(speed_std));
-    let mut found = None;
-    for [memory, longest] in BEGINNINGS {
-        let (noise, motion) = fit_memory(&some, &before, usual.moving(memory), &usual, longest, area_px2);
-        let gain = within(&noise, Motion::Persistent(motion));
-        // Another one has to say much more than a simpler one.
-        if gain >= most + LEAST_GAIN && motion.memory_s <= COURSE * usual.interval_s {
-            most = gain;
-            found = Some((noise, motion));
-            if which == Which::Simplest {
-                break;
-            }
-        }
-    }
-    found
+    let ever_better = Usual::of(&some).map(|usual| {
+        let driven = fit::fit(&some, before, least_density, speed_std, area_px2);
+        let mut most = log_likelihood(&some, &driven, Motion::Accelerated(speed_std), area_px2);
+        BEGINNINGS.into_iter().filter_map(move |[memory, longest]| {
+            let (noise, motion) = fit_memory(&some, &before, usual.moving(memory), &usual, longest, area_px2);
+            let gain = log_likelihood(&some, &noise, Motion::Persistent(motion), area_px2);
+            let is_better = gain >= most + LEAST_GAIN && motion.memory_s <= COURSE * usual.interval_s;
+            is_better.then(|| {
+                most = gain;
+                (noise, motion)
+            })
+        })
+    });
+    ever_better.into_iter().flatten()
 }
 
 /// The longest series that hold half of all steps, of many some: what false detections made does not last, and would be taken for noise.
@@ -77,7 +65,6 @@ fn lasting(series: &[Vec<Step>]) -> Vec<Vec<Step>> {
 }
 
 /// The usual interval of the series, s, and the deviation of the speed between two of its positions per axis, px/s.
-#[derive(Debug)]
 struct Usual {
     interval_s: f64,
     speed_std: f64,
@@ -87,9 +74,10 @@ impl Usual {
     fn of(series: &[Vec<Step>]) -> Option<Self> {
         let steps = || series.iter().flat_map(|t| t.windows(2)).filter(|pair| pair[1].dt_s > 0.0);
         let speed = |pair: &[Step], a: usize| (pair[1].position[a] - pair[0].position[a]).abs() / pair[1].dt_s;
-        let interval_s = at_share(0.5, steps().map(|pair| pair[1].dt_s).collect())?;
-        // The deviation by the 68.3 % point, as strangers do not count.
-        let speed_std = at_share(0.683, steps().flat_map(|pair| [speed(pair, 0), speed(pair, 1)]).collect())?;
+        let interval_s = quantile(&mut steps().map(|pair| pair[1].dt_s).collect::<Vec<_>>(), 0.5);
+        // The deviation by the point of the magnitudes, as strangers do not count.
+        let mut speeds: Vec<f64> = steps().flat_map(|pair| [speed(pair, 0), speed(pair, 1)]).collect();
+        let speed_std = quantile(&mut speeds, WITHIN_ONE);
         (speed_std > 0.0).then_some(Self { interval_s, speed_std })
     }
 
@@ -98,12 +86,6 @@ impl Usual {
         let forgets = f64::max(1.0, 0.5 / memory).sqrt();
         Persistence { speed_std_px_per_s: self.speed_std * forgets, memory_s: memory * self.interval_s }
     }
-}
-
-/// The value that this share is below.
-fn at_share(share: f64, mut values: Vec<f64>) -> Option<f64> {
-    let at = (share * values.len() as f64) as usize;
-    (at < values.len()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
 /// The most probable noise and motion with a memory of so many intervals at most; the prior of the noise is around what was assumed before, that of the motion around where it begins.
@@ -116,24 +98,18 @@ fn fit_memory(
     area_px2: f64,
 ) -> (Noise, Persistence) {
     let interval_s = usual.interval_s;
-    let parts = |x: &[f64; 5]| {
-        let [scale, extra_px, extra_per_height, diffusion, memory_s] = x.map(f64::exp);
+    let parts = |[scale, extra_px, extra_per_height, diffusion, memory_s]: [f64; 5]| {
         let speed_std_px_per_s = (diffusion / memory_s).sqrt();
         (Noise { scale, extra_px, extra_per_height, ..*before }, Persistence { speed_std_px_per_s, memory_s })
     };
-    let least = fit::LEAST;
-    let diffusion = began.diffusion_px2_per_s();
-    let start = [before.scale, before.extra_px, before.extra_per_height, diffusion, began.memory_s];
-    let low = [least, least, least, least * least / interval_s, SHORTEST * interval_s].map(f64::ln);
-    let high = [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY, (longest * interval_s).ln()];
-    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().clamp(low[i], high[i]));
-    let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
-    let cost = |x: &[f64; 5]| {
-        let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
+    let start = [before.scale, before.extra_px, before.extra_per_height, began.diffusion_px2_per_s(), began.memory_s];
+    let low = [LEAST, LEAST, LEAST, LEAST * LEAST / interval_s, SHORTEST * interval_s];
+    let high = [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY, longest * interval_s];
+    let likelihood = |x| {
         let (noise, motion) = parts(x);
-        0.5 * prior - log_likelihood(series, &noise, Motion::Persistent(motion), area_px2)
+        log_likelihood(series, &noise, Motion::Persistent(motion), area_px2)
     };
-    parts(&search(start, STEPS, [low, high], cost))
+    parts(most_probable(start, [low, high], likelihood))
 }
 
 #[cfg(test)]
@@ -165,8 +141,8 @@ mod tests {
     fn found(series: &[Vec<Step>]) -> Option<(Noise, Persistence)> {
         let noise =
             Noise { scale: 1.0, extra_px: 0.3, extra_per_height: 0.0, density: 100.0, density_per_height2: 0.0 };
-        let assumed = Assumed { noise, least_density: fit::LEAST, speed_std: 50.0, area_px2: 1e5 };
-        better(series, assumed, Which::Best)
+        let assumed = Assumed { noise, least_density: LEAST, speed_std: 50.0, area_px2: 1e5 };
+        better(series, assumed).last()
     }
 
     #[test]

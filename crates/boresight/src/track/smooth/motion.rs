@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// See the head of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::track) enum TableMotion {
+pub(in crate::track) enum RowModel {
     Driven(ConstantVelocity),
     Forgetful(OrnsteinUhlenbeck),
 }
@@ -21,13 +21,13 @@ pub(in crate::track) enum TableMotion {
 macro_rules! of {
     ($motion:expr, $m:ident => $call:expr) => {
         match $motion {
-            TableMotion::Driven($m) => $call,
-            TableMotion::Forgetful($m) => $call,
+            RowModel::Driven($m) => $call,
+            RowModel::Forgetful($m) => $call,
         }
     };
 }
 
-impl TableMotion {
+impl RowModel {
     /// Velocities that are forgotten if that is given, else driven by a white acceleration.
     /// # Errors
     /// A value out of its range.
@@ -39,7 +39,7 @@ impl TableMotion {
     }
 }
 
-impl Model<4> for TableMotion {
+impl Model<4> for RowModel {
     const POSITION: [usize; 2] = <ConstantVelocity as Model<4>>::POSITION;
     const VELOCITY: Option<[usize; 2]> = <ConstantVelocity as Model<4>>::VELOCITY;
     const AXES: bool = <ConstantVelocity as Model<4>>::AXES && <OrnsteinUhlenbeck as Model<4>>::AXES;

@@ -280,6 +280,10 @@ impl FrameSource for FfmpegSource {
         &self.info
     }
 
+    fn is_coded(&self) -> bool {
+        true
+    }
+
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.first.take() {
             return Ok(Some(frame));

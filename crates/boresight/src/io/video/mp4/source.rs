@@ -161,6 +161,10 @@ impl FrameSource for Mp4Source {
         &self.info
     }
 
+    fn is_coded(&self) -> bool {
+        true
+    }
+
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.first.take() {
             return Ok(Some(frame));
