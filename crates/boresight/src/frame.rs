@@ -155,6 +155,10 @@ pub trait FrameSource: Send {
     fn recycle(&mut self, frame: Frame) {
         drop(frame);
     }
+    /// Says that the caller is going to hold the first `n` frames, so that they may be read as fast as it goes.
+    fn will_hold(&mut self, n: usize) {
+        let _ = n;
+    }
     /// Says by their numbers which frames are wanted; the others may come without pixels (0 x 0), or not be decoded at all.
     fn want_only(&mut self, wanted: Wanted) {
         drop(wanted);

@@ -60,9 +60,14 @@ pub(super) fn polarity(
         Polarity::Both => return Ok(None),
     };
     let area_px2 = (info.width * info.height) as f64;
+    // What the run would not see is not looked for.
+    let mut detector = spots::detector(other, info);
+    if let ThresholdConfig::Isolated(of_other) = &mut detector.threshold {
+        of_other.min_score = isolated.min_score;
+    }
     for start in starts(frames.len().min(scans.len())) {
         let places: Vec<usize> = growing(PROBE_FRAMES).into_iter().map(|k| start + k).collect();
-        let found = looks::scans(&spots::detector(other, info), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+        let found = looks::scans(&detector, places.iter().map(|&k| &frames[k]), info, n_threads)?;
         let own: Vec<Scan> = places.iter().map(|&k| scans[k].clone()).collect();
         let side = |of_places: &[Scan]| {
             let all = on_their_way(scans, &places, of_places);

@@ -68,7 +68,7 @@ pub fn learn<E: From<Error>>(
         pass = learn_on(again, at_once, frames, &mut longer, request)?;
         *choice = longer;
     }
-    let later = later_looks::polarity(frames.ahead(), pass.scans(), &assumed.config, &info, request.n_threads())?;
+    let later = later_looks::polarity(frames.ahead(), pass.scans(), &choice.config, &info, request.n_threads())?;
     if let Some((polarity, reason)) = later {
         let mut wider = assumed;
         if let ThresholdConfig::Isolated(isolated) = &mut wider.config.detector.threshold {

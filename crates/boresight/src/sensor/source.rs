@@ -172,6 +172,10 @@ impl FrameSource for MendedSource {
         self.inner.entries()
     }
 
+    fn will_hold(&mut self, n: usize) {
+        self.inner.will_hold(n);
+    }
+
     fn want_only(&mut self, wanted: Wanted) {
         self.inner.want_only(wanted);
     }

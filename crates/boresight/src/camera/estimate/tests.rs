@@ -379,3 +379,30 @@ fn a_few_bright_things_before_an_even_ground_are_no_motion_of_the_camera() {
     }
     assert!(invented.len() <= 1, "{invented:?}");
 }
+
+#[cfg(feature = "video")]
+#[test]
+fn of_a_view_that_moved_few_patches_lie_where_they_lay() {
+    let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
+    let frame = crate::io::open(clip, &crate::io::OpenOptions::default()).unwrap().next_frame().unwrap().unwrap();
+    let (mut image, mut sums) = (Image::default(), Vec::new());
+    reduce(&frame.pixels, &mut image, &mut sums);
+    let (w, h) = (image.width() - 32, image.height() - 16);
+    let view = |left: usize, top: usize| {
+        let rows = (top..top + h).flat_map(|y| image.row(y)[left..left + w].iter().copied());
+        Image::from_vec(w, h, rows.collect()).unwrap()
+    };
+    let mut key = KeyFrame::default();
+    key.take(&mut view(0, 0));
+    let share = |left, top| {
+        let now = view(left, top);
+        let found = |p: &&crate::camera::key_frame::Patch| {
+            find_near(&key.image, &now, **p, p.middle(), &Similarity::identity()).is_some()
+        };
+        key.patches.iter().filter(found).count() as f64 / key.patches.len() as f64
+    };
+    assert!(share(0, 0) > AT_REST, "some reach the border");
+    for moved in [(2, 0), (0, 2), (3, 0), (0, 4), (7, 2), (5, 9), (12, 0), (15, 15), (31, 8)] {
+        assert!(share(moved.0, moved.1) < 0.75 * AT_REST, "{moved:?}: {}", share(moved.0, moved.1));
+    }
+}

@@ -1,5 +1,6 @@
 //! MP4 and QuickTime files read in process: the tables of times, and H.264 pictures in their order.
 
+mod ahead;
 mod boxes;
 mod decoders;
 mod fragments;

@@ -5,6 +5,7 @@
 //! Damage: a picture that cannot be decoded is lost, and so are those that depend on it, up to the next sync sample;
 //! frame numbers and times stay true, so that lost frames leave a gap, and a warning counts them.
 
+use super::ahead::Ahead;
 use super::decoders::Decoders;
 use super::movie::{Movie, read_movie};
 use super::picture::{Refusal, start_error};
@@ -15,11 +16,8 @@ use crate::io::options::OpenOptions;
 use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Pixels, Result, SourceInfo, Wanted};
 use std::fs::File;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, OnceLock};
-
-/// Frames decoded ahead of the caller.
-const AHEAD: usize = 4;
 
 /// The source.
 pub(in crate::io::video) struct Mp4Source {
@@ -27,6 +25,7 @@ pub(in crate::io::video) struct Mp4Source {
     warnings: Vec<String>,
     first: Option<Frame>,
     frames: Option<Receiver<Message>>,
+    ahead: Arc<Ahead>,
     spare: Sender<Pixels>,
     wanted: Arc<OnceLock<Wanted>>,
     /// Numbers of the frames at sync samples.
@@ -69,7 +68,8 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
     let n_frames = movie.steps.iter().filter(|s| s.shown).count() as u64;
     let rate_hz = rate(&movie);
     let entries = entries(&movie, &ranks);
-    let (frame_in, frame_out) = sync_channel(AHEAD);
+    let (frame_in, frame_out) = channel();
+    let ahead = Arc::<Ahead>::default();
     let (spare_in, spare_out) = channel();
     let units = Decoders::new(configurations, options.max_pixels);
     let wanted = Arc::<OnceLock<Wanted>>::default();
@@ -82,6 +82,7 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
         colour: options.colour,
         colours_beside: options.colours_beside.clone(),
         out: frame_in,
+        ahead: Arc::clone(&ahead),
         spare: spare_out,
         wanted: Arc::clone(&wanted),
         n_frames,
@@ -91,7 +92,10 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
         .spawn(move || worker.run())
         .map_err(|e| Error::new(ErrorKind::NotFound, "no thread for decoding can be started").because(e))?;
     let (first, reader) = match frame_out.recv() {
-        Ok(Message::Frame(frame, reader)) => (frame, reader),
+        Ok(Message::Frame(frame, reader)) => {
+            ahead.taken();
+            (frame, reader)
+        }
         Ok(Message::Refused(refusal @ Refusal::Unsupported(_))) => {
             return Ok(Opened::Other(start_error(refusal).at(path.display())));
         }
@@ -121,6 +125,7 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
         warnings,
         first: Some(first),
         frames: Some(frame_out),
+        ahead,
         spare: spare_in,
         wanted,
         entries,
@@ -156,6 +161,12 @@ fn rate(movie: &Movie) -> Option<f64> {
     Some((n - 1) as f64 * f64::from(movie.timescale) / span as f64)
 }
 
+impl Drop for Mp4Source {
+    fn drop(&mut self) {
+        self.ahead.end();
+    }
+}
+
 impl FrameSource for Mp4Source {
     fn info(&self) -> &SourceInfo {
         &self.info
@@ -172,6 +183,7 @@ impl FrameSource for Mp4Source {
         let Some(frames) = &self.frames else { return Ok(None) };
         match frames.recv() {
             Ok(Message::Frame(frame, _)) => {
+                self.ahead.taken();
                 let (w, h, kind) = (frame.pixels.width(), frame.pixels.height(), frame.pixels.kind());
                 let i = &self.info;
                 if (w, h, kind) != (i.width, i.height, i.kind) && (w, h) != (0, 0) {
@@ -213,6 +225,10 @@ impl FrameSource for Mp4Source {
         if matches!(frame.pixels.kind(), PixelKind::Rgb8 | PixelKind::Gray16) {
             let _ = self.spare.send(frame.pixels);
         }
+    }
+
+    fn will_hold(&mut self, n: usize) {
+        self.ahead.go_on_to(n as u64);
     }
 
     fn want_only(&mut self, wanted: Wanted) {

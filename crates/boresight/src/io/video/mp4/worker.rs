@@ -1,5 +1,6 @@
 //! The decoding thread of an MP4 file: samples in decoding order to frames in presentation order, and what was lost on the way.
 
+use super::ahead::Ahead;
 use super::decoders::Decoders;
 use super::movie::Movie;
 use super::picture::{Picture, Refusal};
@@ -12,7 +13,7 @@ use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{Frame, FrameIndex, Image, Pixels, Timestamp, Wanted};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, OnceLock};
 
 /// Largest accepted sample, bytes (an uncompressed picture of the largest size is below it).
@@ -37,7 +38,8 @@ pub(super) struct Worker {
     pub may_be_fast: bool,
     pub colour: Colour,
     pub colours_beside: Option<ColoursBeside>,
-    pub out: SyncSender<Message>,
+    pub out: Sender<Message>,
+    pub ahead: Arc<Ahead>,
     pub spare: Receiver<Pixels>,
     pub wanted: Arc<OnceLock<Wanted>>,
     pub n_frames: u64,
@@ -209,6 +211,7 @@ impl Worker {
             tally.next_rank = rank + 1;
             tally.sent += 1;
             let frame = Frame { index: FrameIndex(rank), time, pixels };
+            self.ahead.wait_for(rank).then_some(()).ok_or(Gone)?;
             self.out.send(Message::Frame(frame, self.units.reader())).map_err(|_| Gone)?;
         }
         Ok(())
