@@ -11,8 +11,6 @@ pub struct Replay {
     ended: bool,
     /// Most frames that are held.
     most: usize,
-    /// Frames of those read ahead that were handed out.
-    n_given: usize,
     rest: Box<dyn FrameSource>,
 }
 
@@ -21,8 +19,7 @@ opaque_debug!(Replay);
 impl Replay {
     /// Reads up to `n` frames ahead.
     pub fn new(source: Box<dyn FrameSource>, n: usize) -> Self {
-        let mut replay =
-            Self { ahead: VecDeque::with_capacity(n), failed: None, ended: false, most: n, n_given: 0, rest: source };
+        let mut replay = Self { ahead: VecDeque::with_capacity(n), failed: None, ended: false, most: n, rest: source };
         while replay.read_one() {}
         replay
     }
@@ -89,9 +86,6 @@ impl FrameSource for Replay {
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.ahead.pop_front() {
-            // Another one may take its place, so that decoding does not wait for a slower step behind it.
-            self.n_given += 1;
-            self.rest.will_hold(self.most + self.n_given);
             return Ok(Some(frame));
         }
         if let Some(e) = self.failed.take() {

@@ -41,7 +41,7 @@ pub(super) struct Contrast {
     pub(super) blocks: Vec<f32>,
     /// Strength |v| of three rows, one pixel of 0 before them and zeros up to a whole word of bits after.
     strong: [Vec<f32>; 3],
-    /// Contrast of the last two rows.
+    /// Contrast of the last two rows, up to a whole word of bits.
     signed: [Vec<f32>; 2],
     sums: Vec<f32>,
 }
@@ -63,7 +63,7 @@ impl Contrast {
             row.clear();
             row.resize(w.next_multiple_of(64) + 2, 0.0);
         }
-        self.signed.iter_mut().for_each(|row| row.resize(w, 0.0));
+        self.signed.iter_mut().for_each(|row| row.resize(w.next_multiple_of(64), 0.0));
         self.sums.clear();
         self.sums.resize(w, 0.0);
         let (mut quietest, mut in_block) = (f32::INFINITY, 0);
@@ -108,12 +108,8 @@ impl Contrast {
         let [above, here, below] = &self.strong;
         for i in 0..w.div_ceil(64) {
             let from = 64 * i;
-            let (all, strong) = word(simd, [above, here, below], from, least);
-            let mut bright = 0u64;
-            for (bit, v) in self.signed[y % 2][from..(from + 64).min(w)].iter().enumerate() {
-                bright |= u64::from(*v > 0.0) << bit;
-            }
-            // Beyond the width all is 0, and 0 is no extreme.
+            let (all, strong, bright) = word(simd, [above, here, below], &self.signed[y % 2], from, least);
+            // Beyond the width all strengths are 0, and 0 is no extreme.
             self.n_bright += (all & bright).count_ones() as usize;
             self.n_dark += (all & !bright).count_ones() as usize;
             let mut listed = all & strong;
@@ -126,12 +122,18 @@ impl Contrast {
     }
 }
 
-/// The extremes among 64 pixels, and which of them are at least `least` strong; rows have one pixel of margin.
+/// The extremes among 64 pixels, which of these are at least `least` strong, and which are bright; rows of strengths have one pixel of margin.
 #[inline(always)]
-fn word<S: Simd>(simd: S, [above, here, below]: [&[f32]; 3], from: usize, least: f32) -> (u64, u64) {
+fn word<S: Simd>(
+    simd: S,
+    [above, here, below]: [&[f32]; 3],
+    signed: &[f32],
+    from: usize,
+    least: f32,
+) -> (u64, u64, u64) {
     let n = S::f32s::LEN;
-    let least = S::f32s::splat(simd, least);
-    let (mut all, mut listed) = (0, 0);
+    let (least, zero) = (S::f32s::splat(simd, least), S::f32s::splat(simd, 0.0));
+    let (mut all, mut listed, mut bright) = (0, 0, 0);
     for k in (0..64).step_by(n) {
         let load = |row: &[f32], shift: usize| S::f32s::from_slice(simd, &row[from + k + shift..from + k + shift + n]);
         let c = load(here, 1);
@@ -141,8 +143,10 @@ fn word<S: Simd>(simd: S, [above, here, below]: [&[f32]; 3], from: usize, least:
         let extreme = c.simd_gt(before) & c.simd_ge(after);
         all |= extreme.to_bitmask() << k;
         listed |= c.simd_ge(least).to_bitmask() << k;
+        let v = S::f32s::from_slice(simd, &signed[from + k..from + k + n]);
+        bright |= v.simd_gt(zero).to_bitmask() << k;
     }
-    (all, listed)
+    (all, listed, bright)
 }
 
 #[inline(always)]

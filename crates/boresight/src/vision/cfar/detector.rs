@@ -166,11 +166,15 @@ impl CfarDetector {
             counts[0] += self.contrast.n_bright;
             counts[1] += self.contrast.n_dark;
             let edges = (level.width as u32 - 1, level.height as u32 - 1);
+            let mut of_row = (0, self.noise.row(0));
             for e in &self.contrast.extremes {
+                if e.y != of_row.0 {
+                    of_row = (e.y, self.noise.row(e.y));
+                }
                 // On the outermost pixels a mirrored pair is one pixel twice: its noise has twice the variance.
                 let column = if e.x == 0 || e.x == edges.0 { std::f32::consts::SQRT_2 } else { 1.0 };
                 let row = if e.y == 0 || e.y == edges.1 { std::f32::consts::SQRT_2 } else { 1.0 };
-                let z = (e.v.abs() / (self.noise.at(e.x, e.y) * column * row)).min(1e4);
+                let z = (e.v.abs() / (of_row.1.at(e.x) * column * row)).min(1e4);
                 let strength = strength(z);
                 let side = if e.v > 0.0 { Side::Bright } else { Side::Dark };
                 self.strengths[usize::from(side == Side::Dark)].push(strength);
@@ -194,8 +198,11 @@ impl CfarDetector {
         let least = nulls.map(|n| n.strength_of(rate));
         self.candidates.retain_mut(|c| {
             let side = usize::from(c.v < 0.0);
-            c.number = nulls[side].number(f64::from(c.strength));
-            f64::from(c.strength) >= least[side]
+            let is_rare = f64::from(c.strength) >= least[side];
+            if is_rare {
+                c.number = nulls[side].number(f64::from(c.strength));
+            }
+            is_rare
         });
     }
 

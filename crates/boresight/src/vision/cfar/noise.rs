@@ -54,17 +54,35 @@ impl NoiseMap {
         self.sd.iter_mut().for_each(|s| *s = (*s * *s + least2).sqrt());
     }
 
+    /// Where the deviation of the contrast is read in a row of the level's pixels.
+    pub(super) fn row(&self, y: u32) -> NoiseRow<'_> {
+        let (y0, y1, part) = between(y, self.ny);
+        let blocks = |y: usize| &self.sd[y * self.nx..][..self.nx];
+        NoiseRow { above: blocks(y0), below: blocks(y1), part }
+    }
+}
+
+/// The blocks above and below a row of pixels, and how far it is between their centres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NoiseRow<'a> {
+    above: &'a [f32],
+    below: &'a [f32],
+    part: f32,
+}
+
+impl NoiseRow<'_> {
     /// Deviation of the contrast at a pixel of the level, counts.
-    pub(super) fn at(&self, x: u32, y: u32) -> f32 {
-        let (x0, x1, fx) = between(x, self.nx);
-        let (y0, y1, fy) = between(y, self.ny);
-        let at = |x: usize, y: usize| self.sd[y * self.nx + x];
-        let row = |y: usize| at(x0, y) + fx * (at(x1, y) - at(x0, y));
-        row(y0) + fy * (row(y1) - row(y0))
+    #[inline]
+    pub(super) fn at(self, x: u32) -> f32 {
+        let (x0, x1, part) = between(x, self.above.len());
+        let along = |blocks: &[f32]| blocks[x0] + part * (blocks[x1] - blocks[x0]);
+        let above = along(self.above);
+        above + self.part * (along(self.below) - above)
     }
 }
 
 /// The blocks before and after a pixel, and how far it is between their centres.
+#[inline]
 fn between(p: u32, n: usize) -> (usize, usize, f32) {
     let b = ((p as f32 - 0.5 * (BLOCK as f32 - 1.0)) / BLOCK as f32).clamp(0.0, (n - 1) as f32);
     let i = b as usize;
@@ -87,6 +105,6 @@ mod tests {
         assert!((own - 5f32.sqrt()).abs() < 1e-5, "{own}");
         assert!(noise.sd[3 * 9 + 5] > 40.0);
         // Half way between two centres.
-        assert!((noise.at(0, 0) - 5f32.sqrt()).abs() < 1e-5);
+        assert!((noise.row(0).at(0) - 5f32.sqrt()).abs() < 1e-5);
     }
 }
