@@ -4,6 +4,7 @@
 //! Source: our own; the test is Poisson's. Over the frames looked at, the number of false alarms has at most the mean and the variance 3 × rate × frames.
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
+use super::chains::Chain;
 use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
@@ -110,6 +111,36 @@ pub fn look(
     Ok(more.then_some(seen))
 }
 
+/// Faint targets beside clear ones of the same polarity: all that the `isolated` chains show is found, a chain besides that would start no track as an isolated one, and what is left is no more than the false alarms asked for:
+/// nothing that the rate does not know of is there, no texture, wave or leaf.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn look_beside(
+    frames: &[Frame],
+    ground: &[Ground],
+    isolated: &Seen,
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<Option<Faint>> {
+    let (polarity, clear) = isolated.most();
+    let places = growing(frames.len());
+    let seen = look_at(frames, &places, ground, polarity, info, n_threads)?;
+    Ok(finds_others(&seen, clear, places.len()).then_some(seen))
+}
+
+/// Whether the faint ones hold all the `clear` chains, one that goes with none of those that would start a track, and little else, in so many frames.
+fn finds_others(faint: &Faint, clear: &Evidence, n_frames: usize) -> bool {
+    let expected = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * n_frames as f64;
+    let left = faint.per_frame * n_frames as f64 - faint.chains.n_hits() as f64;
+    let starts = |c: &Chain| c.hits.iter().any(|h| h.1.score >= spots::INITIATION_SCORE);
+    let mut followed = clear.clone();
+    followed.moving.retain(starts);
+    let is_held = |c: &Chain| faint.chains.moving.iter().any(|o| c.goes_with(o));
+    left <= expected + SURE_STDS * expected.sqrt()
+        && followed.moving.iter().all(is_held)
+        && faint.chains.gain_beside(&followed) > SURE_GAIN
+}
+
 /// Puts the detector for faint targets in the place of that for isolated ones; scores are now -log10 of a number of false alarms.
 fn replace(faint: &Faint, config: &mut Config) {
     let camera = config.detector.camera;
@@ -136,7 +167,7 @@ pub fn configure_asked(faint: &Faint, config: &mut Config, reasons: &mut Vec<Str
     ));
 }
 
-/// Writes the detector where isolated targets are not found.
+/// Writes the detector where it finds what the one for isolated targets does not.
 pub fn configure(faint: &Faint, config: &mut Config, reasons: &mut Vec<String>) {
     replace(faint, config);
     reasons.push(format!(
@@ -241,5 +272,42 @@ mod tests {
         // Three a frame are no more than twelve frames of false alarms may have.
         assert!(seen.polarity == Polarity::Bright && seen.per_frame < 5.0, "{seen:?}");
         assert!(seen.chains.moving.len() >= 2 && seen.chains.is_sure());
+    }
+
+    #[test]
+    fn a_faint_one_beside_a_clear_one_is_looked_for_unless_more_is_there_than_noise_and_both() {
+        // Twelve frames of noise of three counts with a spot of 150 and one of that height, which move, and with so many at rest that are as faint.
+        let chosen = |height: f64, n_still: usize| {
+            let (mut all, info) = frames(0);
+            let mut rng = ChaCha8Rng::seed_from_u64(9);
+            let still: Vec<[f64; 2]> =
+                (0..n_still).map(|_| [10.0 + 180.0 * rng.random::<f64>(), 70.0 + 20.0 * rng.random::<f64>()]).collect();
+            for (k, frame) in all.iter_mut().enumerate() {
+                frame.time = Timestamp::from_secs_f64(0.04 * k as f64);
+                let way = 3.0 * k as f64;
+                let mut spots = vec![([30.0 + way, 40.0], 150.0), ([40.0 + way, 120.0], height)];
+                spots.extend(still.iter().map(|at| (*at, 30.0)));
+                let light = |x: usize, y: usize| -> f64 {
+                    let of = |(at, height): &([f64; 2], f64)| {
+                        height * (-0.5 * ((x as f64 - at[0]).powi(2) + (y as f64 - at[1]).powi(2)) / 1.69).exp()
+                    };
+                    spots.iter().map(of).sum()
+                };
+                let Pixels::Gray8(image) = &mut frame.pixels else { unreachable!() };
+                for y in 0..160 {
+                    for (x, p) in image.row_mut(y).iter_mut().enumerate() {
+                        let noise = 3.0 * rng.sample::<f64, _>(StandardNormal);
+                        *p = (80.0 + noise + light(x, y)).round() as u8;
+                    }
+                }
+            }
+            let clear = spots::look(&all, &[], &info, 1).unwrap();
+            assert!(!clear.is_poor() && clear.moves(), "{clear:?}");
+            look_beside(&all, &[], &clear, &info, 1).unwrap()
+        };
+        let seen = chosen(12.0, 0).expect("both");
+        assert!(seen.polarity == Polarity::Bright && seen.chains.moving.len() >= 2, "{seen:?}");
+        assert_eq!(chosen(0.0, 0), None, "the clear one is followed as it is");
+        assert_eq!(chosen(12.0, 40), None, "ground that is no noise");
     }
 }

@@ -87,6 +87,11 @@ impl Seen {
         self.bright.per_frame + self.dark.per_frame < POOR
     }
 
+    /// Whether they are particles or cells.
+    pub fn are_many(&self) -> bool {
+        self.bright.per_frame.max(self.dark.per_frame) > MANY
+    }
+
     /// Whether anything moves as a target would.
     pub fn moves(&self) -> bool {
         self.bright.chains.is_sure() || self.dark.chains.is_sure()
@@ -118,7 +123,7 @@ impl Seen {
         let moves_clearly = |s: &Side| s.per_frame >= POOR && s.chains.is_sure();
         let by_motion = self.bright.chains.is_sure() != self.dark.chains.is_sure()
             && (moves_clearly(&self.bright) || moves_clearly(&self.dark))
-            && self.bright.per_frame.max(self.dark.per_frame) <= MANY;
+            && !self.are_many();
         let dark_weighs = match by_motion || (self.is_poor() && self.moves()) {
             true => self.dark.chains.gain() > self.bright.chains.gain(),
             false => weight(&self.dark) > 2.0 * weight(&self.bright),
@@ -189,7 +194,7 @@ pub(super) fn max_side(info: &SourceInfo) -> u32 {
 
 /// Score from which a target starts a track where few are expected, and where there are many, unless what moves is fainter ([`super::initiation_score`]). Chosen: with 6, 4, 2.5 for all infrared clips of
 /// the exam 1.1, 4.7, 8.3 false tracks a minute come in half A and 0.4, 1.2, 2.7 in half B, for 95.0, 95.1, 96.7 and 88.6, 89.9, 92.4 % held.
-const INITIATION_SCORE: f64 = 6.0;
+pub(super) const INITIATION_SCORE: f64 = 6.0;
 const WEAK_INITIATION_SCORE: f64 = 4.0;
 /// Share of the blobs that may score less.
 const MOST_FAINT: f64 = 0.25;
