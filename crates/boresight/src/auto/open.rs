@@ -58,8 +58,8 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         let sensor = &mut config.input.sensor;
         sensor.bad_pixels = sensor.bad_pixels.or((found.n_bad > 0).then_some(true));
         sensor.column_noise = sensor.column_noise.or((found.column_rms > 0.0).then_some(true));
-        // The rest of them is read when it is detected, so that decoding and detecting overlap and the second look finds the memory free.
-        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n), found))
+        // The rest of them is read while the first ones are looked at: the first pass holds them all.
+        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on(), found))
     };
     let (mut frames, found) = read(&mut base, beside.clone())?;
     let base = &base;
@@ -118,7 +118,7 @@ pub fn read_and_choose(
     let info = source.info().clone();
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, MOST_BYTES);
-    let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
+    let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on();
     let mut again = again;
     let second = |_: &mut Replay, wanted: Wanted| match wanted {
         Wanted::None => None,

@@ -27,7 +27,12 @@ impl Replay {
     /// Lets [`Replay::read_on`] read on, up to `most` frames in all.
     pub(crate) fn up_to(mut self, most: usize) -> Self {
         self.most = most;
-        self.rest.will_hold(most);
+        self
+    }
+
+    /// Lets the source read on by itself to as many as may be held: for who is going to hold them all.
+    pub(crate) fn reading_on(mut self) -> Self {
+        self.rest.will_hold(self.most);
         self
     }
 
