@@ -2,6 +2,8 @@
 //! that rate explains.
 //!
 //! Source: our own; the test is Poisson's. Over the frames looked at, the number of false alarms has at most the mean and the variance 3 × rate × frames.
+//! Beside clear targets it is taken where it finds all of them, others that move, and no more than such false alarms ([`look_beside`]): the score of isolated ones counts the noise of a pixel and that of the ring around, so that
+//! a spot of four times the noise starts no track.
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
 use super::chains::Chain;
@@ -123,6 +125,10 @@ pub fn look_beside(
     n_threads: usize,
 ) -> Result<Option<Faint>> {
     let (polarity, clear) = isolated.most();
+    if isolated.polarity() != polarity {
+        // Targets of the other polarity are clear as well.
+        return Ok(None);
+    }
     let places = growing(frames.len());
     let seen = look_at(frames, &places, ground, polarity, info, n_threads)?;
     Ok(finds_others(&seen, clear, places.len()).then_some(seen))
