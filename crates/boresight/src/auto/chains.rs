@@ -56,7 +56,7 @@ impl Chain {
         for (k, a) in &self.hits {
             if let Some((_, b)) = other.hits.iter().find(|h| h.0 == *k) {
                 both += 1;
-                near += usize::from((a.at - b.at).norm() <= a.side_px + b.side_px + 2.0);
+                near += usize::from(a.touches(b));
             }
         }
         2 * near > both

@@ -10,6 +10,7 @@ use super::chains::Chain;
 use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
+use super::sightings::Sightings;
 use super::spots::{self, Seen};
 use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
@@ -113,7 +114,7 @@ pub fn look(
     Ok(more.then_some(seen))
 }
 
-/// Faint targets beside clear ones of the same polarity: all that the `isolated` chains show is found, a chain besides that would start no track as an isolated one, and what is left is no more than the false alarms asked for:
+/// Faint targets beside clear ones of the same polarity: all chains that would start a track as `isolated` ones are found, what is left without them moves, and the rest of it is no more than the false alarms asked for:
 /// nothing that the rate does not know of is there, no texture, wave or leaf.
 /// # Errors
 /// Frames of more than one size or pixel type.
@@ -130,21 +131,31 @@ pub fn look_beside(
         return Ok(None);
     }
     let places = growing(frames.len());
-    let seen = look_at(frames, &places, ground, polarity, info, n_threads)?;
-    Ok(finds_others(&seen, clear, places.len()).then_some(seen))
+    let scans = looks::scans(&detector(polarity), places.iter().map(|&k| &frames[k]), info, n_threads)?;
+    let sightings: Vec<_> = scans.iter().zip(&places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
+    let area_px2 = (info.width * info.height) as f64;
+    let n: usize = sightings.iter().map(|s| s.all.len()).sum();
+    let per_frame = n as f64 / places.len().max(1) as f64;
+    let seen = Faint { polarity, per_frame, chains: Evidence::of(&sightings, area_px2) };
+    Ok(finds_others(&seen, clear, sightings, area_px2).then_some(seen))
 }
 
-/// Whether the faint ones hold all the `clear` chains, one that goes with none of those that would start a track, and little else, in so many frames.
-fn finds_others(faint: &Faint, clear: &Evidence, n_frames: usize) -> bool {
-    let expected = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * n_frames as f64;
-    let left = faint.per_frame * n_frames as f64 - faint.chains.n_hits() as f64;
-    let starts = |c: &Chain| c.hits.iter().any(|h| h.1.score >= spots::INITIATION_SCORE);
-    let mut followed = clear.clone();
-    followed.moving.retain(starts);
-    let is_held = |c: &Chain| faint.chains.moving.iter().any(|o| c.goes_with(o));
-    left <= expected + SURE_STDS * expected.sqrt()
-        && followed.moving.iter().all(is_held)
-        && faint.chains.gain_beside(&followed) > SURE_GAIN
+/// Whether the faint ones hold all of the `clear` chains that would start a track, and what is left of the `sightings` then moves and is little else.
+fn finds_others(faint: &Faint, clear: &Evidence, mut sightings: Vec<Sightings>, area_px2: f64) -> bool {
+    let starts = |c: &&Chain| c.hits.iter().any(|h| h.1.score >= spots::INITIATION_SCORE);
+    for chain in clear.moving.iter().filter(starts) {
+        let same: Vec<&Chain> = faint.chains.moving.iter().filter(|c| chain.goes_with(c)).collect();
+        if same.is_empty() {
+            return false;
+        }
+        for (k, hit) in same.into_iter().chain([chain]).flat_map(|c| &c.hits) {
+            sightings[*k].all.retain(|s| !s.touches(hit));
+        }
+    }
+    let left = Evidence::of(&sightings, area_px2);
+    let n_left = sightings.iter().map(|s| s.all.len()).sum::<usize>() - left.n_hits();
+    let expected = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * sightings.len() as f64;
+    n_left as f64 <= expected + SURE_STDS * expected.sqrt() && left.gain() > SURE_GAIN
 }
 
 /// Puts the detector for faint targets in the place of that for isolated ones; scores are now -log10 of a number of false alarms.

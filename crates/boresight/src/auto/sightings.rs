@@ -32,6 +32,11 @@ impl Sighting {
         let variance = variance + LEAST_STD_PX.powi(2) + (SHARE_OF_SIDE * side_px).powi(2);
         Self { at, variance, side_px, thickness_px: side_px, score: 0.0 }
     }
+
+    /// Whether it touches another one, or nearly does: an edge or a shadow touches its thing.
+    pub fn touches(&self, other: &Self) -> bool {
+        (self.at - other.at).norm() <= self.side_px + other.side_px + 2.0
+    }
 }
 
 /// The sightings of one time.
