@@ -13,6 +13,8 @@ const FREQUENCIES_HZ: [f64; 2] = [1.0 / 60.0, 2.0];
 /// Plots and seconds looked at.
 const MOST_PLOTS: usize = 1500;
 const MOST_S: f64 = 300.0;
+/// Turns without a plot beyond a hundred for each plot: five days of turns of 2.5 s, some 150 MB of empty scans.
+pub(super) const MOST_EMPTY: usize = 200_000;
 /// Steps of the grid in the frequency that the time looked at tells apart.
 const STEPS: f64 = 6.0;
 /// Less coherent plots show no antenna that turns; of n plots at random the coherence is about 1/√n.
@@ -105,12 +107,12 @@ pub(crate) fn turns(plots: &[(f64, f64)], given_s: Option<f64>) -> Result<Turns>
     let n = (last - first + 1) as usize;
     // What holes in time make of turns without plots; beyond any pause it is a wrong number.
     const MOST_TURNS: usize = 10_000_000;
-    if n > MOST_TURNS || n > 1_000_000 + 100 * plots.len() {
+    if n > MOST_TURNS || n > MOST_EMPTY + 100 * plots.len() {
         return Err(Error::new(
             ErrorKind::Damaged,
             format!("{n} turns of the antenna between the first plot and the last"),
         )
-        .hint("are the times really seconds?"));
+        .hint("are the times really seconds? a table of weeks is read in parts"));
     }
     // The end of a turn by its own plots, as they would place it; of one without plots a turn after the one before.
     let mut sums = vec![(0.0, 0usize, f64::NEG_INFINITY); n];

@@ -62,12 +62,12 @@ fn median_step(times: &[f64]) -> f64 {
 /// Scans by their numbers; the time of one is that of its last plot, of one without plots evenly between its neighbours'.
 fn by_number(plots: &[Plot], numbers: &[u64], turn_s: Option<f64>) -> Result<Numbered> {
     let (first, last) = (numbers.iter().copied().min().unwrap_or(0), numbers.iter().copied().max().unwrap_or(0));
-    if last - first >= MOST_SCANS || last - first > 1_000_000 + 100 * plots.len() as u64 {
+    if last - first >= MOST_SCANS || last - first > (antenna::MOST_EMPTY + 100 * plots.len()) as u64 {
         return Err(Error::new(
             ErrorKind::Damaged,
             format!("{} scans between the first plot and the last", last - first + 1),
         )
-        .hint("is it really the number of the scan, are the times really seconds?"));
+        .hint("is it really the number of the scan, are the times really seconds? a table of weeks is read in parts"));
     }
     let n = (last - first + 1) as usize;
     let mut latest = vec![f64::NEG_INFINITY; n];
