@@ -185,15 +185,7 @@ pub(super) fn choose_looked(
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, tempo, info, &mut config, &mut reasons);
             gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
-            let is_unclear = evidence.is_poor() || !evidence.moves() || evidence.many_faint().is_some();
-            // Before a camera that moves what stands nearer than the ground goes a way of its own as well.
-            let may_hide_others = !evidence.are_many() && scene.camera != Camera::Moving;
-            let faint = match (is_unclear, may_hide_others) {
-                (true, _) => faint::look(frames, &scene.ground, &evidence, info, n_threads)?,
-                (false, true) => faint::look_beside(frames, &scene.ground, &evidence, info, n_threads)?,
-                (false, false) => None,
-            };
-            if let Some(seen) = faint {
+            if let Some(seen) = faint::look(frames, scene, &evidence, info, n_threads)? {
                 faint::configure(&seen, &mut config, &mut reasons);
                 // There are more than false alarms, whether they move or not.
                 gain = seen.chains.gain().max(f64::MIN_POSITIVE);

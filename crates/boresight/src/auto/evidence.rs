@@ -68,8 +68,7 @@ impl Evidence {
 
     /// Looks for chains in the scans of the frames at these places; `ground` is the first frame's in each frame, none where it stands.
     pub fn of_looks(scans: &[Scan], places: &[usize], ground: &[Ground], info: &SourceInfo) -> Self {
-        let sightings: Vec<_> = scans.iter().zip(places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
-        Self::of(&sightings, (info.width * info.height) as f64)
+        Self::of(&Sightings::of_looks(scans, places, ground), (info.width * info.height) as f64)
     }
 
     /// Looks for chains in a field of that area, px².

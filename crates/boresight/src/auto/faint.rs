@@ -2,7 +2,7 @@
 //! that rate explains.
 //!
 //! Source: our own; the test is Poisson's. Over the frames looked at, the number of false alarms has at most the mean and the variance 3 × rate × frames.
-//! Beside clear targets it is taken where it finds all of them, others that move, and no more than such false alarms ([`look_beside`]): the score of isolated ones counts the noise of a pixel and that of the ring around, so that
+//! Beside clear targets it is taken where it finds all of them, others that move, and no more than such false alarms ([`beside`]): the score of isolated ones counts the noise of a pixel and that of the ring around, so that
 //! a spot of four times the noise starts no track.
 //! Limits: texture hides what is as strong as texture; there the detector for isolated targets looks at each one's own surroundings.
 
@@ -10,13 +10,14 @@ use super::chains::Chain;
 use super::evidence::{Evidence, SURE_GAIN};
 use super::ground::Ground;
 use super::looks;
+use super::scene::{Camera, Scene};
 use super::sightings::Sightings;
 use super::spots::{self, Seen};
 use super::spread::growing;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::{Config, Frame, Result, SourceInfo};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// False alarms a frame that the tracker can bear: at 320 x 240 px and 5 px a frame, three within five frames and a gate of 50 px² meet by
 /// chance in some 3e-6 of the frames, twice in eight hours.
@@ -35,6 +36,13 @@ pub struct Faint {
     pub per_frame: f64,
     /// Chains of these.
     pub chains: Evidence,
+}
+
+impl Faint {
+    fn of(polarity: Polarity, scans: &[Scan], chains: Evidence) -> Self {
+        let n: usize = scans.iter().map(|s| s.detections.len()).sum();
+        Self { polarity, per_frame: n as f64 / scans.len().max(1) as f64, chains }
+    }
 }
 
 fn detector(polarity: Polarity) -> DetectorConfig {
@@ -60,9 +68,7 @@ fn look_at(
     n_threads: usize,
 ) -> Result<Faint> {
     let scans = looks::scans(&detector(polarity), places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let n: usize = scans.iter().map(|s| s.detections.len()).sum();
-    let chains = Evidence::of_looks(&scans, places, ground, info);
-    Ok(Faint { polarity, per_frame: n as f64 / places.len().max(1) as f64, chains })
+    Ok(Faint::of(polarity, &scans, Evidence::of_looks(&scans, places, ground, info)))
 }
 
 /// Of both polarities the one whose chains gain more, or both if the lesser one's go beside those; where neither moves, that of which there are more.
@@ -77,16 +83,25 @@ pub fn better([bright, dark]: [Faint; 2]) -> Faint {
     Faint { polarity, ..most }
 }
 
-/// Faint targets, if their chains surely gain more than those of the `isolated` ones, or if they are most of the many of which a part would never start a track, or if there are more detections than false alarms and nothing moves surely.
+/// Faint targets beside or in the place of the `isolated` ones.
+///
+/// Where these are clear, those beside them ([`beside`]). Else, if their chains surely gain more than those of the isolated ones, or if they are most of the many of which a part would never start a
+/// track, or if there are more detections than false alarms and nothing moves surely.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(
     frames: &[Frame],
-    ground: &[Ground],
+    scene: &Scene,
     isolated: &Seen,
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Option<Faint>> {
+    let ground = &scene.ground[..];
+    if !isolated.is_poor() && isolated.moves() && isolated.many_faint().is_none() {
+        // Before a camera that moves what stands nearer than the ground goes a way of its own as well.
+        let may_be_others = scene.camera != Camera::Moving && !isolated.are_many();
+        return if may_be_others { beside(frames, ground, isolated, info, n_threads) } else { Ok(None) };
+    }
     let (seen, looks) = count(frames, ground, info, n_threads)?;
     let seen = better(seen);
     let (polarity, chains) = isolated.most();
@@ -116,9 +131,7 @@ pub fn look(
 
 /// Faint targets beside clear ones of the same polarity: all chains that would start a track as `isolated` ones are found, what is left without them moves, and the rest of it is no more than the false alarms asked for:
 /// nothing that the rate does not know of is there, no texture, wave or leaf.
-/// # Errors
-/// Frames of more than one size or pixel type.
-pub fn look_beside(
+fn beside(
     frames: &[Frame],
     ground: &[Ground],
     isolated: &Seen,
@@ -132,30 +145,24 @@ pub fn look_beside(
     }
     let places = growing(frames.len());
     let scans = looks::scans(&detector(polarity), places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let sightings: Vec<_> = scans.iter().zip(&places).map(|(s, &k)| Sightings::of(s, ground.get(k))).collect();
+    let mut left = Sightings::of_looks(&scans, &places, ground);
     let area_px2 = (info.width * info.height) as f64;
-    let n: usize = sightings.iter().map(|s| s.all.len()).sum();
-    let per_frame = n as f64 / places.len().max(1) as f64;
-    let seen = Faint { polarity, per_frame, chains: Evidence::of(&sightings, area_px2) };
-    Ok(finds_others(&seen, clear, sightings, area_px2).then_some(seen))
-}
-
-/// Whether the faint ones hold all of the `clear` chains that would start a track, and what is left of the `sightings` then moves and is little else.
-fn finds_others(faint: &Faint, clear: &Evidence, mut sightings: Vec<Sightings>, area_px2: f64) -> bool {
+    let seen = Faint::of(polarity, &scans, Evidence::of(&left, area_px2));
     let starts = |c: &&Chain| c.hits.iter().any(|h| h.1.score >= spots::INITIATION_SCORE);
     for chain in clear.moving.iter().filter(starts) {
-        let same: Vec<&Chain> = faint.chains.moving.iter().filter(|c| chain.goes_with(c)).collect();
+        let same: Vec<&Chain> = seen.chains.moving.iter().filter(|c| chain.goes_with(c)).collect();
         if same.is_empty() {
-            return false;
+            return Ok(None);
         }
         for (k, hit) in same.into_iter().chain([chain]).flat_map(|c| &c.hits) {
-            sightings[*k].all.retain(|s| !s.touches(hit));
+            left[*k].all.retain(|s| !s.touches(hit));
         }
     }
-    let left = Evidence::of(&sightings, area_px2);
-    let n_left = sightings.iter().map(|s| s.all.len()).sum::<usize>() - left.n_hits();
-    let expected = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * sightings.len() as f64;
-    n_left as f64 <= expected + SURE_STDS * expected.sqrt() && left.gain() > SURE_GAIN
+    let moving = Evidence::of(&left, area_px2);
+    let n_others = left.iter().map(|s| s.all.len() as f64).sum::<f64>() - moving.n_hits() as f64;
+    let expected = REAL_FACTOR * FALSE_ALARMS_PER_FRAME * places.len() as f64;
+    let is_noise = n_others <= expected + SURE_STDS * expected.sqrt();
+    Ok(Some(seen).filter(|_| is_noise && moving.gain() > SURE_GAIN))
 }
 
 /// Puts the detector for faint targets in the place of that for isolated ones; scores are now -log10 of a number of false alarms.
@@ -236,11 +243,11 @@ mod tests {
     #[test]
     fn spots_of_five_deviations_are_seen_and_noise_alone_is_not() {
         let (spots, info) = frames(10);
-        let seen = look(&spots, &[], &Seen::default(), &info, 1).unwrap().expect("ten spots");
+        let seen = look(&spots, &Scene::default(), &Seen::default(), &info, 1).unwrap().expect("ten spots");
         assert_eq!(seen.polarity, Polarity::Bright);
         assert!((8.0..13.0).contains(&seen.per_frame), "{seen:?}");
         let (noise, info) = frames(0);
-        assert_eq!(look(&noise, &[], &Seen::default(), &info, 1).unwrap(), None);
+        assert_eq!(look(&noise, &Scene::default(), &Seen::default(), &info, 1).unwrap(), None);
     }
 
     #[test]
@@ -285,7 +292,7 @@ mod tests {
                 }
             }
         }
-        let seen = look(&few, &[], &Seen::default(), &info, 1).unwrap().expect("two spots");
+        let seen = look(&few, &Scene::default(), &Seen::default(), &info, 1).unwrap().expect("two spots");
         // Three a frame are no more than twelve frames of false alarms may have.
         assert!(seen.polarity == Polarity::Bright && seen.per_frame < 5.0, "{seen:?}");
         assert!(seen.chains.moving.len() >= 2 && seen.chains.is_sure());
@@ -294,7 +301,7 @@ mod tests {
     #[test]
     fn a_faint_one_beside_a_clear_one_is_looked_for_unless_more_is_there_than_noise_and_both() {
         // Twelve frames of noise of three counts with a spot of 150 and one of that height, which move, and with so many at rest that are as faint.
-        let chosen = |height: f64, n_still: usize| {
+        let chosen = |height: f64, n_still: usize, camera: Camera| {
             let (mut all, info) = frames(0);
             let mut rng = ChaCha8Rng::seed_from_u64(9);
             let still: Vec<[f64; 2]> =
@@ -320,11 +327,14 @@ mod tests {
             }
             let clear = spots::look(&all, &[], &info, 1).unwrap();
             assert!(!clear.is_poor() && clear.moves(), "{clear:?}");
-            look_beside(&all, &[], &clear, &info, 1).unwrap()
+            let mut scene = Scene::default();
+            scene.camera = camera;
+            look(&all, &scene, &clear, &info, 1).unwrap()
         };
-        let seen = chosen(12.0, 0).expect("both");
+        let seen = chosen(12.0, 0, Camera::Fixed).expect("both");
         assert!(seen.polarity == Polarity::Bright && seen.chains.moving.len() >= 2, "{seen:?}");
-        assert_eq!(chosen(0.0, 0), None, "the clear one is followed as it is");
-        assert_eq!(chosen(12.0, 40), None, "ground that is no noise");
+        assert_eq!(chosen(0.0, 0, Camera::Fixed), None, "the clear one is followed as it is");
+        assert_eq!(chosen(12.0, 40, Camera::Fixed), None, "ground that is no noise");
+        assert_eq!(chosen(12.0, 0, Camera::Moving), None, "it may stand nearer than the ground");
     }
 }

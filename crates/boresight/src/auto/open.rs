@@ -14,7 +14,7 @@ use super::learn::learn;
 use super::moving;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera, Scene};
-use super::second_look::{self, Read};
+use super::second_look::{self, Read, SECOND_LOOK_FRAMES};
 use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::sensor::{Found, if_defective};
 use crate::track::Tracking;
@@ -58,8 +58,8 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         let sensor = &mut config.input.sensor;
         sensor.bad_pixels = sensor.bad_pixels.or((found.n_bad > 0).then_some(true));
         sensor.column_noise = sensor.column_noise.or((found.column_rms > 0.0).then_some(true));
-        // The rest of them is read while the first ones are looked at: the first pass holds them all.
-        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on(), found))
+        // Those of the second look are read while the first ones are looked at, the rest of them when it is detected: where a colour is chosen they are read anew.
+        Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on(SECOND_LOOK_FRAMES), found))
     };
     let (mut frames, found) = read(&mut base, beside.clone())?;
     let base = &base;
@@ -118,7 +118,7 @@ pub fn read_and_choose(
     let info = source.info().clone();
     let most = if info.n_frames.is_some() || again.is_some() { first_scans::MOST_SCANS } else { PROBE_FRAMES };
     let n = frames_ahead(&info, most, MOST_BYTES);
-    let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on();
+    let mut frames = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on(SECOND_LOOK_FRAMES);
     let mut again = again;
     let second = |_: &mut Replay, wanted: Wanted| match wanted {
         Wanted::None => None,

@@ -67,6 +67,11 @@ impl Sightings {
         };
         Self { time_s: scan.time.ns as f64 * 1e-9, all: order.into_iter().take(MOST_A_SCAN).map(sighting).collect() }
     }
+
+    /// Those of the scans of the frames at these places; `ground` is the first frame's in each frame, none where it stands.
+    pub fn of_looks(scans: &[Scan], places: &[usize], ground: &[Ground]) -> Vec<Self> {
+        scans.iter().zip(places).map(|(scan, &k)| Self::of(scan, ground.get(k))).collect()
+    }
 }
 
 #[cfg(test)]

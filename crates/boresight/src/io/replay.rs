@@ -30,9 +30,9 @@ impl Replay {
         self
     }
 
-    /// Lets the source read on by itself to as many as may be held: for who is going to hold them all.
-    pub(crate) fn reading_on(mut self) -> Self {
-        self.rest.will_hold(self.most);
+    /// Lets the source read on by itself to the first `n` frames, or as many as may be held: for who is going to hold them all.
+    pub(crate) fn reading_on(mut self, n: usize) -> Self {
+        self.rest.will_hold(n.min(self.most));
         self
     }
 

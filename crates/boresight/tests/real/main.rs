@@ -4,6 +4,7 @@
 //! The data lie in the folder that `BORESIGHT_TEST_DATA` names (default: `../shared/data` beside the repository).
 
 mod auto;
+mod camera;
 mod colour;
 mod fuse;
 mod kitti_scores;
@@ -19,6 +20,7 @@ mod video;
 fn main() -> std::process::ExitCode {
     let tests = [
         auto::tests(),
+        camera::tests(),
         colour::tests(),
         fuse::tests(),
         kitti_scores::tests(),

@@ -397,7 +397,8 @@ fn of_a_view_that_moved_few_patches_lie_where_they_lay() {
     let share = |left, top| {
         let now = view(left, top);
         let found = |p: &&crate::camera::key_frame::Patch| {
-            find_near(&key.image, &now, **p, p.middle(), &Similarity::identity()).is_some()
+            let to = find_near(&key.image, &now, **p, p.middle(), &Similarity::identity());
+            to.is_some_and(|to| (to - p.middle()).norm() <= STILL)
         };
         key.patches.iter().filter(found).count() as f64 / key.patches.len() as f64
     };
