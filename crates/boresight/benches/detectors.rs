@@ -1,4 +1,4 @@
-//! Whole detectors, a frame: `isolated`, `spot` and movers before a fixed camera, on the frames that their aims name; `bernoulli` on noise.
+//! Whole detectors, a frame: `isolated`, `cfar`, `spot` and movers before a fixed camera, on the frames that their aims name; `bernoulli` on noise.
 //!
 //! Run: `cargo bench -p boresight --bench detectors`. Fixed seeds; one thread; eight frames in turn. Scenes: the sample clip (320 x 256), 50 and 600 round spots in white noise, and ten textured things before
 //! a textured ground with even noise of 2 counts either way; 256 x 256 px of even noise.
@@ -6,6 +6,7 @@
 use boresight::sim::{SceneConfig, Seed};
 use boresight::vision::background::BackgroundConfig;
 use boresight::vision::bernoulli::BernoulliConfig;
+use boresight::vision::cfar::CfarConfig;
 use boresight::vision::threshold::{SpotConfig, ThresholdConfig};
 use boresight::vision::{ClusterConfig, DetectorConfig, IsolatedConfig, build};
 use boresight::{Frame, FrameIndex, FrameSource, Image, Pixels, Scan, Timestamp};
@@ -77,17 +78,34 @@ fn spots((width, height): (usize, usize), n: usize) -> Vec<Frame> {
     std::iter::from_fn(|| source.next_frame().expect("a frame")).take(N).collect()
 }
 
-#[divan::bench(args = [2.5, 7.3])]
-fn isolated_sample_320x256(bencher: Bencher, min_score: f64) {
+fn sample() -> Vec<Frame> {
     let clip = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/ir_drone/IR_DRONE_046.mp4");
     let mut source = boresight::io::open(clip, &boresight::io::OpenOptions::default()).expect("the sample clip");
-    let frames: Vec<Frame> = std::iter::from_fn(|| source.next_frame().expect("a frame")).step_by(30).take(N).collect();
-    run(bencher, &frames, &isolated(min_score, 102));
+    std::iter::from_fn(|| source.next_frame().expect("a frame")).step_by(30).take(N).collect()
+}
+
+#[divan::bench(args = [2.5, 7.3])]
+fn isolated_sample_320x256(bencher: Bencher, min_score: f64) {
+    run(bencher, &sample(), &isolated(min_score, 102));
 }
 
 #[divan::bench(args = [2.5, 7.3])]
 fn isolated_50_spots_1080p(bencher: Bencher, min_score: f64) {
     run(bencher, &spots((1920, 1080), 50), &isolated(min_score, 432));
+}
+
+fn cfar() -> DetectorConfig {
+    DetectorConfig { threshold: ThresholdConfig::Cfar(CfarConfig::default()), ..Default::default() }
+}
+
+#[divan::bench]
+fn cfar_sample_320x256(bencher: Bencher) {
+    run(bencher, &sample(), &cfar());
+}
+
+#[divan::bench]
+fn cfar_50_spots_1080p(bencher: Bencher) {
+    run(bencher, &spots((1920, 1080), 50), &cfar());
 }
 
 #[divan::bench]

@@ -1,6 +1,7 @@
 //! The pixel types that a detector takes: u8, u16 and f32, in the type the file holds.
 
 use super::background::BackgroundPixel;
+use super::cfar::lane::Lane;
 use super::threshold::band;
 
 /// Sums over the pixels of a run.
@@ -21,6 +22,12 @@ pub struct RunSums {
 pub trait Pixel: BackgroundPixel + PartialOrd {
     /// Distance between neighbouring values, counts; 0 for a float.
     const STEP: f32;
+    /// What small binomial sums of these pixels are held in.
+    type Lane: Lane;
+    /// The pixel in such a sum.
+    fn lane(self) -> Self::Lane;
+    /// The pixels with their left neighbour's value where they have none (NaN, infinite), in `copy` where they can.
+    fn mended<'a>(pixels: &'a [Self], copy: &'a mut Vec<f32>) -> &'a [Self];
     /// The value, counts.
     fn value(self) -> f64;
     /// The value as a place in a table of all values; 0 for a float.
@@ -38,8 +45,16 @@ pub trait Pixel: BackgroundPixel + PartialOrd {
 }
 
 macro_rules! integer_pixel {
-    ($t:ty, $band_bits:ident, $level_states:ident) => {
+    ($t:ty, $lane:ty, $band_bits:ident, $level_states:ident) => {
         impl Pixel for $t {
+            type Lane = $lane;
+            #[inline(always)]
+            fn lane(self) -> $lane {
+                self.into()
+            }
+            fn mended<'a>(pixels: &'a [Self], _: &'a mut Vec<f32>) -> &'a [Self] {
+                pixels
+            }
             fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
                 band::$band_bits(row, low, high, bits);
             }
@@ -82,10 +97,26 @@ macro_rules! integer_pixel {
         }
     };
 }
-integer_pixel!(u8, band_bits_u8, level_states_u8);
-integer_pixel!(u16, band_bits_u16, level_states_u16);
+integer_pixel!(u8, i16, band_bits_u8, level_states_u8);
+integer_pixel!(u16, f32, band_bits_u16, level_states_u16);
 
 impl Pixel for f32 {
+    type Lane = f32;
+    #[inline(always)]
+    fn lane(self) -> f32 {
+        self
+    }
+    fn mended<'a>(pixels: &'a [Self], copy: &'a mut Vec<f32>) -> &'a [Self] {
+        copy.clear();
+        let mut last = 0.0;
+        copy.extend(pixels.iter().map(|v| {
+            if v.is_finite() {
+                last = *v;
+            }
+            last
+        }));
+        copy
+    }
     fn band_bits(row: &[Self], low: Self, high: Self, bits: &mut [u64]) {
         band::band_bits_f32(row, low, high, bits);
     }
@@ -131,6 +162,13 @@ impl Pixel for f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pixels_without_a_value_take_their_neighbours() {
+        let copy = &mut Vec::new();
+        assert_eq!(f32::mended(&[f32::NAN, 3.0, f32::INFINITY, f32::NAN, 4.0], copy), [0.0, 3.0, 3.0, 3.0, 4.0]);
+        assert_eq!(u8::mended(&[7, 255], copy), [7, 255]);
+    }
 
     #[test]
     fn a_real_band_becomes_the_pixels_inside_it() {

@@ -9,7 +9,7 @@ use super::config::CfarConfig;
 use super::contrast::Contrast;
 use super::merge::Places;
 use super::noise::NoiseMap;
-use super::pyramid::{Pyramid, sigma_px};
+use super::pyramid::{Pyramid, View, sigma_px};
 use super::region::{Region, Seed};
 use super::spot_fit::{Guess, Spot, fit};
 use super::tail::{Strengths, nulls, strength};
@@ -73,6 +73,8 @@ pub struct CfarDetector {
     strengths: [Vec<f32>; 2],
     candidates: Vec<Candidate>,
     places: Places,
+    /// The frame where pixels without a value were mended.
+    mended: Vec<f32>,
     region: Region,
     /// Which blocks of 2 x 2 pixels belong to a detection.
     taken: Vec<bool>,
@@ -102,6 +104,7 @@ impl CfarDetector {
             strengths: Default::default(),
             candidates: Vec::new(),
             places: Places::default(),
+            mended: Vec::new(),
             region: Region::default(),
             taken: Vec::new(),
             cells: Vec::new(),
@@ -119,15 +122,18 @@ impl CfarDetector {
             return;
         }
         let largest = self.config.largest_px.unwrap_or(LARGEST * w.min(h) as f64);
-        self.search(image, largest);
+        let mut mended = std::mem::take(&mut self.mended);
+        let frame = View { pixels: T::mended(image.as_slice(), &mut mended), ..View::of(image) };
+        self.search(frame, largest);
         self.choose();
         self.taken.clear();
         self.taken.resize(w.div_ceil(2) * h.div_ceil(2), false);
         let candidates = std::mem::take(&mut self.candidates);
         for c in &candidates {
-            self.measure(c, T::STEP, largest);
+            self.measure(c, frame, largest);
         }
         self.candidates = candidates;
+        self.mended = mended;
         self.found.sort_unstable_by(|a, b| {
             let (a, b) = (a.detection.position, b.detection.position);
             a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x))
@@ -150,38 +156,31 @@ impl CfarDetector {
     }
 
     /// Lists the extremes of all levels with their strengths.
-    fn search<T: Pixel>(&mut self, image: &Image<T>, largest: f64) {
+    fn search<T: Pixel>(&mut self, frame: View<'_, T>, largest: f64) {
         let (from, to) = self.levels(largest);
-        let levels = self.pyramid.fill(image, to);
-        self.places.clear(levels.iter().map(|l| (l.width, l.height)));
+        let n = self.pyramid.fill(frame, to);
+        let size = |k: usize| (frame.width.div_ceil(1 << k), frame.height.div_ceil(1 << k));
+        self.places.clear((0..n).map(size));
         let mut counts = [0, 0];
         let mut finest = None;
         self.strengths.iter_mut().for_each(Vec::clear);
         // Sums of floats round by some parts in ten million of the values.
-        let magnitude = levels.last().map_or(0.0, |l| l.g.iter().fold(0.0f32, |m, v| m.max(v.abs())));
-        for (k, level) in levels.iter().enumerate().skip(from) {
-            self.contrast.run(level);
+        let most = |m: f32, v: f32| m.max(v.abs());
+        let magnitude = match n {
+            0 => 0.0,
+            1 => frame.pixels.iter().map(|v| v.value_f32()).fold(0.0, most),
+            _ => self.pyramid.level(n - 1).pixels.iter().copied().fold(0.0, most),
+        };
+        for k in from..n {
+            match k {
+                0 => self.contrast.run(frame),
+                _ => self.contrast.run(self.pyramid.level(k)),
+            }
             let rounding = T::STEP / 12f32.sqrt() * CONTRAST_PER_NOISE / (1 << k) as f32;
             self.noise.fill(&self.contrast, rounding + 3e-6 * magnitude + f32::MIN_POSITIVE);
             counts[0] += self.contrast.n_bright;
             counts[1] += self.contrast.n_dark;
-            let edges = (level.width as u32 - 1, level.height as u32 - 1);
-            let mut of_row = (0, self.noise.row(0));
-            for e in &self.contrast.extremes {
-                if e.y != of_row.0 {
-                    of_row = (e.y, self.noise.row(e.y));
-                }
-                // On the outermost pixels a mirrored pair is one pixel twice: its noise has twice the variance.
-                let column = if e.x == 0 || e.x == edges.0 { std::f32::consts::SQRT_2 } else { 1.0 };
-                let row = if e.y == 0 || e.y == edges.1 { std::f32::consts::SQRT_2 } else { 1.0 };
-                let z = (e.v.abs() / (of_row.1.at(e.x) * column * row)).min(1e4);
-                let strength = strength(z);
-                let side = if e.v > 0.0 { Side::Bright } else { Side::Dark };
-                self.strengths[usize::from(side == Side::Dark)].push(strength);
-                if strength > LEAST_STRENGTH && self.config.polarity.has(side) {
-                    self.candidates.push(Candidate { level: k, x: e.x, y: e.y, v: e.v, z, strength, number: 0.0 });
-                }
-            }
+            self.list(k, size(k));
             finest.get_or_insert_with(|| (self.strengths.each_ref().map(Vec::len), counts));
         }
         let (finest_listed, finest_count) = finest.unwrap_or_default();
@@ -194,7 +193,7 @@ impl CfarDetector {
             finest_count: finest_count[i],
         };
         let nulls = nulls(of(0, bright), of(1, dark), sides);
-        let rate = self.config.rate(image.width() * image.height());
+        let rate = self.config.rate(frame.width * frame.height);
         let least = nulls.map(|n| n.strength_of(rate));
         self.candidates.retain_mut(|c| {
             let side = usize::from(c.v < 0.0);
@@ -204,6 +203,41 @@ impl CfarDetector {
             }
             is_rare
         });
+    }
+
+    /// Lists the strengths of the extremes of level `k`, and which may be detections.
+    fn list(&mut self, k: usize, (w, h): (usize, usize)) {
+        let extremes = &self.contrast.extremes;
+        // Written by place, not by side: which of the two it is cannot be foreseen.
+        let [bright, dark] = &mut self.strengths;
+        let begun = [bright.len(), dark.len()];
+        bright.resize(begun[0] + extremes.len(), 0.0);
+        dark.resize(begun[1] + extremes.len(), 0.0);
+        let sides = [&mut bright[begun[0]..], &mut dark[begun[1]..]];
+        let is_wanted = [Side::Bright, Side::Dark].map(|side| self.config.polarity.has(side));
+        let (mut done, mut n_dark) = (0, 0);
+        let edges = (w as u32 - 1, h as u32 - 1);
+        for of_row in extremes.chunk_by(|a, b| a.y == b.y) {
+            let y = of_row[0].y;
+            let noise = self.noise.row(y, w);
+            // On the outermost pixels a mirrored pair is one pixel twice: its noise has twice the variance.
+            let row = if y == 0 || y == edges.1 { std::f32::consts::SQRT_2 } else { 1.0 };
+            for e in of_row {
+                let column = if e.x == 0 || e.x == edges.0 { std::f32::consts::SQRT_2 } else { 1.0 };
+                let z = (e.v.abs() / (noise.at(e.x) * column * row)).min(1e4);
+                let strength = strength(z);
+                let is_dark = usize::from(e.v < 0.0);
+                let at = if is_dark == 0 { done - n_dark } else { n_dark };
+                sides[is_dark][at] = strength;
+                done += 1;
+                n_dark += is_dark;
+                if strength > LEAST_STRENGTH && is_wanted[is_dark] {
+                    self.candidates.push(Candidate { level: k, x: e.x, y: e.y, v: e.v, z, strength, number: 0.0 });
+                }
+            }
+        }
+        bright.truncate(begun[0] + done - n_dark);
+        dark.truncate(begun[1] + n_dark);
     }
 
     /// Orders the candidates, the rarest first, and keeps one a place.
@@ -217,8 +251,7 @@ impl CfarDetector {
     }
 
     /// Makes a detection of a candidate, unless it lies in one already made or is too large.
-    fn measure(&mut self, c: &Candidate, step: f32, largest: f64) {
-        let full = self.pyramid.level(0);
+    fn measure<T: Pixel>(&mut self, c: &Candidate, full: View<'_, T>, largest: f64) {
         let taken_width = full.width.div_ceil(2);
         let half = |v: u32| ((v << c.level) / 2) as usize;
         if self.taken[half(c.y).min(full.height.div_ceil(2) - 1) * taken_width + half(c.x).min(taken_width - 1)] {
@@ -227,16 +260,17 @@ impl CfarDetector {
         let on_level = c.level.saturating_sub(1);
         let zoom = 1 << (c.level - on_level);
         let side = 1i32 << on_level;
-        let at = self.pyramid.level(c.level).value(c.x as i32, c.y as i32, true).unwrap_or(0.0);
-        let seed = Seed {
-            x: c.x as i32 * zoom,
-            y: c.y as i32 * zoom,
-            zoom,
-            smooth: c.level > 0,
-            sign: c.v.signum(),
-            ground: at - c.v,
+        let (x, y) = (c.x as i32, c.y as i32);
+        let at = match c.level {
+            0 => full.value(x, y, true),
+            k => self.pyramid.level(k).value(x, y, true),
         };
-        self.region.grow(self.pyramid.level(on_level), &seed);
+        let at = at.unwrap_or(0.0);
+        let seed = Seed { x: x * zoom, y: y * zoom, zoom, smooth: c.level > 0, sign: c.v.signum(), ground: at - c.v };
+        match on_level {
+            0 => self.region.grow(full, &seed),
+            k => self.region.grow(self.pyramid.level(k), &seed),
+        }
         let [left, top, right, bottom] = self.region.bounds();
         let longest = (right - left).max(bottom - top) + 1;
         if f64::from(longest * side) > largest.max(f64::from(side)) {
@@ -256,7 +290,7 @@ impl CfarDetector {
             }
         }
         let area = self.region.pixels.len() as f64 * f64::from(side * side);
-        let (position, cov) = self.position(c, &seed, area, step, f64::from(side));
+        let (position, cov) = self.position(c, &seed, area, full, f64::from(side));
         let side = f64::from(side);
         let detection = Detection {
             position,
@@ -281,11 +315,17 @@ impl CfarDetector {
     }
 
     /// Position and covariance of a detection whose region has been grown.
-    fn position(&self, c: &Candidate, seed: &Seed, area: f64, step: f32, side: f64) -> (Vector2<f64>, Matrix2<f64>) {
+    fn position<T: Pixel>(
+        &self,
+        c: &Candidate,
+        seed: &Seed,
+        area: f64,
+        full: View<'_, T>,
+        side: f64,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
         let centre = Vector2::new(self.region.centre.0 * side, self.region.centre.1 * side);
         let sigma = sigma_px(c.level);
         if c.level <= FITTED {
-            let full = self.pyramid.level(0);
             let guess = Guess {
                 x: centre.x,
                 y: centre.y,
@@ -294,7 +334,7 @@ impl CfarDetector {
                 // A region that ends at half of a Gaussian's height has the area 2 π ln(2) σ².
                 sigma: (area / 4.355).sqrt().clamp(0.6, 1.6 * sigma),
             };
-            let rounding = f64::from(step) * f64::from(step) / 12.0;
+            let rounding = f64::from(T::STEP).powi(2) / 12.0;
             if let Some(Spot { position, cov, .. }) = fit(full, &guess, rounding.max(1e-12)) {
                 return (position, cov);
             }

@@ -10,6 +10,7 @@
 pub(crate) mod config;
 mod contrast;
 pub(crate) mod detector;
+pub(crate) mod lane;
 mod merge;
 mod noise;
 mod pyramid;

@@ -11,6 +11,17 @@ const REACH: isize = 2;
 /// Part of the frame's median noise that every place has at least.
 const SHARED: f32 = 0.5;
 
+/// How far the pixels between two centres are from the first, in blocks.
+const PARTS: [f32; BLOCK] = {
+    let mut parts = [0.0; BLOCK];
+    let mut i = 0;
+    while i < BLOCK {
+        parts[i] = (i as f32 + 0.5) / BLOCK as f32;
+        i += 1;
+    }
+    parts
+};
+
 /// The noise of one level.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NoiseMap {
@@ -19,6 +30,9 @@ pub(super) struct NoiseMap {
     sd: Vec<f32>,
     columns: Vec<f32>,
     sorted: Vec<f32>,
+    /// The rows of blocks above and below a row of pixels, read for every pixel, and the index of the first.
+    wide: [Vec<f32>; 2],
+    wide_row: Option<usize>,
 }
 
 /// The index inside 0..n that a mirror at the edge of the blocks shows.
@@ -32,6 +46,7 @@ impl NoiseMap {
     /// Takes the blocks of a level; `floor` is the least noise, counts, above 0.
     pub(super) fn fill(&mut self, contrast: &Contrast, floor: f32) {
         (self.nx, self.ny) = (contrast.nx, contrast.ny);
+        self.wide_row = None;
         let (nx, ny) = (self.nx, self.ny);
         self.sd.clear();
         self.sd.resize(nx * ny, 0.0);
@@ -54,15 +69,38 @@ impl NoiseMap {
         self.sd.iter_mut().for_each(|s| *s = (*s * *s + least2).sqrt());
     }
 
-    /// Where the deviation of the contrast is read in a row of the level's pixels.
-    pub(super) fn row(&self, y: u32) -> NoiseRow<'_> {
-        let (y0, y1, part) = between(y, self.ny);
-        let blocks = |y: usize| &self.sd[y * self.nx..][..self.nx];
-        NoiseRow { above: blocks(y0), below: blocks(y1), part }
+    /// Where the deviation of the contrast is read in row `y` of the level's pixels, of which a row has `w`.
+    pub(super) fn row(&mut self, y: u32, w: usize) -> NoiseRow<'_> {
+        let (above, below, part) = between(y, self.ny);
+        if self.wide_row != Some(above) {
+            self.wide.rotate_left(1);
+            if self.wide_row.is_none_or(|row| row + 1 != above) {
+                self.widen(0, above, w);
+            }
+            self.widen(1, below, w);
+            self.wide_row = Some(above);
+        }
+        NoiseRow { above: &self.wide[0], below: &self.wide[1], part }
+    }
+
+    /// Reads a row of blocks for every pixel.
+    fn widen(&mut self, to: usize, row: usize, w: usize) {
+        let blocks = &self.sd[row * self.nx..][..self.nx];
+        let wide = &mut self.wide[to];
+        // Up to the first centre and beyond the last one there is nothing to read between.
+        wide.clear();
+        wide.resize(w, blocks[self.nx - 1]);
+        let (first, rest) = wide.split_at_mut((BLOCK / 2).min(w));
+        first.fill(blocks[0]);
+        for (to, pair) in rest.as_chunks_mut::<BLOCK>().0.iter_mut().zip(blocks.windows(2)) {
+            for (v, part) in to.iter_mut().zip(PARTS) {
+                *v = pair[0] + part * (pair[1] - pair[0]);
+            }
+        }
     }
 }
 
-/// The blocks above and below a row of pixels, and how far it is between their centres.
+/// The noise along the centres of the blocks above and below a row of pixels, and how far it is between them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoiseRow<'a> {
     above: &'a [f32],
@@ -72,12 +110,10 @@ pub(super) struct NoiseRow<'a> {
 
 impl NoiseRow<'_> {
     /// Deviation of the contrast at a pixel of the level, counts.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(self, x: u32) -> f32 {
-        let (x0, x1, part) = between(x, self.above.len());
-        let along = |blocks: &[f32]| blocks[x0] + part * (blocks[x1] - blocks[x0]);
-        let above = along(self.above);
-        above + self.part * (along(self.below) - above)
+        let above = self.above[x as usize];
+        above + self.part * (self.below[x as usize] - above)
     }
 }
 
@@ -105,6 +141,6 @@ mod tests {
         assert!((own - 5f32.sqrt()).abs() < 1e-5, "{own}");
         assert!(noise.sd[3 * 9 + 5] > 40.0);
         // Half way between two centres.
-        assert!((noise.row(0).at(0) - 5f32.sqrt()).abs() < 1e-5);
+        assert!((noise.row(0, 72).at(0) - 5f32.sqrt()).abs() < 1e-5);
     }
 }

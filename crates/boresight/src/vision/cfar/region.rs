@@ -4,7 +4,8 @@
 //! noise does not fray the region of a dim target), for detections of the finest level on the pixels themselves.
 //! Limits: a target that touches another as bright is cut by the disc only.
 
-use super::pyramid::Level;
+use super::pyramid::View;
+use crate::vision::pixel::Pixel;
 
 /// Radius of the disc, pixels of the detection's level, and what is added to it, pixels of the region's.
 const RADIUS: i32 = 3;
@@ -44,7 +45,7 @@ pub(super) struct Region {
 
 impl Region {
     /// Grows the region on a level.
-    pub(super) fn grow(&mut self, on: &Level, seed: &Seed) {
+    pub(super) fn grow<P: Pixel>(&mut self, on: View<'_, P>, seed: &Seed) {
         let radius = RADIUS * seed.zoom + MARGIN;
         let side = 2 * radius + 1;
         self.seen.clear();
@@ -100,7 +101,6 @@ impl Region {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pyramid::Pyramid;
     use super::*;
     use crate::Image;
 
@@ -111,10 +111,8 @@ mod tests {
             image.row_mut(y)[4..8].fill(50);
         }
         image.row_mut(10)[4] = 60;
-        let mut pyramid = Pyramid::default();
-        let on = &pyramid.fill(&image, 1)[0];
         let mut region = Region::default();
-        region.grow(on, &Seed { x: 5, y: 1, zoom: 1, smooth: false, sign: 1.0, ground: 10.0 });
+        region.grow(View::of(&image), &Seed { x: 5, y: 1, zoom: 1, smooth: false, sign: 1.0, ground: 10.0 });
         assert_eq!((region.pixels.len(), region.bounds()), (12, [4, 0, 7, 2]));
         assert!((region.centre.0 - 5.5).abs() < 1e-9 && (region.centre.1 - 1.0).abs() < 1e-9);
         assert_eq!(region.peak, 50.0);

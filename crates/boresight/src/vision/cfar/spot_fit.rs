@@ -7,7 +7,8 @@
 //! Limits: the pixel's own width is taken into σ, right for σ above 0.5 px; a spot cut by the border is fitted to what is seen.
 //! Symbols: A height (counts), b ground (counts), g its slope (counts/px), σ deviation of the spot (px).
 
-use super::pyramid::Level;
+use super::pyramid::View;
+use crate::vision::pixel::Pixel;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 const STEPS: usize = 8;
@@ -56,7 +57,7 @@ struct Sums {
 /// Largest half side of a window, px.
 const MOST: usize = 16;
 
-fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &State) -> Sums {
+fn sums<P: Pixel>(on: View<'_, P>, [left, top, right, bottom]: [usize; 4], p: &State) -> Sums {
     let (x0, y0, a, b, s) = (p[0], p[1], p[2], p[3], p[4]);
     let middle = [0.5 * (left + right) as f64, 0.5 * (top + bottom) as f64];
     let scale = -0.5 / (s * s);
@@ -76,7 +77,7 @@ fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &State) -> Sums {
             let ag = a * g / (s * s);
             let (sx, sy) = (x as f64 - middle[0], y as f64 - middle[1]);
             let j = [ag * dx, ag * dy, g, 1.0, ag * (dx * dx + dy * dy) / s, sx, sy];
-            let r = f64::from(pixel) - b - p[5] * sx - p[6] * sy - a * g;
+            let r = pixel.value() - b - p[5] * sx - p[6] * sy - a * g;
             let mut at = 0;
             for i in 0..N {
                 v[i] += j[i] * r;
@@ -102,7 +103,7 @@ fn sums(on: &Level, [left, top, right, bottom]: [usize; 4], p: &State) -> Sums {
 }
 
 /// Fits a spot on a level near a guess; `least_variance` is that of a pixel at least, counts². `None` if what is there is no spot.
-pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot> {
+pub(super) fn fit<P: Pixel>(on: View<'_, P>, guess: &Guess, least_variance: f64) -> Option<Spot> {
     let half = ((WINDOW * guess.sigma).ceil() as usize).clamp(3, MOST);
     let (cx, cy) = (guess.x.round().max(0.0) as usize, guess.y.round().max(0.0) as usize);
     let window = [
@@ -152,7 +153,6 @@ pub(super) fn fit(on: &Level, guess: &Guess, least_variance: f64) -> Option<Spot
 
 #[cfg(test)]
 mod tests {
-    use super::super::pyramid::Pyramid;
     use super::*;
     use crate::Image;
 
@@ -164,10 +164,8 @@ mod tests {
                 100.0 + height * (-((x - x0).powi(2) + (y - y0).powi(2)) / (2.0 * sigma * sigma)).exp()
             };
             let image = Image::from_vec(21, 21, (0..441).map(|i| value(i) as f32).collect()).unwrap();
-            let mut pyramid = Pyramid::default();
-            let on = &pyramid.fill(&image, 1)[0];
             let guess = Guess { x: f64::round(x0), y: f64::round(y0), height: height * 0.6, ground: 98.0, sigma: 1.6 };
-            let spot = fit(on, &guess, 1e-6).unwrap();
+            let spot = fit(View::of(&image), &guess, 1e-6).unwrap();
             assert!((spot.position - Vector2::new(x0, y0)).norm() < 1e-3, "{spot:?}");
             assert!((spot.sigma - sigma).abs() < 1e-2 && (spot.height - height).abs() < 0.1);
         }
@@ -181,17 +179,17 @@ mod tests {
             100.0 + 4.0 * x - 2.5 * y + spot
         };
         let image = Image::from_vec(21, 21, (0..441).map(|i| value(i) as f32).collect()).unwrap();
-        let mut pyramid = Pyramid::default();
-        let on = &pyramid.fill(&image, 1)[0];
         let guess = Guess { x: 11.0, y: 9.0, height: 25.0, ground: 115.0, sigma: 1.6 };
-        let spot = fit(on, &guess, 1e-6).unwrap();
+        let spot = fit(View::of(&image), &guess, 1e-6).unwrap();
         assert!((spot.position - Vector2::new(10.3, 9.6)).norm() < 1e-3, "{spot:?}");
     }
 
     #[test]
     fn an_even_ground_is_no_spot() {
-        let mut pyramid = Pyramid::default();
-        let on = &pyramid.fill(&Image::filled(21, 21, 7u8), 1)[0];
-        assert_eq!(fit(on, &Guess { x: 10.0, y: 10.0, height: 3.0, ground: 7.0, sigma: 1.5 }, 1.0 / 12.0), None);
+        let image = Image::filled(21, 21, 7u8);
+        assert_eq!(
+            fit(View::of(&image), &Guess { x: 10.0, y: 10.0, height: 3.0, ground: 7.0, sigma: 1.5 }, 1.0 / 12.0),
+            None
+        );
     }
 }

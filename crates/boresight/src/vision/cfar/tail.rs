@@ -72,7 +72,8 @@ fn ranked(e: &mut [f32], rank: usize) -> f64 {
     if rank >= e.len() {
         return UNLISTED;
     }
-    f64::from(*e.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1)
+    // Numbers that are not negative stand in the order of their bits.
+    f64::from(*e.select_nth_unstable_by(rank, |a, b| b.to_bits().cmp(&a.to_bits())).1)
 }
 
 /// The strengths of the listed extremes of one polarity.
