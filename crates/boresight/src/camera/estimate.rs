@@ -59,9 +59,11 @@ const CLEAR_COVER: f64 = 0.75;
 /// A first motion that does not explain most of the image's area, as below a sky, is believed once it was found in so many frames one after the other. It may be that of a thing, and is not
 /// believed, where its patches spread over less than [`WIDE`] of the image's width, and half as many or more stand still: nothing that stands out stands before a camera that moves.
 const UNSURE_FRAMES: u32 = 3;
-/// Share of the key frame's patches that must lie within [`STILL`] of where they lay, so that the others are not looked for: noise and targets may hide the rest. Of 31 infrared clips whose view was moved by
-/// twelve motions of 2 to 32 px, 24 % lie there by chance at most, and 71 % within a pixel; of coded noise with moving targets before a camera at rest, two thirds and more in three of four frames.
+/// Share of the key frame's patches that must lie within [`STILL`] of where they lay, so that the others are not looked for, or share that must lie within a pixel: noise and targets may hide the rest, and
+/// targets that are all there is to hold on to have moved by some tenths of a pixel. Of 31 infrared clips whose view was moved by twelve motions of 2 to 32 px, 24 % lie within [`STILL`] by chance at
+/// most, and 71 % within a pixel.
 const AT_REST: f64 = 0.4;
+const NEAR_REST: f64 = 0.85;
 /// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
 const FINE_FOUND: f64 = 0.5;
 /// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
@@ -213,7 +215,8 @@ impl CameraMotionEstimator {
         }
         let n = self.matches.len();
         let n_still = self.matches.iter().filter(|m| (last.apply(m.from) - m.to).norm() <= STILL).count();
-        if n_still < MIN_PATCHES || (n_still as f64) < AT_REST * key.patches.len() as f64 {
+        let share = |n: usize| n as f64 / key.patches.len() as f64;
+        if n < MIN_PATCHES || share(n_still) < AT_REST && share(n) < NEAR_REST {
             return None;
         }
         let agree_px = if key.even { AGREE_EVEN } else { AGREE };
