@@ -15,7 +15,7 @@ use crate::associate::{AssociatorConfig, CostKind, GlobalNearestConfig};
 use crate::tempo::Tempo;
 use crate::track::{ClutterConfig, ClutterMapConfig, ConfirmationConfig, ExistenceConfig};
 use crate::{Config, Result, Scan, TrackStatus};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The tracker runs this often: the first time under the assumed rule, the second under the one learnt from it.
 const PASSES: usize = 2;
@@ -62,6 +62,10 @@ pub struct Found {
     pub least_score: f64,
     /// Scores of their detections, rising.
     pub scores: Vec<f32>,
+    /// Of those, of the targets that were followed for as long as a target stays at least.
+    pub lasting_scores: Vec<f32>,
+    /// Scores of the detections that no reported track holds, rising.
+    pub false_scores: Vec<f32>,
 }
 
 impl Found {
@@ -111,7 +115,7 @@ pub fn learn(
     let interval_s = over_s / (n_scans - 1) as f64;
     let tempo = Tempo::of_scans(scans);
     for _ in 0..PASSES {
-        let (tracks, held) = run(scans, config)?;
+        let Run { tracks, held, shared } = run(scans, config)?;
         let targets = || tracks.values().filter(|t| t.confirmed);
         let (mut hits, mut missed, mut gaps, mut lived, mut ended, mut begun, mut own) = (0, 0, 0, 0, 0, 0, 0);
         // A track that was seen to the last scans has not ended; one that began in the first ones was there before.
@@ -130,16 +134,30 @@ pub fn learn(
         let clear_s = clear(&held, |h| f64::from(score(h)) >= config.tracker.min_initiation_score)
             .map(|id| [time_s(tracks[&id].first), time_s(tracks[&id].last)])
             .collect();
-        let mut scores: Vec<f32> = held.iter().map(score).collect();
-        scores.sort_unstable_by(f32::total_cmp);
+        let rising = |mut scores: Vec<f32>| {
+            scores.sort_unstable_by(f32::total_cmp);
+            scores
+        };
+        let scores = rising(held.iter().map(score).collect());
+        let lasts =
+            |t: &Seen| (t.last - t.first) as f64 * interval_s >= tempo.stretched(LEAST_LIFE_S).min(0.5 * over_s);
+        let lasting_scores = rising(held.iter().filter(|h| lasts(&tracks[&h.track])).map(score).collect());
+        let false_scores = rising(not_held(scans, &held, &shared));
         let faint = (FAINT_SHARE * scores.len() as f64) as usize;
         let least_score = scores.get(faint).map_or(0.0, |s| f64::from(*s));
         let per_scan = own as f64 / n_scans as f64;
-        found = Found { n_targets: targets().count(), per_scan, clear_s, least_score, scores };
-        let all: usize = scans.iter().map(|s| s.detections.len()).sum();
         let seen_px2 = area_px2 * n_scans as f64;
-        let false_density = (all.saturating_sub(own) as f64).max(0.5) / seen_px2;
+        let false_density = (false_scores.len() as f64).max(0.5) / seen_px2;
         let new_density = (begun as f64).max(0.5) / seen_px2;
+        found = Found {
+            n_targets: targets().count(),
+            per_scan,
+            clear_s,
+            least_score,
+            scores,
+            lasting_scores,
+            false_scores,
+        };
         // Of the scans that follow a detection, those in which a gap begins; of those in a gap, the ones that end it.
         let [after_hit, after_miss] =
             [share(hits.saturating_sub(gaps), gaps, PRIOR_HITS), share(gaps, missed.saturating_sub(gaps), PRIOR_FOUND)];
@@ -165,7 +183,7 @@ pub fn learn(
         if t.reidentification.max_gap_s > 0.0 {
             t.reidentification.max_gap_s = tempo.stretched(LONGEST_HIDDEN_S);
         }
-        t.score_likelihood = score_statistics::of(scans, &held, t.appearance_gain);
+        t.score_likelihood = score_statistics::of(scans, &held, &shared, t.appearance_gain);
         if t.score_likelihood.is_some() {
             t.associator = AssociatorConfig::GlobalNearest(GlobalNearestConfig { cost: CostKind::Likelihood });
         }
@@ -204,17 +222,35 @@ fn clear(held: &[Held], is_clear: impl Fn(&Held) -> bool) -> impl Iterator<Item 
     of_track.into_iter().filter(|(_, [n, n_clear])| 4 * n_clear >= 3 * n).map(|(id, _)| id)
 }
 
+/// Scores of the detections that no track holds, alone or with others.
+fn not_held(scans: &[Scan], held: &[Held], shared: &[Held]) -> Vec<f32> {
+    let held: BTreeSet<_> = held.iter().chain(shared).map(|h| (h.scan, h.detection as usize)).collect();
+    let of_scan = |(k, scan): (usize, &Scan)| -> Vec<f32> {
+        let others = scan.detections.iter().enumerate().filter(|(j, _)| !held.contains(&(k, *j)));
+        others.map(|(_, d)| d.score).collect()
+    };
+    scans.iter().enumerate().flat_map(of_scan).collect()
+}
+
 /// Share of `yes` with the counts of a prior.
 fn share(yes: usize, no: usize, prior: [f64; 2]) -> f64 {
     (yes as f64 + prior[0]) / ((yes + no) as f64 + prior[0] + prior[1])
 }
 
 /// What the tracker makes of the scans.
-fn run(scans: &[Scan], config: &Config) -> Result<(BTreeMap<u64, Seen>, Vec<Held>)> {
+struct Run {
+    tracks: BTreeMap<u64, Seen>,
+    /// The detections that one reported track holds alone, and those that it shares: of targets that are seen as one.
+    held: Vec<Held>,
+    shared: Vec<Held>,
+}
+
+/// Runs the tracker over the scans.
+fn run(scans: &[Scan], config: &Config) -> Result<Run> {
     let mut tracker = crate::track::build(&config.tracker)?;
     let mut tracks: BTreeMap<u64, Seen> = BTreeMap::new();
     let mut shares = Shares::default();
-    let mut held = Vec::new();
+    let (mut held, mut shared) = (Vec::new(), Vec::new());
     for (k, scan) in scans.iter().enumerate() {
         let states = tracker.step(scan)?;
         shares.count(scan.detections.len(), states);
@@ -229,14 +265,17 @@ fn run(scans: &[Scan], config: &Config) -> Result<(BTreeMap<u64, Seen>, Vec<Held
             }
             t.last = k;
             t.hits += 1;
+            let holds = Held { scan: k, detection: j, track: s.id.0 };
             if shares.is_one(j) {
                 t.own += 1;
-                held.push(Held { scan: k, detection: j, track: s.id.0 });
+                held.push(holds);
+            } else {
+                shared.push(holds);
             }
         }
     }
-    held.retain(|h| tracks[&h.track].confirmed);
-    Ok((tracks, held))
+    [&mut held, &mut shared].into_iter().for_each(|h| h.retain(|h| tracks[&h.track].confirmed));
+    Ok(Run { tracks, held, shared })
 }
 
 #[cfg(test)]

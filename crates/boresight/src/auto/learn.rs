@@ -162,7 +162,8 @@ fn learn_on(
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let area_px2 = (info.width * info.height).max(1) as f64;
-    let leaves_out = matches!(choice.config.detector.threshold, ThresholdConfig::Isolated(_));
+    let leaves_out =
+        matches!(choice.config.detector.threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_));
     if leaves_out && choice.config.tracker.report == Report::All {
         // Where the first frames say already what the many targets reach, the others are not searched for less.
         pass.take_on(frames, &mut at_once, PROBE_FRAMES);
@@ -253,6 +254,14 @@ fn raise(
 ) -> Result<(Option<Found>, bool)> {
     let assumed = choice.clone();
     let found = statistics(scans, area_px2, false_tracks_per_hour, choice)?;
+    if let Some((k, reason)) = found.as_ref().and_then(|f| initiation_score::apart(f, &choice.config)) {
+        *choice = assumed;
+        if let ThresholdConfig::Spot(spot) = &mut choice.config.detector.threshold {
+            spot.k = k;
+        }
+        choice.reasons.push(reason);
+        return Ok((found, true));
+    }
     let raised = found.as_ref().and_then(|f| initiation_score::raised(f, area_px2, &choice.config));
     let Some((score, reason)) = raised else { return Ok((found, false)) };
     *choice = assumed;

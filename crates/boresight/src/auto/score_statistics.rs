@@ -34,14 +34,18 @@ pub struct Held {
     pub track: u64,
 }
 
-/// The law of the scores; `held` lists the detections of reported tracks in the order of time, `gain` is that of the tracker's mean.
-pub fn of(scans: &[Scan], held: &[Held], gain: f64) -> Option<ScoreLikelihoodConfig> {
+/// The law of the scores; `held` lists the detections of reported tracks in the order of time, `shared` those that several hold, whose scores are neither one target's nor false;
+/// `gain` is that of the tracker's mean.
+pub fn of(scans: &[Scan], held: &[Held], shared: &[Held], gain: f64) -> Option<ScoreLikelihoodConfig> {
     let all = || scans.iter().flat_map(|s| &s.detections).map(|d| f64::from(d.score));
     let (least, most) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), s| (l.min(s), m.max(s)));
     if !(least > 0.0 && most > least && most.is_finite()) {
         return None;
     }
     let mut is_false: Vec<Vec<bool>> = scans.iter().map(|s| vec![true; s.detections.len()]).collect();
+    for h in shared {
+        is_false[h.scan][h.detection as usize] = false;
+    }
     let mut means = BTreeMap::<u64, (usize, f64)>::new();
     let mut steps = Vec::new();
     for h in held {
@@ -121,7 +125,7 @@ mod tests {
         for (std, odd, exponent) in [(0.1, 0.0, 4.0), (0.2, 0.03, 2.0), (0.05, 0.02, 8.0)] {
             let (scans, held) = scans(std, odd, exponent);
             let gain = 0.3;
-            let found = of(&scans, &held, gain).unwrap();
+            let found = of(&scans, &held, &[], gain).unwrap();
             // About an exponential mean of white scores the deviation is √(1 + g / (2 − g)) of their own: 1.08.
             let expected = std * (1.0f64 + gain / (2.0 - gain)).sqrt();
             assert!((found.target_log_std / expected - 1.0).abs() < 0.2, "{std} {odd}: {found:?}");
@@ -138,13 +142,13 @@ mod tests {
     #[test]
     fn nothing_is_said_of_scores_that_are_alike_or_missing_or_of_hardly_any_target() {
         let (mut scans, held) = scans(0.1, 0.0, 4.0);
-        assert_eq!(of(&scans, &held[..20], 0.3), None);
+        assert_eq!(of(&scans, &held[..20], &[], 0.3), None);
         for d in scans.iter_mut().flat_map(|s| &mut s.detections) {
             d.score = 1.0;
         }
-        assert_eq!(of(&scans, &held, 0.3), None);
+        assert_eq!(of(&scans, &held, &[], 0.3), None);
         scans[7].detections[0].score = 0.0;
-        assert_eq!(of(&scans, &held, 0.3), None);
-        assert_eq!(of(&[], &[], 0.3), None);
+        assert_eq!(of(&scans, &held, &[], 0.3), None);
+        assert_eq!(of(&[], &[], &[], 0.3), None);
     }
 }
