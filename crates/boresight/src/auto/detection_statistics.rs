@@ -62,10 +62,6 @@ pub struct Found {
     pub least_score: f64,
     /// Scores of their detections, rising.
     pub scores: Vec<f32>,
-    /// Of those, of the targets that were followed for as long as a target stays at least.
-    pub lasting_scores: Vec<f32>,
-    /// Scores of the detections that no reported track holds, rising.
-    pub false_scores: Vec<f32>,
 }
 
 impl Found {
@@ -134,30 +130,15 @@ pub fn learn(
         let clear_s = clear(&held, |h| f64::from(score(h)) >= config.tracker.min_initiation_score)
             .map(|id| [time_s(tracks[&id].first), time_s(tracks[&id].last)])
             .collect();
-        let rising = |mut scores: Vec<f32>| {
-            scores.sort_unstable_by(f32::total_cmp);
-            scores
-        };
-        let scores = rising(held.iter().map(score).collect());
-        let lasts =
-            |t: &Seen| (t.last - t.first) as f64 * interval_s >= tempo.stretched(LEAST_LIFE_S).min(0.5 * over_s);
-        let lasting_scores = rising(held.iter().filter(|h| lasts(&tracks[&h.track])).map(score).collect());
-        let false_scores = rising(not_held(scans, &held, &shared));
+        let mut scores: Vec<f32> = held.iter().map(score).collect();
+        scores.sort_unstable_by(f32::total_cmp);
         let faint = (FAINT_SHARE * scores.len() as f64) as usize;
         let least_score = scores.get(faint).map_or(0.0, |s| f64::from(*s));
         let per_scan = own as f64 / n_scans as f64;
         let seen_px2 = area_px2 * n_scans as f64;
-        let false_density = (false_scores.len() as f64).max(0.5) / seen_px2;
+        let false_density = (n_not_held(scans, &held, &shared) as f64).max(0.5) / seen_px2;
         let new_density = (begun as f64).max(0.5) / seen_px2;
-        found = Found {
-            n_targets: targets().count(),
-            per_scan,
-            clear_s,
-            least_score,
-            scores,
-            lasting_scores,
-            false_scores,
-        };
+        found = Found { n_targets: targets().count(), per_scan, clear_s, least_score, scores };
         // Of the scans that follow a detection, those in which a gap begins; of those in a gap, the ones that end it.
         let [after_hit, after_miss] =
             [share(hits.saturating_sub(gaps), gaps, PRIOR_HITS), share(gaps, missed.saturating_sub(gaps), PRIOR_FOUND)];
@@ -222,14 +203,10 @@ fn clear(held: &[Held], is_clear: impl Fn(&Held) -> bool) -> impl Iterator<Item 
     of_track.into_iter().filter(|(_, [n, n_clear])| 4 * n_clear >= 3 * n).map(|(id, _)| id)
 }
 
-/// Scores of the detections that no track holds, alone or with others.
-fn not_held(scans: &[Scan], held: &[Held], shared: &[Held]) -> Vec<f32> {
-    let held: BTreeSet<_> = held.iter().chain(shared).map(|h| (h.scan, h.detection as usize)).collect();
-    let of_scan = |(k, scan): (usize, &Scan)| -> Vec<f32> {
-        let others = scan.detections.iter().enumerate().filter(|(j, _)| !held.contains(&(k, *j)));
-        others.map(|(_, d)| d.score).collect()
-    };
-    scans.iter().enumerate().flat_map(of_scan).collect()
+/// How many detections no reported track holds, alone or with others.
+fn n_not_held(scans: &[Scan], held: &[Held], shared: &[Held]) -> usize {
+    let n_held = held.iter().chain(shared).map(|h| (h.scan, h.detection)).collect::<BTreeSet<_>>().len();
+    scans.iter().map(|s| s.detections.len()).sum::<usize>() - n_held
 }
 
 /// Share of `yes` with the counts of a prior.

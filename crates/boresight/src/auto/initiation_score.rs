@@ -27,9 +27,6 @@ const STDS: f64 = 3.0;
 /// Share of false ones among the detections that may start a track, where targets are many and all that stands is reported.
 const FALSE_STARTS: f64 = 0.01;
 
-/// False detections that a target's is worth: with its track's other detections it is told from them.
-const WORTH: f64 = 10.0;
-
 /// Detections of targets after which it is known what hardly one of them falls short of: of so many some ten do, give or take three.
 pub const ENOUGH_HELD: f64 = 10.0 / FAINT_SHARE;
 
@@ -124,33 +121,6 @@ pub fn kept(least_score: f64, config: &Config) -> Option<(f64, String)> {
     })
 }
 
-/// The threshold of the spot detector below which there are most false detections beyond [`WORTH`] for each of a target's, with the reason, if they are more than one for a hundred of the targets':
-/// where targets stand far above the noise, what scores less is nothing, but a codec makes it last for many frames. Targets are those that stay ([`Found::lasting_scores`]); 99 of 100 of the
-/// false detections below them are left out.
-pub fn apart(found: &Found, config: &Config) -> Option<(f64, String)> {
-    let ThresholdConfig::Spot(spot) = &config.detector.threshold else { return None };
-    let (targets, others) = (&found.lasting_scores, &found.false_scores);
-    let below = |s: f32| others.partition_point(|o| *o < s);
-    let gain = |i: usize| below(targets[i]) as f64 - WORTH * i as f64;
-    let at_most = (FAINT_SHARE * targets.len() as f64) as usize;
-    let best = (0..at_most).max_by(|a, b| gain(*a).total_cmp(&gain(*b)))?;
-    if gain(best) <= FALSE_STARTS * targets.len() as f64 {
-        return None;
-    }
-    // The last hundredth of them may be targets' that were not followed.
-    let n = below(targets[best]);
-    let k = round(f64::from(others[n - 1 - n / 100]));
-    (k > spot.k && k.is_finite()).then(|| {
-        let lost = 100.0 * targets.partition_point(|t| f64::from(*t) < k) as f64 / targets.len() as f64;
-        let reason = format!(
-            "Spots of less than {k} deviations (not {}) are left out: {:.0} % of the false ones, {lost:.2} % of the targets'.",
-            spot.k,
-            99.0 * n as f64 / others.len() as f64,
-        );
-        (k, reason)
-    })
-}
-
 /// The score that all but [`MISSED_SHARE`] of a chain's detections reach.
 fn faintest(chain: &Chain) -> f64 {
     let mut scores: Vec<f64> = chain.hits.iter().map(|h| h.1.score).collect();
@@ -163,7 +133,6 @@ mod tests {
     use super::super::sightings::Sighting;
     use super::*;
     use crate::track::ScoreLikelihoodConfig;
-    use crate::vision::threshold::SpotConfig;
     use crate::{Detection, FrameIndex, Scan, Timestamp};
     use nalgebra::Vector2;
     use rand::{RngExt, SeedableRng};
@@ -191,34 +160,6 @@ mod tests {
         let lowered = learn(&evidence, clear_s, &mut config, &mut reasons);
         assert_eq!(lowered, config.tracker.min_initiation_score < 6.0);
         (config.tracker.min_initiation_score, reasons.len())
-    }
-
-    #[test]
-    fn a_spot_threshold_rises_through_the_noise_below_targets_that_stand_apart_and_stays_where_they_do_not() {
-        let mut rng = ChaCha8Rng::seed_from_u64(8);
-        let mut config = Config::default();
-        config.detector.threshold = ThresholdConfig::Spot(SpotConfig { k: 2.5, ..Default::default() });
-        let mut scores = |n: usize, from: f64, to: f64| -> Vec<f32> {
-            let mut all: Vec<f32> = (0..n).map(|_| (from + (to - from) * rng.random::<f64>()) as f32).collect();
-            all.sort_unstable_by(f32::total_cmp);
-            all
-        };
-        let noise = scores(500, 2.5, 7.0);
-        let mut found = Found { lasting_scores: scores(9000, 60.0, 200.0), false_scores: noise, ..Found::default() };
-        let (k, reason) = apart(&found, &config).unwrap();
-        assert!((6.8..7.01).contains(&k), "{k}");
-        assert!(reason.contains("0.00 % of the targets'"), "{reason}");
-        // A few targets among the noise are worth less than it; every tenth is not.
-        found.lasting_scores = [scores(4, 2.5, 7.0), scores(8996, 60.0, 200.0)].concat();
-        let (k, _) = apart(&found, &config).unwrap();
-        assert!((6.8..7.01).contains(&k), "{k}");
-        found.lasting_scores = [scores(900, 2.5, 7.0), scores(8100, 60.0, 200.0)].concat();
-        assert_eq!(apart(&found, &config), None);
-        // Faint targets that begin where the noise does.
-        found.lasting_scores = scores(9000, 2.5, 9.0);
-        assert_eq!(apart(&found, &config), None);
-        found.lasting_scores.clear();
-        assert_eq!(apart(&found, &config), None);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::noise::Motions;
 use super::request::Request;
-use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, pieces, speed};
+use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, pieces, speed, spot_threshold};
 use crate::camera::{CameraConfig, CameraPath};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -162,8 +162,7 @@ fn learn_on(
     let false_tracks_per_hour = request.false_tracks_per_hour;
     let info = frames.info().clone();
     let area_px2 = (info.width * info.height).max(1) as f64;
-    let leaves_out =
-        matches!(choice.config.detector.threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Spot(_));
+    let leaves_out = matches!(choice.config.detector.threshold, ThresholdConfig::Isolated(_));
     if leaves_out && choice.config.tracker.report == Report::All {
         // Where the first frames say already what the many targets reach, the others are not searched for less.
         pass.take_on(frames, &mut at_once, PROBE_FRAMES);
@@ -175,6 +174,15 @@ fn learn_on(
         if kept && n_held >= initiation_score::ENOUGH_HELD {
             *choice = early;
             return learn_of_kept(frames, area_px2, choice, request);
+        }
+    }
+    if matches!(choice.config.detector.threshold, ThresholdConfig::Spot(_)) {
+        pass.take_on(frames, &mut at_once, PROBE_FRAMES);
+        let raised = spot_threshold::raised(frames.ahead(), pass.scans(), &choice.config, &info, request.n_threads())?;
+        if let (Some((k, reason)), ThresholdConfig::Spot(spot)) = (raised, &mut choice.config.detector.threshold) {
+            spot.k = k;
+            choice.reasons.push(reason);
+            (pass, at_once) = first_pass(frames, &choice.config, request)?;
         }
     }
     pass.take_on(frames, &mut at_once, usize::MAX);
@@ -254,14 +262,6 @@ fn raise(
 ) -> Result<(Option<Found>, bool)> {
     let assumed = choice.clone();
     let found = statistics(scans, area_px2, false_tracks_per_hour, choice)?;
-    if let Some((k, reason)) = found.as_ref().and_then(|f| initiation_score::apart(f, &choice.config)) {
-        *choice = assumed;
-        if let ThresholdConfig::Spot(spot) = &mut choice.config.detector.threshold {
-            spot.k = k;
-        }
-        choice.reasons.push(reason);
-        return Ok((found, true));
-    }
     let raised = found.as_ref().and_then(|f| initiation_score::raised(f, area_px2, &choice.config));
     let Some((score, reason)) = raised else { return Ok((found, false)) };
     *choice = assumed;

@@ -46,6 +46,7 @@ mod second_look;
 mod sighting_density;
 mod sightings;
 mod speed;
+mod spot_threshold;
 mod spots;
 mod spread;
 mod steadied;
