@@ -39,6 +39,7 @@ pub fn learn<E: From<Error>>(
     choice.change(set)?;
     let of_own = with_fixed(frames, choice, request)?;
     let begun = of_own.map_or_else(|| with_smaller(frames, choice, request, set), |begun| Ok(Some(begun)))?;
+    let begun = begun.map_or_else(|| with_raised(frames, choice, request, set), |begun| Ok(Some(begun)))?;
     let mut assumed = choice.clone();
     let mut pass = match begun {
         Some((pass, at_once)) => learn_on(pass, at_once, frames, choice, request)?,
@@ -145,6 +146,32 @@ fn with_smaller<E: From<Error>>(
     Ok(pass.leave_out_below(kept_px, most).then_some((pass, at_once)))
 }
 
+/// Raises the threshold of spots that stand apart from the noise, and returns the first pass that has begun with the one chosen; none where other things are looked for.
+fn with_raised<E: From<Error>>(
+    frames: &mut Replay,
+    choice: &mut Choice,
+    request: &Request,
+    set: impl FnMut(&mut Choice) -> Result<(), E>,
+) -> Result<Option<(FirstPass, AtOnce)>, E> {
+    if !matches!(choice.config.detector.threshold, ThresholdConfig::Spot(_)) {
+        return Ok(None);
+    }
+    let (mut pass, mut at_once) = first_pass(frames, &choice.config, request)?;
+    pass.take_on(frames, &mut at_once, PROBE_FRAMES);
+    let info = frames.info().clone();
+    let mut higher = choice.clone();
+    let raised = spot_threshold::raised(frames.ahead(), pass.scans(), &higher.config, &info, request.n_threads())?;
+    if let (Some((k, reason)), ThresholdConfig::Spot(spot)) = (raised, &mut higher.config.detector.threshold) {
+        spot.k = k;
+        higher.reasons.push(reason);
+        if stands(&mut higher, set)? {
+            *choice = higher;
+            return Ok(Some(first_pass(frames, &choice.config, request)?));
+        }
+    }
+    Ok(Some((pass, at_once)))
+}
+
 /// As [`learn`], where what is set is in the configuration.
 fn learn_set(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<FirstPass> {
     let (pass, at_once) = first_pass(frames, &choice.config, request)?;
@@ -174,15 +201,6 @@ fn learn_on(
         if kept && n_held >= initiation_score::ENOUGH_HELD {
             *choice = early;
             return learn_of_kept(frames, area_px2, choice, request);
-        }
-    }
-    if matches!(choice.config.detector.threshold, ThresholdConfig::Spot(_)) {
-        pass.take_on(frames, &mut at_once, PROBE_FRAMES);
-        let raised = spot_threshold::raised(frames.ahead(), pass.scans(), &choice.config, &info, request.n_threads())?;
-        if let (Some((k, reason)), ThresholdConfig::Spot(spot)) = (raised, &mut choice.config.detector.threshold) {
-            spot.k = k;
-            choice.reasons.push(reason);
-            (pass, at_once) = first_pass(frames, &choice.config, request)?;
         }
     }
     pass.take_on(frames, &mut at_once, usize::MAX);

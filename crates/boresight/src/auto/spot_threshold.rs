@@ -2,10 +2,11 @@
 //!
 //! Source: our own. The threshold of particles lets some false detections through, for the sake of faint ones ([`super::particles`]), and counts on white noise. A codec makes noise last for
 //! many frames, and a tracker that takes detections for independent believes it. Where targets are far brighter, nothing is lost without what scores less.
-//! How: of the scores of the first scans a valley is looked for, around which lie next to no detections; the detections below it are noise if they score no higher than those of the other polarity do: what
-//! a codec makes of noise is as often dark as bright. Rims of bright spots are dark, and do not count.
+//! How: of the scores of the first scans a valley is looked for, around which lie next to no detections. Those below it are noise if they score no higher than those of the other polarity do: what a codec
+//! makes of noise is as often dark as bright. Rims of bright spots are dark, and do not count. Where too few are left, as between many spots, those below are noise, or what a codec leaves behind a spot
+//! that moves, if they are the fewer the higher they score: other targets, fainter ones, are a hill of their own.
 //! Symbols: s a threshold, N(s) how many detections score less; b(s) = N(s r) - N(s / r), r = [`WIDE`].
-//! Limits: silent where a ground that is cut off at black has no dark spots; faint targets that are much fewer than the noise beside bright ones go with it.
+//! Limits: faint targets of which most score less than the first threshold, or that are much fewer than the noise, go with it where there are bright ones.
 
 use super::digits::round;
 use super::looks;
@@ -18,11 +19,13 @@ const LOOKS: usize = 12;
 /// Half width of a valley, a factor: a score of few deviations wanders by a fifth.
 const WIDE: f64 = 1.25;
 /// Most detections in a valley for each of those on the side where there are fewer.
-const MOST_BETWEEN: f64 = 0.02;
-/// Fewest detections at each side of it, and of the other polarity.
+const MOST_BETWEEN: f64 = 0.05;
+/// Fewest detections at each side of it, and of the other polarity so that they can be compared.
 const FEWEST: usize = 50;
 /// The score that so many of them fall short of is compared with that of the other polarity, which it may exceed by as much as a valley is wide.
 const COMPARED: f64 = 0.9;
+/// Deviations by which a number may exceed the one before by chance.
+const BY_CHANCE: f64 = 2.0;
 /// Thresholds that are tried lie apart by this factor.
 const STEP: f64 = 1.05;
 /// Reach of the dark ring around a bright spot, in units of the spot's size, and how much brighter than the ring the spot is at least.
@@ -52,38 +55,56 @@ pub(super) fn raised(
     let of_other = looks::scans(&other, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     let own = || places.iter().map(|&k| &scans[k]);
     let scores = own().flat_map(|scan| scan.detections.iter().map(|d| d.score)).collect();
-    let reach2 = (RING_REACH * spot.size_px).powi(2);
-    let is_ring = |d: &Detection, scan: &Scan| {
-        let of = |b: &Detection| b.score > RING_RATIO * d.score && (b.position - d.position).norm_squared() < reach2;
-        scan.detections.iter().any(of)
-    };
-    let noise = own().zip(&of_other);
-    let noise = noise.flat_map(|(own, other)| other.detections.iter().filter(|d| !is_ring(d, own)).map(|d| d.score));
+    let noise = own().zip(&of_other).flat_map(|(own, other)| without_rings(other, own, RING_REACH * spot.size_px));
     let Some((k, share)) = valley(rising(scores), &rising(noise.collect()), spot.k) else { return Ok(None) };
     let reason = format!(
-        "Spots of less than {k} deviations (not {}) are left out: {:.0} % of all, which score as {} noise does; hardly one scores as much.",
+        "Spots of less than {k} deviations (not {}) are left out: {:.0} % of all, which score as noise does; hardly one scores as much.",
         spot.k,
         100.0 * share,
-        if polarity == Polarity::Dark { "dark" } else { "bright" },
     );
     Ok(Some((k, reason)))
 }
 
-/// The deepest valley of the scores from `least` on of which those below score as the noise does, and the share of these.
+/// The scores of a scan's detections but those within `reach_px` of a stronger one of the other polarity: its rim.
+fn without_rings(scan: &Scan, other: &Scan, reach_px: f64) -> Vec<f32> {
+    let mut others: Vec<&Detection> = other.detections.iter().collect();
+    others.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
+    let is_ring = |d: &Detection| {
+        let from = others.partition_point(|o| o.position.y < d.position.y - reach_px);
+        let near = others[from..].iter().take_while(|o| o.position.y <= d.position.y + reach_px);
+        near.into_iter().any(|o| o.score > RING_RATIO * d.score && (o.position - d.position).norm() <= reach_px)
+    };
+    scan.detections.iter().filter(|d| !is_ring(d)).map(|d| d.score).collect()
+}
+
+/// The deepest valley of the scores from `least` on, above 0, of which those below are noise by that of the other polarity, or by themselves where there is little, and the share of these.
 fn valley(scores: Vec<f32>, noise: &[f32], least: f64) -> Option<(f64, f64)> {
     let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
-    let most = f64::from(*scores.last()?);
+    let most = f64::from(*scores.last().filter(|_| least > 0.0)?);
     let at = |of: &[f32]| f64::from(of[(COMPARED * of.len() as f64) as usize]);
     let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most);
     let sides = steps.filter_map(|s| {
         let (n, between) = (below(s), below(s * WIDE) - below(s / WIDE));
         let fewer = n.min(scores.len() - n);
-        let is_noise = || at(&scores[..n]) <= WIDE * at(noise);
-        let counts = fewer >= FEWEST && noise.len() >= FEWEST && between as f64 <= MOST_BETWEEN * fewer as f64;
-        (counts && is_noise()).then_some((s, n, between as f64 / fewer as f64))
+        let is_noise = || match noise.len() {
+            FEWEST.. => at(&scores[..n]) <= WIDE * at(noise),
+            _ => falls(&scores[..n], least),
+        };
+        let is_valley = fewer >= FEWEST && between as f64 <= MOST_BETWEEN * fewer as f64;
+        (is_valley && is_noise()).then_some((s, n, between as f64 / fewer as f64))
     });
     let (s, n, _) = sides.min_by(|a, b| a.2.total_cmp(&b.2))?;
     Some((round(s), n as f64 / scores.len() as f64))
+}
+
+/// Whether rising scores from `least` on are the fewer the higher they are, in steps of [`WIDE`] squared, but for chance.
+fn falls(scores: &[f32], least: f64) -> bool {
+    let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
+    let most = scores.last().map_or(0.0, |s| f64::from(*s));
+    let edges = (0..).map(|i| least * (WIDE * WIDE).powi(i)).take_while(|s| *s <= most);
+    let edges: Vec<usize> = edges.map(below).chain([scores.len()]).collect();
+    let counts: Vec<f64> = edges.windows(2).map(|e| (e[1] - e[0]) as f64).collect();
+    counts.windows(2).all(|c| c[1] <= c[0] + BY_CHANCE * c[0].max(1.0).sqrt())
 }
 
 fn rising(mut scores: Vec<f32>) -> Vec<f32> {
@@ -118,6 +139,20 @@ mod tests {
     }
 
     #[test]
+    fn a_rim_is_left_out_and_what_lies_farther_away_or_is_as_strong_is_not() {
+        let of = |places: &[(f64, f64, f32)]| {
+            let detection = |&(x, y, score): &(f64, f64, f32)| Detection {
+                score,
+                ..Detection::at(nalgebra::Vector2::new(x, y), nalgebra::Matrix2::identity())
+            };
+            Scan::default().with_detections(places.iter().map(detection).collect())
+        };
+        let bright = of(&[(50.0, 90.0, 30.0), (50.0, 20.0, 30.0), (100.0, 50.0, 4.0)]);
+        let dark = of(&[(60.0, 20.0, 5.0), (50.0, 31.0, 6.0), (50.0, 81.0, 7.0), (100.0, 52.0, 3.0)]);
+        assert_eq!(without_rings(&dark, &bright, 10.0), [6.0, 3.0]);
+    }
+
+    #[test]
     fn there_is_none_where_targets_begin_in_the_noise_and_none_above_faint_targets() {
         let rng = &mut ChaCha8Rng::seed_from_u64(9);
         let dark = rising(tail(rng, 600, 2.5, 0.6));
@@ -127,8 +162,12 @@ mod tests {
         // Faint targets as many as the noise, and bright ones: what lies below the valley is no noise.
         let (faint, bright) = (even(rng, 3000, 2.5, 9.0), even(rng, 5000, 40.0, 80.0));
         assert_eq!(valley(rising([&noise[..], &faint, &bright].concat()), &dark, 2.5), None);
-        // Without anything of the other polarity nothing is known of the noise.
-        assert_eq!(valley(rising([&noise[..], &bright].concat()), &[], 2.5), None);
+        // The noise is told without the other polarity as well; what scores higher than that does is none, though it falls.
+        assert!(valley(rising([&noise[..], &bright].concat()), &[], 2.5).is_some());
+        assert_eq!(valley(rising([&noise[..], &bright].concat()), &rising(even(rng, 100, 2.5, 2.7)), 2.5), None);
+        // A hill of faint targets alone.
+        assert!(valley(rising([&bright[..], &even(rng, 1000, 6.0, 9.0)].concat()), &[], 2.5).is_none());
         assert_eq!(valley(Vec::new(), &dark, 2.5), None);
+        assert_eq!(valley(rising([&noise[..], &bright].concat()), &dark, 0.0), None);
     }
 }

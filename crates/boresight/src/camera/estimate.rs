@@ -215,8 +215,8 @@ impl CameraMotionEstimator {
         }
         let n = self.matches.len();
         let n_still = self.matches.iter().filter(|m| (last.apply(m.from) - m.to).norm() <= STILL).count();
-        let share = |n: usize| n as f64 / key.patches.len() as f64;
-        if n < MIN_PATCHES || share(n_still) < AT_REST && share(n) < NEAR_REST {
+        let enough = |n: usize, share: f64| n >= MIN_PATCHES && n as f64 >= share * key.patches.len() as f64;
+        if !enough(n_still, AT_REST) && !enough(n, NEAR_REST) {
             return None;
         }
         let agree_px = if key.even { AGREE_EVEN } else { AGREE };

@@ -2,6 +2,8 @@
 
 mod background;
 mod citations;
+#[cfg(feature = "video")]
+mod coded_particles;
 mod faint_movers;
 mod fuse;
 mod golden;

@@ -8,7 +8,7 @@
 //! Related: the patch contrasts of Y. Wei et al., *Multiscale patch-based contrast measure*, Pattern Recognition 58, 216 (2016).
 //! Limits: extremes weaker than 1.2 times the quietest block above them are counted but not listed: their z is below 3.
 
-use super::lane::Lane;
+use super::lane::{HELD, Lane, Rows};
 use super::pyramid::{View, mirror};
 use crate::vision::pixel::Pixel;
 use fearless_simd::prelude::*;
@@ -20,9 +20,8 @@ pub(super) const BLOCK: usize = 8;
 const SD_PER_MEAN_ABS: f32 = 1.253_314_1;
 /// Extremes below so many times the quietest block are not listed.
 const LISTED: f32 = 1.2;
-/// Reach of the pairs, pixels, which rows are held mirrored at each side, and how many rows are held: the power of two above twice it.
+/// Reach of the pairs, pixels, by which rows are mirrored at each side.
 const REACH: usize = 3;
-const HELD: usize = 8;
 
 /// An extreme of the contrast.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,21 +30,6 @@ pub(super) struct Extreme {
     pub(super) y: u32,
     /// Contrast, counts; negative for a dark one.
     pub(super) v: f32,
-}
-
-/// The rows that a level is read through.
-#[derive(Clone, Debug, Default)]
-#[allow(unnameable_types)] // of a trait that is not implemented outside
-pub struct Rows<L: Lane> {
-    /// Smoothed rows, row y at y modulo their number.
-    smooth: [Vec<L>; HELD],
-    /// Sums down the columns of three rows, one mirrored pixel at both sides.
-    columns: Vec<L>,
-    /// Strength |v| of three rows, one pixel of 0 before them and zeros up to a whole word of bits after.
-    strong: [Vec<L>; 3],
-    /// Contrast of the last two rows, up to a whole word of bits.
-    signed: [Vec<L>; 2],
-    sums: Vec<L::Sum>,
 }
 
 /// The extremes and the noise of one level; keeps its memory between frames.

@@ -4,8 +4,25 @@
 //! 2^15, and single precision holds them exactly as well. The short numbers go twice as many into a vector.
 //! Symbols: a lane holds a smoothed pixel in units of [`Lane::COUNTS`]; contrasts are kept twice as large.
 
-use super::contrast::Rows;
 use fearless_simd::prelude::*;
+
+/// Smoothed rows that are held: the power of two above twice the reach of the contrast's pairs, 3 px.
+pub(super) const HELD: usize = 8;
+
+/// The rows that a level is read through.
+#[derive(Clone, Debug, Default)]
+#[allow(unnameable_types)] // of a trait that is not implemented outside
+pub struct Rows<L: Lane> {
+    /// Smoothed rows, row y at y modulo their number.
+    pub(super) smooth: [Vec<L>; HELD],
+    /// Sums down the columns of three rows, one mirrored pixel at both sides.
+    pub(super) columns: Vec<L>,
+    /// Strength |v| of three rows, one pixel of 0 before them and zeros up to a whole word of bits after.
+    pub(super) strong: [Vec<L>; 3],
+    /// Contrast of the last two rows, up to a whole word of bits.
+    pub(super) signed: [Vec<L>; 2],
+    pub(super) sums: Vec<L::Sum>,
+}
 
 /// A number of a row.
 #[allow(unnameable_types)] // of a trait that is not implemented outside
