@@ -135,10 +135,10 @@ pub fn learn(
         let faint = (FAINT_SHARE * scores.len() as f64) as usize;
         let least_score = scores.get(faint).map_or(0.0, |s| f64::from(*s));
         let per_scan = own as f64 / n_scans as f64;
+        found = Found { n_targets: targets().count(), per_scan, clear_s, least_score, scores };
         let seen_px2 = area_px2 * n_scans as f64;
         let false_density = (n_not_held(scans, &held, &shared) as f64).max(0.5) / seen_px2;
         let new_density = (begun as f64).max(0.5) / seen_px2;
-        found = Found { n_targets: targets().count(), per_scan, clear_s, least_score, scores };
         // Of the scans that follow a detection, those in which a gap begins; of those in a gap, the ones that end it.
         let [after_hit, after_miss] =
             [share(hits.saturating_sub(gaps), gaps, PRIOR_HITS), share(gaps, missed.saturating_sub(gaps), PRIOR_FOUND)];
@@ -205,8 +205,9 @@ fn clear(held: &[Held], is_clear: impl Fn(&Held) -> bool) -> impl Iterator<Item 
 
 /// How many detections no reported track holds, alone or with others.
 fn n_not_held(scans: &[Scan], held: &[Held], shared: &[Held]) -> usize {
-    let n_held = held.iter().chain(shared).map(|h| (h.scan, h.detection)).collect::<BTreeSet<_>>().len();
-    scans.iter().map(|s| s.detections.len()).sum::<usize>() - n_held
+    // What is shared is listed once for each of its tracks.
+    let n_shared = shared.iter().map(|h| (h.scan, h.detection)).collect::<BTreeSet<_>>().len();
+    scans.iter().map(|s| s.detections.len()).sum::<usize>() - held.len() - n_shared
 }
 
 /// Share of `yes` with the counts of a prior.

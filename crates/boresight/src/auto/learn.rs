@@ -39,7 +39,7 @@ pub fn learn<E: From<Error>>(
     choice.change(set)?;
     let of_own = with_fixed(frames, choice, request)?;
     let begun = of_own.map_or_else(|| with_smaller(frames, choice, request, set), |begun| Ok(Some(begun)))?;
-    let begun = begun.map_or_else(|| with_raised(frames, choice, request, set), |begun| Ok(Some(begun)))?;
+    let begun = with_raised(begun, frames, choice, request, set)?;
     let mut assumed = choice.clone();
     let mut pass = match begun {
         Some((pass, at_once)) => learn_on(pass, at_once, frames, choice, request)?,
@@ -146,17 +146,18 @@ fn with_smaller<E: From<Error>>(
     Ok(pass.leave_out_below(kept_px, most).then_some((pass, at_once)))
 }
 
-/// Raises the threshold of spots that stand apart from the noise, and returns the first pass that has begun with the one chosen; none where other things are looked for.
+/// Raises the threshold of spots that stand apart from the noise, and returns the first pass that has begun with the one chosen; what has begun already where other things are looked for.
 fn with_raised<E: From<Error>>(
+    begun: Option<(FirstPass, AtOnce)>,
     frames: &mut Replay,
     choice: &mut Choice,
     request: &Request,
     set: impl FnMut(&mut Choice) -> Result<(), E>,
 ) -> Result<Option<(FirstPass, AtOnce)>, E> {
     if !matches!(choice.config.detector.threshold, ThresholdConfig::Spot(_)) {
-        return Ok(None);
+        return Ok(begun);
     }
-    let (mut pass, mut at_once) = first_pass(frames, &choice.config, request)?;
+    let (mut pass, mut at_once) = begun.map_or_else(|| first_pass(frames, &choice.config, request), Ok)?;
     pass.take_on(frames, &mut at_once, PROBE_FRAMES);
     let info = frames.info().clone();
     let mut higher = choice.clone();

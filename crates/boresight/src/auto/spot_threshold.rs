@@ -71,8 +71,8 @@ fn without_rings(scan: &Scan, other: &Scan, reach_px: f64) -> Vec<f32> {
     others.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
     let is_ring = |d: &Detection| {
         let from = others.partition_point(|o| o.position.y < d.position.y - reach_px);
-        let near = others[from..].iter().take_while(|o| o.position.y <= d.position.y + reach_px);
-        near.into_iter().any(|o| o.score > RING_RATIO * d.score && (o.position - d.position).norm() <= reach_px)
+        let mut near = others[from..].iter().take_while(|o| o.position.y <= d.position.y + reach_px);
+        near.any(|o| o.score > RING_RATIO * d.score && (o.position - d.position).norm() <= reach_px)
     };
     scan.detections.iter().filter(|d| !is_ring(d)).map(|d| d.score).collect()
 }
@@ -86,10 +86,8 @@ fn valley(scores: Vec<f32>, noise: &[f32], least: f64) -> Option<(f64, f64)> {
     let sides = steps.filter_map(|s| {
         let (n, between) = (below(s), below(s * WIDE) - below(s / WIDE));
         let fewer = n.min(scores.len() - n);
-        let is_noise = || match noise.len() {
-            FEWEST.. => at(&scores[..n]) <= WIDE * at(noise),
-            _ => falls(&scores[..n], least),
-        };
+        let compares = noise.len() >= FEWEST;
+        let is_noise = || if compares { at(&scores[..n]) <= WIDE * at(noise) } else { falls(&scores[..n], least) };
         let is_valley = fewer >= FEWEST && between as f64 <= MOST_BETWEEN * fewer as f64;
         (is_valley && is_noise()).then_some((s, n, between as f64 / fewer as f64))
     });

@@ -4,7 +4,7 @@
 //! (dark), else 0, d = (3, 0), (0, 3), (2, 2), (2, -2) pixels of the level, b the level smoothed by [1 2 1]/4 in both directions. A plane, a
 //! straight edge and a line along a pair have v = 0, and the sides of a target have no contrast of the other sign. An extreme is a
 //! pixel whose |v| no neighbour exceeds (of equals the first in raster order). The noise of a block of 8 x 8 pixels is the mean
-//! |b(p) - mean of all pairs| times √(π/2). Seven smoothed rows are held at a time, so a level is read once.
+//! |b(p) - mean of all pairs| times √(π/2). The rows that the pairs reach are held smoothed, so a level is read once.
 //! Related: the patch contrasts of Y. Wei et al., *Multiscale patch-based contrast measure*, Pattern Recognition 58, 216 (2016).
 //! Limits: extremes weaker than 1.2 times the quietest block above them are counted but not listed: their z is below 3.
 

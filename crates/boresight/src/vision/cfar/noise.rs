@@ -11,17 +11,6 @@ const REACH: isize = 2;
 /// Part of the frame's median noise that every place has at least.
 const SHARED: f32 = 0.5;
 
-/// How far the pixels between two centres are from the first, in blocks.
-const PARTS: [f32; BLOCK] = {
-    let mut parts = [0.0; BLOCK];
-    let mut i = 0;
-    while i < BLOCK {
-        parts[i] = (i as f32 + 0.5) / BLOCK as f32;
-        i += 1;
-    }
-    parts
-};
-
 /// The noise of one level.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NoiseMap {
@@ -93,8 +82,8 @@ impl NoiseMap {
         let (first, rest) = wide.split_at_mut((BLOCK / 2).min(w));
         first.fill(blocks[0]);
         for (to, pair) in rest.as_chunks_mut::<BLOCK>().0.iter_mut().zip(blocks.windows(2)) {
-            for (v, part) in to.iter_mut().zip(PARTS) {
-                *v = pair[0] + part * (pair[1] - pair[0]);
+            for (i, v) in to.iter_mut().enumerate() {
+                *v = pair[0] + (i as f32 + 0.5) / BLOCK as f32 * (pair[1] - pair[0]);
             }
         }
     }
@@ -142,5 +131,30 @@ mod tests {
         assert!(noise.sd[3 * 9 + 5] > 40.0);
         // Half way between two centres.
         assert!((noise.row(0, 72).at(0) - 5f32.sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_noise_of_a_pixel_lies_between_those_of_the_four_blocks_around_it() {
+        let mut state = 5u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            1.0 + (state >> 16) as f32 / 65_536.0
+        };
+        // One block, whole blocks, and last ones that are wider.
+        for (w, h) in [(7, 9), (64, 40), (79, 47)] {
+            let (nx, ny) = ((w / BLOCK).max(1), (h / BLOCK).max(1));
+            let sd: Vec<f32> = (0..nx * ny).map(|_| next()).collect();
+            let mut noise = NoiseMap { nx, ny, sd: sd.clone(), ..NoiseMap::default() };
+            // Row by row, and some rows only.
+            for y in (0..h).chain([0, 3, h - 1, 1]) {
+                let row = noise.row(y as u32, w);
+                for x in 0..w {
+                    let ((x0, x1, u), (y0, y1, v)) = (between(x as u32, nx), between(y as u32, ny));
+                    let along = |y: usize| sd[y * nx + x0] + u * (sd[y * nx + x1] - sd[y * nx + x0]);
+                    let expected = along(y0) + v * (along(y1) - along(y0));
+                    assert!((row.at(x as u32) - expected).abs() < 1e-6, "{w} x {h} at {x}, {y}");
+                }
+            }
+        }
     }
 }
