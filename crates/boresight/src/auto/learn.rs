@@ -6,12 +6,16 @@
 
 use super::choose::Choice;
 use super::detection_statistics::{self, Found, RATE_WITHOUT_EFFECT};
+use super::digits::round;
 use super::evidence::{self, Evidence};
 use super::first_pass::FirstPass;
 use super::first_scans::PROBE_FRAMES;
 use super::noise::Motions;
 use super::request::Request;
-use super::{contest, if_fixed, initiation_score, lag, later_looks, moving, noise, pieces, speed, spot_threshold};
+use super::{
+    contest, decoys, if_fixed, initiation_score, lag, lasting, later_looks, moving, noise, pieces, speed,
+    spot_threshold,
+};
 use crate::camera::{CameraConfig, CameraPath};
 use crate::io::{LengthUnit, Replay};
 use crate::track::Report;
@@ -39,7 +43,7 @@ pub fn learn<E: From<Error>>(
     choice.change(set)?;
     let of_own = with_fixed(frames, choice, request)?;
     let begun = of_own.map_or_else(|| with_smaller(frames, choice, request, set), |begun| Ok(Some(begun)))?;
-    let begun = with_raised(begun, frames, choice, request, set)?;
+    let begun = with_decoys(begun, frames, choice, request, set)?;
     let mut assumed = choice.clone();
     let mut pass = match begun {
         Some((pass, at_once)) => learn_on(pass, at_once, frames, choice, request)?,
@@ -146,23 +150,43 @@ fn with_smaller<E: From<Error>>(
     Ok(pass.leave_out_below(kept_px, most).then_some((pass, at_once)))
 }
 
-/// Raises the threshold of spots that stand apart from the noise, and returns the first pass that has begun with the one chosen; what has begun already where other things are looked for.
-fn with_raised<E: From<Error>>(
+/// Looks at what false detections are like: raises the threshold of spots to where there are few, and says up to which score they last. Returns the first pass that has begun with the detector
+/// chosen; what has begun already where nothing is known of them.
+fn with_decoys<E: From<Error>>(
     begun: Option<(FirstPass, AtOnce)>,
     frames: &mut Replay,
     choice: &mut Choice,
     request: &Request,
-    set: impl FnMut(&mut Choice) -> Result<(), E>,
+    mut set: impl FnMut(&mut Choice) -> Result<(), E>,
 ) -> Result<Option<(FirstPass, AtOnce)>, E> {
-    if !matches!(choice.config.detector.threshold, ThresholdConfig::Spot(_)) {
+    let threshold = &choice.config.detector.threshold;
+    let is_spot = matches!(threshold, ThresholdConfig::Spot(_));
+    if !is_spot && !matches!(threshold, ThresholdConfig::Cfar(_) | ThresholdConfig::Isolated(_)) {
         return Ok(begun);
     }
     let (mut pass, mut at_once) = begun.map_or_else(|| first_pass(frames, &choice.config, request), Ok)?;
-    pass.take_on(frames, &mut at_once, PROBE_FRAMES);
+    // Where the detector may be changed by what is found, the others are not searched yet.
+    let most = if matches!(threshold, ThresholdConfig::Cfar(_)) { usize::MAX } else { PROBE_FRAMES };
+    pass.take_on(frames, &mut at_once, most);
+    // Where only what moves is reported its motion test holds back what stays, and a target that hovers is one.
+    let is_copied = choice.config.tracker.report == Report::All && lasting::is_copied(pass.scans());
+    if !is_spot && !is_copied {
+        return Ok(Some((pass, at_once)));
+    }
     let info = frames.info().clone();
+    let decoys = decoys::look(frames.ahead(), pass.scans(), &choice.config, &info, request.n_threads())?;
+    let Some(decoys) = decoys else { return Ok(Some((pass, at_once))) };
+    if is_copied && let Some((score, reason)) = lasting::score(&decoys, pass.scans()) {
+        choice.config.tracker.lasting_clutter_score = score;
+        choice.reasons.push(reason);
+        set(choice)?;
+    }
     let mut higher = choice.clone();
-    let raised = spot_threshold::raised(frames.ahead(), pass.scans(), &higher.config, &info, request.n_threads())?;
-    if let (Some((k, reason)), ThresholdConfig::Spot(spot)) = (raised, &mut higher.config.detector.threshold) {
+    if let ThresholdConfig::Spot(spot) = &mut higher.config.detector.threshold
+        && let Some((k, reason)) = spot_threshold::raised(&decoys, spot.k)
+    {
+        // The least contrast stays so many of the deviations that scores count in.
+        spot.min_contrast = round(spot.min_contrast * k / spot.k);
         spot.k = k;
         higher.reasons.push(reason);
         if stands(&mut higher, set)? {

@@ -38,7 +38,7 @@ const DIAMETER_PER_WIDTH: f64 = 2.45;
 const SPOT_PX: f64 = 10.0;
 
 /// Expected false detections for each blob seen: the tracks' existence weighs them, and a dim particle is worth ten.
-const FALSE_SHARE: f64 = 0.1;
+pub(super) const FALSE_SHARE: f64 = 0.1;
 /// Least and largest threshold, standard deviations.
 const THRESHOLDS: [f64; 2] = [2.0, 5.0];
 

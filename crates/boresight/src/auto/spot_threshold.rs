@@ -5,17 +5,14 @@
 //! How: of the scores of the first scans a valley is looked for, around which lie next to no detections. Those below it are noise if they score no higher than those of the other polarity do: what a codec
 //! makes of noise is as often dark as bright. Rims of bright spots are dark, and do not count. Where too few are left, as between many spots, those below are noise, or what a codec leaves behind a spot
 //! that moves, if they are the fewer the higher they score: other targets, fainter ones, are a hill of their own.
+//! Where there is no valley the threshold rises to where detections of the other polarity are as many as the false ones it was to let through: of noise that is not white, a normal law foretells too few.
 //! Symbols: s a threshold, N(s) how many detections score less; b(s) = N(s r) - N(s / r), r = [`WIDE`].
 //! Limits: faint targets of which most score less than the first threshold, or that are much fewer than the noise, go with it where there are bright ones.
 
+use super::decoys::Decoys;
 use super::digits::round;
-use super::looks;
-use super::spread::spread;
-use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
-use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};
+use super::particles::FALSE_SHARE;
 
-/// Frames looked at.
-const LOOKS: usize = 12;
 /// Half width of a valley, a factor: a score of few deviations wanders by a fifth.
 const WIDE: f64 = 1.25;
 /// Most detections in a valley for each of those on the side where there are fewer.
@@ -28,61 +25,44 @@ const COMPARED: f64 = 0.9;
 const BY_CHANCE: f64 = 2.0;
 /// Thresholds that are tried lie apart by this factor.
 const STEP: f64 = 1.05;
-/// Reach of the dark ring around a bright spot, in units of the spot's size, and how much brighter than the ring the spot is at least.
-const RING_REACH: f64 = 1.5;
-const RING_RATIO: f32 = 2.0;
+/// Beyond this a threshold is none of noise: the largest that a configuration takes.
+const MOST_K: f64 = 1e6;
 
-/// The threshold in a valley above the noise, with the reason, if there is one; `scans` are what the detector made of `frames`.
-/// # Errors
-/// Frames of more than one size or pixel type.
-pub(super) fn raised(
-    frames: &[Frame],
-    scans: &[Scan],
-    config: &Config,
-    info: &SourceInfo,
-    n_threads: usize,
-) -> Result<Option<(f64, String)>> {
-    let ThresholdConfig::Spot(spot) = &config.detector.threshold else { return Ok(None) };
-    let polarity = match spot.polarity {
-        Polarity::Bright => Polarity::Dark,
-        Polarity::Dark => Polarity::Bright,
-        Polarity::Both => return Ok(None),
-    };
-    let places: Vec<usize> = (0..frames.len().min(scans.len())).collect();
-    let places: Vec<usize> = spread(&places, LOOKS).copied().collect();
-    let mut other = config.detector.clone();
-    other.threshold = ThresholdConfig::Spot(SpotConfig { polarity, ..spot.clone() });
-    let of_other = looks::scans(&other, places.iter().map(|&k| &frames[k]), info, n_threads)?;
-    let own = || places.iter().map(|&k| &scans[k]);
-    let scores = own().flat_map(|scan| scan.detections.iter().map(|d| d.score)).collect();
-    let noise = own().zip(&of_other).flat_map(|(own, other)| without_rings(other, own, RING_REACH * spot.size_px));
-    let Some((k, share)) = valley(rising(scores), &rising(noise.collect()), spot.k) else { return Ok(None) };
+/// The threshold in a valley above the noise, or where noise is a small share of all, with the reason, if there is one.
+pub(super) fn raised(decoys: &Decoys, least: f64) -> Option<(f64, String)> {
+    let Decoys { own, other, .. } = decoys;
+    if let Some((k, share)) = valley(own, other, least) {
+        let reason = format!(
+            "Spots of less than {k} deviations (not {least}) are left out: {:.0} % of all, which score as noise does; hardly one scores as much.",
+            100.0 * share,
+        );
+        return Some((k, reason));
+    }
+    let k = where_few(own, other, least).filter(|k| *k > least)?;
     let reason = format!(
-        "Spots of less than {k} deviations (not {}) are left out: {:.0} % of all, which score as noise does; hardly one scores as much.",
-        spot.k,
-        100.0 * share,
+        "Spots of less than {k} deviations (not {least}) are left out: there are more false ones than white noise would make, by those of the other polarity {:.0} % of all.",
+        100.0 * other.len() as f64 / own.len() as f64,
     );
-    Ok(Some((k, reason)))
+    Some((k, reason))
 }
 
-/// The scores of a scan's detections but those within `reach_px` of a stronger one of the other polarity: its rim.
-fn without_rings(scan: &Scan, other: &Scan, reach_px: f64) -> Vec<f32> {
-    let mut others: Vec<&Detection> = other.detections.iter().collect();
-    others.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
-    let is_ring = |d: &Detection| {
-        let from = others.partition_point(|o| o.position.y < d.position.y - reach_px);
-        let mut near = others[from..].iter().take_while(|o| o.position.y <= d.position.y + reach_px);
-        near.any(|o| o.score > RING_RATIO * d.score && (o.position - d.position).norm() <= reach_px)
-    };
-    scan.detections.iter().filter(|d| !is_ring(d)).map(|d| d.score).collect()
+/// The least threshold from `least` on at which detections of the other polarity are [`FALSE_SHARE`] of the own at most.
+fn where_few(scores: &[f32], noise: &[f32], least: f64) -> Option<f64> {
+    let from = |of: &[f32], s: f64| (of.len() - of.partition_point(|v| f64::from(*v) < s)) as f64;
+    let most = f64::from(*scores.last()?);
+    let mut steps = (0..).map(|i| round(least * STEP.powi(i))).take_while(|s| *s < most.min(MOST_K));
+    steps.find(|s| {
+        let few = FALSE_SHARE * from(scores, *s);
+        from(noise, *s) <= few + BY_CHANCE * few.sqrt()
+    })
 }
 
 /// The deepest valley of the scores from `least` on, above 0, of which those below are noise by that of the other polarity, or by themselves where there is little, and the share of these.
-fn valley(scores: Vec<f32>, noise: &[f32], least: f64) -> Option<(f64, f64)> {
+fn valley(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
     let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
     let most = f64::from(*scores.last().filter(|_| least > 0.0)?);
     let at = |of: &[f32]| f64::from(of[(COMPARED * of.len() as f64) as usize]);
-    let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most);
+    let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most.min(MOST_K));
     let sides = steps.filter_map(|s| {
         let (n, between) = (below(s), below(s * WIDE) - below(s / WIDE));
         let fewer = n.min(scores.len() - n);
@@ -105,6 +85,7 @@ fn falls(scores: &[f32], least: f64) -> bool {
     counts.windows(2).all(|c| c[1] <= c[0] + BY_CHANCE * c[0].max(1.0).sqrt())
 }
 
+#[cfg(test)]
 fn rising(mut scores: Vec<f32>) -> Vec<f32> {
     scores.sort_unstable_by(f32::total_cmp);
     scores
@@ -131,23 +112,24 @@ mod tests {
         let dark = rising(tail(rng, 600, 2.5, 0.6));
         let noise = tail(rng, 3000, 2.5, 0.6);
         let bright = even(rng, 5000, 30.0, 80.0);
-        let (k, share) = valley(rising([&noise[..], &bright].concat()), &dark, 2.5).unwrap();
+        let (k, share) = valley(&rising([&noise[..], &bright].concat()), &dark, 2.5).unwrap();
         assert!(k > 7.0 && k < 30.0, "{k}");
         assert!((share - 0.375).abs() < 0.01, "{share}");
     }
 
     #[test]
-    fn a_rim_is_left_out_and_what_lies_farther_away_or_is_as_strong_is_not() {
-        let of = |places: &[(f64, f64, f32)]| {
-            let detection = |&(x, y, score): &(f64, f64, f32)| Detection {
-                score,
-                ..Detection::at(nalgebra::Vector2::new(x, y), nalgebra::Matrix2::identity())
-            };
-            Scan::default().with_detections(places.iter().map(detection).collect())
-        };
-        let bright = of(&[(50.0, 90.0, 30.0), (50.0, 20.0, 30.0), (100.0, 50.0, 4.0)]);
-        let dark = of(&[(60.0, 20.0, 5.0), (50.0, 31.0, 6.0), (50.0, 81.0, 7.0), (100.0, 52.0, 3.0)]);
-        assert_eq!(without_rings(&dark, &bright, 10.0), [6.0, 3.0]);
+    fn without_a_valley_it_rises_to_where_a_tenth_is_of_the_other_polarity() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(10);
+        let noise = tail(rng, 2000, 2.5, 2.0);
+        let other = rising(tail(rng, 2000, 2.5, 2.0));
+        let own = rising([&noise[..], &even(rng, 3000, 2.5, 60.0)].concat());
+        let k = where_few(&own, &other, 2.5).unwrap();
+        // 2000 e^(-(k - 2.5) / 2) = 0.1 (as many + 3000 (60 - k) / 57.5): k = 6.2, less by chance.
+        assert!((k - 6.1).abs() < 0.4, "{k}");
+        assert_eq!(where_few(&own, &other[..200], 2.5), Some(2.5), "few enough as it is");
+        assert_eq!(where_few(&[], &other, 2.5), None);
+        let decoys = Decoys { own, other, ..Decoys::default() };
+        assert_eq!(raised(&decoys, 2.5).map(|r| r.0), Some(k));
     }
 
     #[test]
@@ -156,16 +138,16 @@ mod tests {
         let dark = rising(tail(rng, 600, 2.5, 0.6));
         let noise = tail(rng, 3000, 2.5, 0.6);
         let faint = even(rng, 5000, 2.5, 40.0);
-        assert_eq!(valley(rising([&noise[..], &faint].concat()), &dark, 2.5), None);
+        assert_eq!(valley(&rising([&noise[..], &faint].concat()), &dark, 2.5), None);
         // Faint targets as many as the noise, and bright ones: what lies below the valley is no noise.
         let (faint, bright) = (even(rng, 3000, 2.5, 9.0), even(rng, 5000, 40.0, 80.0));
-        assert_eq!(valley(rising([&noise[..], &faint, &bright].concat()), &dark, 2.5), None);
+        assert_eq!(valley(&rising([&noise[..], &faint, &bright].concat()), &dark, 2.5), None);
         // The noise is told without the other polarity as well; what scores higher than that does is none, though it falls.
-        assert!(valley(rising([&noise[..], &bright].concat()), &[], 2.5).is_some());
-        assert_eq!(valley(rising([&noise[..], &bright].concat()), &rising(even(rng, 100, 2.5, 2.7)), 2.5), None);
+        assert!(valley(&rising([&noise[..], &bright].concat()), &[], 2.5).is_some());
+        assert_eq!(valley(&rising([&noise[..], &bright].concat()), &rising(even(rng, 100, 2.5, 2.7)), 2.5), None);
         // A hill of faint targets alone.
-        assert!(valley(rising([&bright[..], &even(rng, 1000, 6.0, 9.0)].concat()), &[], 2.5).is_none());
-        assert_eq!(valley(Vec::new(), &dark, 2.5), None);
-        assert_eq!(valley(rising([&noise[..], &bright].concat()), &dark, 0.0), None);
+        assert!(valley(&rising([&bright[..], &even(rng, 1000, 6.0, 9.0)].concat()), &[], 2.5).is_none());
+        assert_eq!(valley(&[], &dark, 2.5), None);
+        assert_eq!(valley(&rising([&noise[..], &bright].concat()), &dark, 0.0), None);
     }
 }

@@ -75,6 +75,8 @@ struct Walk<'c> {
     time: crate::Timestamp,
     side_px: [f64; 2],
     log_score: Option<f64>,
+    /// Where a detection last counted as evidence, px on the ground.
+    counted: Vector2<f64>,
     misses: u32,
     /// Others' detections around the place, and the area in which they were counted, px².
     around: [f64; 2],
@@ -149,12 +151,14 @@ impl Backward {
             time: seen(scan, d),
             side_px: [d.extent.width_px, d.extent.height_px],
             log_score: self.log_score(d).map(|s| s.ln),
+            counted: measurement.position,
             misses: 0,
             around: [0.0, (2.0 * AROUND_PX).powi(2)],
             noise_px2: self.noise_trace(d),
         };
         for (ground, scan, d) in own {
             walk.predict(seen(scan, d))?;
+            walk.counted = self.measurement(ground, d).position;
             walk.filter.correct(&self.measurement(ground, d)).ok()?;
             walk.follow(d);
         }
@@ -248,8 +252,11 @@ impl Walk<'_> {
         let (evidence, detection, innovation) = match likely {
             Some(l) if self.filter.correct(&l.measurement).is_ok() => {
                 self.misses = 0;
-                self.follow(&past.scan.detections[l.detection as usize]);
-                ((p_motion * p_detection / clutter).ln() + l.log_ratio, Some(l.detection), Some(l.innovation))
+                let d = &past.scan.detections[l.detection as usize];
+                self.follow(d);
+                let evidence = (p_motion * p_detection / clutter).ln() + l.log_ratio;
+                let told = config.evidence(d, &l.measurement.position, &mut self.counted, evidence);
+                (told, Some(l.detection), Some(l.innovation))
             }
             _ => {
                 self.misses += 1;

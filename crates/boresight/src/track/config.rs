@@ -83,6 +83,8 @@ pub struct TrackerConfig {
     /// Least score of a detection that initiates a track, 0 or more; weaker ones only continue tracks. 0 asks for no score: some
     /// detectors give negative ones.
     pub min_initiation_score: f64,
+    /// False detections that score less than this may stay where they are from scan to scan, 0 or more: a second one there says nothing of existence. 0: false detections are independent.
+    pub lasting_clutter_score: f64,
     /// Targets known before the first scan: confirmed tracks at once. None by default.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub initial_tracks: Vec<InitialTrackConfig>,
@@ -142,6 +144,7 @@ impl Default for TrackerConfig {
             motion_test: MotionTestConfig::default(),
             initiation: InitiationConfig::default(),
             min_initiation_score: 0.0,
+            lasting_clutter_score: 0.0,
             initial_tracks: Vec::new(),
             association_cost: AssociationCostConfig::default(),
             score_likelihood: None,
@@ -284,6 +287,12 @@ impl TrackerConfig {
         }
         self.merged_measurements.validate(&format!("{at}.merged-measurements"))?;
         self.reidentification.validate(&format!("{at}.reidentification"))?;
+        not_negative(
+            at,
+            "lasting-clutter-score",
+            self.lasting_clutter_score,
+            "0 takes false detections for independent",
+        )?;
         let mend = "10 reports nearly every track whole, 0 reports at once";
         not_negative(at, "retrospective-s", self.retrospective_s, mend)?;
         positive(at, "duplicate-s", self.duplicate_s, "half a second is usual")?;

@@ -8,6 +8,7 @@ use super::scan_table::Cov2;
 use crate::camera::CameraPath;
 use crate::record::TrackInnovation;
 use crate::{Detection, Timestamp};
+use nalgebra::Vector2;
 
 /// Tracks whose neighbourhoods are fetched together, so that the waits for memory overlap.
 pub(super) const BATCH: usize = 16;
@@ -23,6 +24,8 @@ pub(super) struct Track {
     pub duplicate_since_ns: Option<i64>,
     /// Where it was at its last detection, and how sure (standard deviation), px: the centre of its possible reach.
     pub last_place: [f64; 3],
+    /// Where it was when a detection last counted as evidence, px (`lasting.rs`).
+    pub counted: Vector2<f64>,
     /// How long before its scan's time that detection was seen, ns.
     pub last_age_ns: u64,
     /// Whether it was ever reported as confirmed.
@@ -96,7 +99,7 @@ mod tests {
     use super::*;
     use crate::track::step::initiate::from_initial_tracks;
     use crate::track::{InitialTrackConfig, TrackerConfig};
-    use nalgebra::{Matrix2, Vector2};
+    use nalgebra::Matrix2;
 
     #[test]
     fn the_level_of_the_scores_is_their_exponential_mean() {

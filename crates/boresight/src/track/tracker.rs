@@ -198,7 +198,11 @@ impl Tracker {
             {
                 cost.learn(&t.appearance, &scan.detections[j as usize]);
             }
-            let evidence = Evidence { hit: outcome.hit, likelihood_ratio: outcome.likelihood_ratio };
+            let likelihood_ratio = match outcome.detection.filter(|_| outcome.hit && !outcome.merged) {
+                Some(j) => t.evidence_of(config, &scan.detections[j as usize], outcome.likelihood_ratio, dt_s),
+                None => outcome.likelihood_ratio,
+            };
+            let evidence = Evidence { hit: outcome.hit, likelihood_ratio };
             save_time_alone(&mut t.history, &outcome, now, coast_s, secondary_s);
             t.history.note_alone(outcome.hit && !outcome.merged);
             let deleted = config.confirmation.decide(&mut t.history, evidence, now.ns) == Decision::Delete

@@ -89,6 +89,12 @@ impl ExistenceConfig {
         history.value *= survival / (1.0 + history.value * (1.0 - survival));
     }
 
+    /// Takes the prediction back: ψ ← ψ / p, in odds.
+    pub(super) fn undo_prediction(&self, history: &mut History, survival: f64) {
+        let left = (survival - history.value * (1.0 - survival)).max(f64::MIN_POSITIVE);
+        history.value = (history.value / left).clamp(ODDS.0, ODDS.1);
+    }
+
     /// Multiplies the odds by Λ of a scan and decides.
     pub(super) fn decide(&self, history: &mut History, likelihood_ratio: f64) -> Decision {
         // ψ ← ψ Λ / (1 − ψ + ψ Λ) is odds ← odds Λ.
@@ -131,6 +137,9 @@ mod tests {
         assert!((rule.existence(&history) - 2.0 / 3.0).abs() < 1e-12);
         rule.predict_existence(&mut history, 0.9);
         assert!((rule.existence(&history) - 0.6).abs() < 1e-12);
+        rule.undo_prediction(&mut history, 0.9);
+        assert!((rule.existence(&history) - 2.0 / 3.0).abs() < 1e-12);
+        rule.predict_existence(&mut history, 0.9);
         assert!((f64::from(rule.score(&history)) - 0.6).abs() < 1e-7);
     }
 

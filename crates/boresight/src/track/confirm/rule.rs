@@ -98,6 +98,14 @@ impl ConfirmationConfig {
         }
     }
 
+    /// Takes that prediction back.
+    #[inline]
+    pub(crate) fn undo_prediction(&self, history: &mut History, survival: f64) {
+        if let Self::Existence(c) = self {
+            c.undo_prediction(history, survival);
+        }
+    }
+
     /// Existence probability that weighs in the association: ψ, or 1 where the rule has none.
     #[inline]
     pub(crate) fn existence(&self, history: &History) -> f64 {

@@ -152,7 +152,8 @@ fn hit(growth: &Growth<'_>, leaf: &Hypothesis, pair: &Pair) -> Option<Hypothesis
         - (growth.clutter.at(d.position.x, d.position.y) * table.scores.clutter(pair.detection)).max(1e-200).ln();
     child.score += log_ratio;
     let likelihood_ratio = log_ratio.clamp(-100.0, 100.0).exp();
-    let evidence = Evidence { hit: true, likelihood_ratio };
+    let told = child.track.evidence_of(config, d, likelihood_ratio, growth.context.dt_s);
+    let evidence = Evidence { hit: true, likelihood_ratio: told };
     if config.confirmation.decide(&mut child.track.history, evidence, scan.time.ns) == Decision::Delete {
         return None;
     }
@@ -201,6 +202,7 @@ pub(super) fn initiate(growth: &Growth<'_>, trees: &mut Vec<Tree>) {
                 appearance: Appearance::of(d),
                 duplicate_since_ns: None,
                 last_place: place_of(d, &noise),
+                counted: d.position,
                 last_age_ns: age_ns,
                 reported: false,
                 identified: false,

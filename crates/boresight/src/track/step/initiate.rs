@@ -129,6 +129,7 @@ pub(in crate::track) fn from_initial_tracks(
             appearance: Appearance { size: initial.size_px, sum: 0.0, class: None },
             duplicate_since_ns: None,
             last_place: [k.mean[0], k.mean[2], spread],
+            counted: Vector2::new(k.mean[0], k.mean[2]),
             last_age_ns: 0,
             reported: true,
             identified: true,
@@ -162,8 +163,11 @@ fn begin(
     if age_ns > 0 && filter.predict(seconds(age_ns)).is_err() {
         return;
     }
-    let likelihood_ratio =
+    let mut likelihood_ratio =
         likelihood_ratio * context.new_target_score_ratio(first.and_then(|f| f.score), detection as u32);
+    if first.is_some_and(|f| config.says_nothing_new(d, &d.position, &f.position)) {
+        likelihood_ratio = likelihood_ratio.min(1.0);
+    }
     let n_points = if first.is_some() { 2 } else { 1 };
     let clutter_density = clutter.at(d.position.x, d.position.y);
     let mut track = Track {
@@ -173,6 +177,7 @@ fn begin(
         appearance: Appearance::of(d),
         duplicate_since_ns: None,
         last_place: place_of(d, &noise),
+        counted: d.position,
         last_age_ns: age_ns,
         reported: false,
         identified: false,

@@ -137,7 +137,7 @@ pub struct SpotConfig {
     pub k: f64,
     /// Which contrast is looked for.
     pub polarity: Polarity,
-    /// Least response, counts, 0...: keeps a quiet background from calling every step a target.
+    /// Least response, counts, 0...: keeps a quiet background from calling every step a target. Scores count in a `k`-th of it at least.
     pub min_contrast: f64,
     /// Side of the surroundings in units of `size-px`, 1..=10. 1 suits crowded frames, 2 or more dim single targets.
     pub surround: f64,

@@ -2,7 +2,7 @@
 //!
 //! Response D = S - B: S the frame smoothed by a box applied twice (close to a Gaussian of the optics), B the mean of a wider
 //! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
-//! on a grid) above its surroundings. Position: centroid of the positive part of D in a disc of radius size/2 that is moved until
+//! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc of radius size/2 that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
 //! edge, so that positions are not drawn to whole pixels; of two positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
@@ -248,9 +248,14 @@ impl SpotDetector {
             }
         }
         let (median, deviation) = self.grid.at(x as f64, y as f64);
-        // A response without spread (an empty frame but for the target) is as sure as f32 can say.
-        let score = ((f64::from(v) - median) / deviation.max(1e-6)).min(1e9) as f32;
+        let score = ((f64::from(v) - median) / deviation.max(self.least_deviation())).min(1e9) as f32;
         Spot { position: c, mass, pull, score, peak: (x, y) }
+    }
+
+    /// Least deviation that a score counts in, counts: that of which the least contrast is k. Of a ground without noise, or of one that a codec has flattened in most places, half of the
+    /// responses are 0; there a score is the contrast in units that stay the same from frame to frame. Without a least contrast it is what f32 can say.
+    fn least_deviation(&self) -> f64 {
+        (self.config.min_contrast / self.config.k).max(1e-6)
     }
 
     /// Of spots closer than size / 2 the strongest stays.

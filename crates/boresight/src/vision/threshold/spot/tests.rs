@@ -164,11 +164,14 @@ fn a_response_below_the_least_contrast_is_none() {
         let config = SpotConfig { min_contrast: least, ..Default::default() };
         assert_eq!(detect(&frame(&[(30.0, 20.0, height)]), &config, (1.0, 0.0)).len(), n, "{height}");
     }
-    // A frame without spread scores by the least deviation there is, 1e-6.
-    let found = detect(&frame(&[(30.0, 20.0, 10.0)]), &SpotConfig::default(), (1.0, 0.0));
-    assert!((f64::from(found[0].score) * 1e-6 / least - 1.0).abs() < 1e-3, "{} {least}", found[0].score);
-    let found = detect(&frame(&[(30.0, 20.0, 1e6)]), &SpotConfig::default(), (1.0, 0.0));
-    assert_eq!(found[0].score, 1e9);
+    // A frame without spread scores by the least contrast, which is k deviations, and without one by the least deviation there is, 1e-6.
+    let score = |height: f64, min_contrast: f64| {
+        let config = SpotConfig { min_contrast, ..Default::default() };
+        f64::from(detect(&frame(&[(30.0, 20.0, height)]), &config, (1.0, 0.0))[0].score)
+    };
+    assert!((score(10.0, 0.5) / (6.0 * least / 0.5) - 1.0).abs() < 1e-3, "{least}");
+    assert!((score(10.0, 0.0) * 1e-6 / least - 1.0).abs() < 1e-3, "{least}");
+    assert_eq!(score(1e6, 0.0), 1e9);
 }
 
 #[test]
