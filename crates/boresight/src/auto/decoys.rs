@@ -5,11 +5,13 @@
 //! Limits: what is dark and no noise, gaps between bright things and shadows, counts as noise.
 
 use super::looks;
+use super::near::Near;
+use super::particles::DIAMETER_PER_WIDTH;
 use super::spread::spread;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::isolated::IsolatedConfig;
-use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
-use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};
+use crate::vision::threshold::{SpotConfig, ThresholdConfig};
+use crate::{Config, Frame, Result, Scan, SourceInfo};
 
 /// Frames looked at, two and two.
 const LOOKS: usize = 12;
@@ -26,23 +28,18 @@ pub struct Decoys {
     pub own: Vec<f32>,
     /// Of the other one.
     pub other: Vec<f32>,
-    /// Of these the ones in the first frame of a pair, and those of them that stay to the second.
-    pub first: Vec<f32>,
+    /// How many of these are in the first frame of a pair, and the scores of those that stay to the second.
+    pub n_first: usize,
     pub lasting: Vec<f32>,
 }
 
 /// The detector for the other polarity, where it has one.
 fn other_polarity(threshold: &ThresholdConfig) -> Option<ThresholdConfig> {
-    let other = |polarity: Polarity| match polarity {
-        Polarity::Bright => Some(Polarity::Dark),
-        Polarity::Dark => Some(Polarity::Bright),
-        Polarity::Both => None,
-    };
     Some(match threshold {
-        ThresholdConfig::Spot(c) => ThresholdConfig::Spot(SpotConfig { polarity: other(c.polarity)?, ..c.clone() }),
-        ThresholdConfig::Cfar(c) => ThresholdConfig::Cfar(CfarConfig { polarity: other(c.polarity)?, ..c.clone() }),
+        ThresholdConfig::Spot(c) => ThresholdConfig::Spot(SpotConfig { polarity: c.polarity.opposite()?, ..c.clone() }),
+        ThresholdConfig::Cfar(c) => ThresholdConfig::Cfar(CfarConfig { polarity: c.polarity.opposite()?, ..c.clone() }),
         ThresholdConfig::Isolated(c) => {
-            ThresholdConfig::Isolated(IsolatedConfig { polarity: other(c.polarity)?, ..c.clone() })
+            ThresholdConfig::Isolated(IsolatedConfig { polarity: c.polarity.opposite()?, ..c.clone() })
         }
         _ => return None,
     })
@@ -71,44 +68,42 @@ pub fn look(
 
 /// The same, of scans of both polarities at these places in time.
 fn of_scans(places: &[usize], own: &[&Scan], other: &[Scan]) -> Decoys {
-    let noise: Vec<Vec<&Detection>> = own.iter().zip(other).map(|(own, other)| without_rims(other, own)).collect();
-    let pairs = || {
-        let next = |k: &[usize]| k[1] == k[0] + 1;
-        noise.windows(2).zip(places.windows(2)).filter(move |(_, k)| next(k)).map(|(pair, _)| pair)
-    };
-    let scores = |found: &mut dyn Iterator<Item = &Detection>| {
-        let mut scores: Vec<f32> = found.map(|d| d.score).collect();
+    let rising = |mut scores: Vec<f32>| {
         scores.sort_unstable_by(f32::total_cmp);
         scores
     };
-    let stays = |d: &Detection, next: &[&Detection]| next.iter().any(|n| (n.position - d.position).norm() <= STAYS_PX);
+    let noise: Vec<Scan> = own.iter().zip(other).map(|(own, other)| without_rims(other, own)).collect();
+    let (mut n_first, mut lasting) = (0, Vec::new());
+    for (pair, _) in noise.windows(2).zip(places.windows(2)).filter(|(_, k)| k[1] == k[0] + 1) {
+        let next = Near::of(&pair[1]);
+        n_first += pair[0].detections.len();
+        let stays = pair[0].detections.iter().filter(|d| next.nearest(d, STAYS_PX).is_some());
+        lasting.extend(stays.map(|d| d.score));
+    }
     Decoys {
-        own: scores(&mut own.iter().flat_map(|scan| &scan.detections)),
-        other: scores(&mut noise.iter().flatten().copied()),
-        first: scores(&mut pairs().flat_map(|pair| pair[0].iter().copied())),
-        lasting: scores(&mut pairs().flat_map(|p| p[0].iter().copied().filter(|d| stays(d, &p[1])))),
+        own: rising(own.iter().flat_map(|scan| &scan.detections).map(|d| d.score).collect()),
+        other: rising(noise.iter().flat_map(|scan| &scan.detections).map(|d| d.score).collect()),
+        n_first,
+        lasting: rising(lasting),
     }
 }
 
-/// The detections of a scan but those near a stronger one of the other polarity: its rim.
-fn without_rims<'s>(scan: &'s Scan, other: &Scan) -> Vec<&'s Detection> {
-    let mut others: Vec<&Detection> = other.detections.iter().collect();
-    others.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
-    // A spot with its soft edge is 2.45 times as wide as at half of its height.
-    let reach = |o: &Detection| RIM_REACH * 2.45 * (o.extent.width_px * o.extent.height_px).sqrt();
-    let farthest = others.iter().map(|o| reach(o)).fold(0.0, f64::max);
-    let is_rim = |d: &Detection| {
-        let from = others.partition_point(|o| o.position.y < d.position.y - farthest);
-        let mut near = others[from..].iter().take_while(|o| o.position.y <= d.position.y + farthest);
-        near.any(|o| o.score > RIM_RATIO * d.score && (o.position - d.position).norm() <= reach(o))
-    };
-    scan.detections.iter().filter(|d| !is_rim(d)).collect()
+/// A scan without the detections near a stronger one of the other polarity: its rim.
+fn without_rims(scan: &Scan, other: &Scan) -> Scan {
+    let near = Near::of(scan);
+    let mut is_rim = vec![false; near.len()];
+    for o in &other.detections {
+        let reach_px = RIM_REACH * DIAMETER_PER_WIDTH * (o.extent.width_px * o.extent.height_px).sqrt();
+        near.within(o, reach_px, |j, _| is_rim[j] |= o.score > RIM_RATIO * near.get(j).score);
+    }
+    let kept = scan.detections.iter().zip(&is_rim).filter(|(_, rim)| !**rim);
+    Scan::at(scan.index, scan.time).with_detections(kept.map(|(d, _)| d.clone()).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Extent;
+    use crate::{Detection, Extent};
 
     #[test]
     fn a_rim_is_left_out_and_what_lies_farther_away_or_is_as_strong_is_not() {
@@ -122,7 +117,12 @@ mod tests {
         };
         let bright = of(&[(50.0, 90.0, 30.0), (50.0, 20.0, 30.0), (100.0, 50.0, 4.0)]);
         let dark = of(&[(60.0, 20.0, 5.0), (50.0, 31.0, 6.0), (50.0, 81.0, 7.0), (100.0, 52.0, 3.0)]);
-        let left: Vec<f32> = without_rims(&dark, &bright).iter().map(|d| d.score).collect();
+        let left: Vec<f32> = without_rims(&dark, &bright).detections.iter().map(|d| d.score).collect();
         assert_eq!(left, [6.0, 3.0]);
+        // In the next frame one of those is half a pixel away, the other is not there; the frame after that is no neighbour.
+        let next = of(&[(50.0, 31.5, 6.0)]);
+        let decoys = of_scans(&[3, 4, 9], &[&bright, &bright, &bright], &[dark, next.clone(), next]);
+        assert_eq!((decoys.n_first, &decoys.lasting[..]), (2, &[6.0f32][..]));
+        assert_eq!((decoys.own.len(), &decoys.other[..]), (9, &[3.0f32, 6.0, 6.0, 6.0][..]));
     }
 }

@@ -8,6 +8,7 @@
 
 use super::decoys::Decoys;
 use super::digits::round;
+use super::near::Near;
 use crate::{Detection, Scan};
 
 /// Share of the own detections that are there again to [`COPIED_PX`]: of those measured anew, with an error of 0.05 px in each axis, 4 %.
@@ -24,30 +25,11 @@ const MOST: f64 = 0.75;
 /// The brightest of what a codec leaves behind score so many times as much.
 const BRIGHTEST: f64 = 2.0;
 
-/// Detections of a scan by their height in the frame.
-struct ByHeight<'s>(Vec<&'s Detection>);
-
-impl<'s> ByHeight<'s> {
-    fn of(scan: &'s Scan) -> Self {
-        let mut all: Vec<&Detection> = scan.detections.iter().collect();
-        all.sort_by(|a, b| a.position.y.total_cmp(&b.position.y));
-        Self(all)
-    }
-
-    /// The nearest one within so many pixels of another, and how far away it is.
-    fn nearest(&self, d: &Detection, within_px: f64) -> Option<(usize, f64)> {
-        let from = self.0.partition_point(|p| p.position.y < d.position.y - within_px);
-        let near = self.0[from..].iter().take_while(|p| p.position.y <= d.position.y + within_px);
-        let far = near.enumerate().map(|(i, p)| (from + i, (p.position - d.position).norm()));
-        far.filter(|(_, far)| *far <= within_px).min_by(|a, b| a.1.total_cmp(&b.1))
-    }
-}
-
 /// Whether the detections of the scans are copies of those before, in part: nothing else needs to be looked at.
 pub fn is_copied(scans: &[Scan]) -> bool {
     let n: usize = scans.iter().rev().skip(1).map(|s| s.detections.len()).sum();
     let copied = |pair: &[Scan]| {
-        let next = ByHeight::of(&pair[1]);
+        let next = Near::of(&pair[1]);
         pair[0].detections.iter().filter(|d| next.nearest(d, COPIED_PX).is_some()).count()
     };
     scans.windows(2).map(copied).sum::<usize>() as f64 > COPIED_SHARE * n as f64
@@ -84,13 +66,13 @@ fn passing(scans: &[Scan]) -> Vec<f32> {
     let mut scores = Vec::new();
     let mut followed: Vec<Followed<'_>> = Vec::new();
     for (k, scan) in scans.iter().enumerate() {
-        let now = ByHeight::of(scan);
-        let mut is_new = vec![true; now.0.len()];
+        let now = Near::of(scan);
+        let mut is_new = vec![true; now.len()];
         for f in &mut followed {
             f.missed += 1;
             if let Some((j, far_px)) = now.nearest(f.last, width(f.last)) {
                 is_new[j] = false;
-                f.go_on(now.0[j], far_px);
+                f.go_on(now.get(j), far_px);
             }
         }
         followed.retain(|f| {
@@ -100,7 +82,7 @@ fn passing(scans: &[Scan]) -> Vec<f32> {
             }
             !vanished
         });
-        let new = now.0.iter().zip(&is_new).filter(|(_, new)| **new);
+        let new = scan.detections.iter().zip(&is_new).filter(|(_, new)| **new);
         followed.extend(new.map(|(d, _)| Followed::begin(d, k >= STAYS_FRAMES)));
     }
     scores.sort_unstable_by(f32::total_cmp);
@@ -110,13 +92,13 @@ fn passing(scans: &[Scan]) -> Vec<f32> {
 /// The score that lasting false detections hardly reach, with the reason, if there are any; `scans` are of successive frames.
 pub fn score(decoys: &Decoys, scans: &[Scan]) -> Option<(f64, String)> {
     let at = |of: &[f32], share: f64| of[((share * of.len() as f64) as usize).min(of.len() - 1)];
-    let Decoys { other, first, lasting, .. } = decoys;
+    let Decoys { other, n_first, lasting, .. } = decoys;
     // Without any of the other polarity there are no false detections that could last: what blinks in a picture without noise is what it seems.
     if other.is_empty() {
         return None;
     }
     let passing = passing(scans);
-    let last = lasting.len() >= FEWEST && lasting.len() as f64 >= LASTING_SHARE * first.len() as f64;
+    let last = lasting.len() >= FEWEST && lasting.len() as f64 >= LASTING_SHARE * *n_first as f64;
     let of_other = last.then(|| at(lasting, NEARLY_ALL));
     let of_own = (passing.len() >= FEWEST).then(|| at(&passing, MOST));
     let score = round(BRIGHTEST * of_other.into_iter().chain(of_own).map(f64::from).reduce(f64::max)?);
@@ -128,7 +110,7 @@ pub fn score(decoys: &Decoys, scans: &[Scan]) -> Option<(f64, String)> {
          One that scores less than {score} is no evidence where it stays; a target is told by its motion, or by being brighter (tracker.lasting-clutter-score).",
         passing.len(),
         lasting.len(),
-        first.len(),
+        n_first,
     );
     Some((score, reason))
 }
@@ -181,7 +163,7 @@ mod tests {
     fn the_score_is_twice_what_either_kind_reaches_and_none_where_there_are_few() {
         let decoys = |lasting: &[f32]| Decoys {
             other: vec![3.0; 40],
-            first: vec![3.0; 20],
+            n_first: 20,
             lasting: lasting.to_vec(),
             ..Decoys::default()
         };

@@ -54,11 +54,8 @@ pub(super) fn polarity(
     n_threads: usize,
 ) -> Result<Option<(Polarity, String)>> {
     let ThresholdConfig::Isolated(isolated) = &config.detector.threshold else { return Ok(None) };
-    let (other, word) = match isolated.polarity {
-        Polarity::Bright => (Polarity::Dark, "dark"),
-        Polarity::Dark => (Polarity::Bright, "bright"),
-        Polarity::Both => return Ok(None),
-    };
+    let Some(other) = isolated.polarity.opposite() else { return Ok(None) };
+    let word = if other == Polarity::Dark { "dark" } else { "bright" };
     let area_px2 = (info.width * info.height) as f64;
     // What the run would not see is not looked for.
     let mut detector = spots::detector(other, info);

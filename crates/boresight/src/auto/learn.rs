@@ -161,15 +161,17 @@ fn with_decoys<E: From<Error>>(
 ) -> Result<Option<(FirstPass, AtOnce)>, E> {
     let threshold = &choice.config.detector.threshold;
     let is_spot = matches!(threshold, ThresholdConfig::Spot(_));
-    if !is_spot && !matches!(threshold, ThresholdConfig::Cfar(_) | ThresholdConfig::Isolated(_)) {
+    // Where only what moves is reported its motion test holds back what stays, and a target that hovers is one.
+    let may_last = choice.config.tracker.report == Report::All
+        && matches!(threshold, ThresholdConfig::Spot(_) | ThresholdConfig::Cfar(_) | ThresholdConfig::Isolated(_));
+    if !is_spot && !may_last {
         return Ok(begun);
     }
     let (mut pass, mut at_once) = begun.map_or_else(|| first_pass(frames, &choice.config, request), Ok)?;
     // Where the detector may be changed by what is found, the others are not searched yet.
     let most = if matches!(threshold, ThresholdConfig::Cfar(_)) { usize::MAX } else { PROBE_FRAMES };
     pass.take_on(frames, &mut at_once, most);
-    // Where only what moves is reported its motion test holds back what stays, and a target that hovers is one.
-    let is_copied = choice.config.tracker.report == Report::All && lasting::is_copied(pass.scans());
+    let is_copied = may_last && lasting::is_copied(pass.scans());
     if !is_spot && !is_copied {
         return Ok(Some((pass, at_once)));
     }

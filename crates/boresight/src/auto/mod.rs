@@ -33,6 +33,7 @@ mod later_looks;
 mod learn;
 mod looks;
 mod moving;
+mod near;
 mod noise;
 mod open;
 mod particles;

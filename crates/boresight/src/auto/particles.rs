@@ -32,7 +32,7 @@ const ASSUMED_WIDTH_PX: f64 = 3.0;
 /// Widest blob taken for a particle, px.
 const WIDEST_PX: u32 = 40;
 /// A soft-edged spot's diameter in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
-const DIAMETER_PER_WIDTH: f64 = 2.45;
+pub(super) const DIAMETER_PER_WIDTH: f64 = 2.45;
 
 /// Things of less across are spots, not cells, px.
 const SPOT_PX: f64 = 10.0;

@@ -40,7 +40,7 @@ pub(super) fn raised(decoys: &Decoys, least: f64) -> Option<(f64, String)> {
     }
     let k = where_few(own, other, least).filter(|k| *k > least)?;
     let reason = format!(
-        "Spots of less than {k} deviations (not {least}) are left out: there are more false ones than white noise would make, by those of the other polarity {:.0} % of all.",
+        "Spots of less than {k} deviations (not {least}) are left out: there are more false ones than white noise would make, for a hundred of all {:.0} of the other polarity.",
         100.0 * other.len() as f64 / own.len() as f64,
     );
     Some((k, reason))
@@ -86,16 +86,15 @@ fn falls(scores: &[f32], least: f64) -> bool {
 }
 
 #[cfg(test)]
-fn rising(mut scores: Vec<f32>) -> Vec<f32> {
-    scores.sort_unstable_by(f32::total_cmp);
-    scores
-}
-
-#[cfg(test)]
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    fn rising(mut scores: Vec<f32>) -> Vec<f32> {
+        scores.sort_unstable_by(f32::total_cmp);
+        scores
+    }
 
     /// Scores whose excess over `from` falls off exponentially, with a mean of `mean`.
     fn tail(rng: &mut ChaCha8Rng, n: usize, from: f32, mean: f32) -> Vec<f32> {

@@ -17,7 +17,8 @@ impl TrackerConfig {
     #[inline]
     pub(super) fn says_nothing_new(&self, d: &Detection, place: &Vector2<f64>, counted: &Vector2<f64>) -> bool {
         let width2 = d.extent.width_px * d.extent.height_px;
-        f64::from(d.score) < self.lasting_clutter_score && (place - counted).norm_squared() <= width2
+        let is_clutter = self.lasting_clutter_score > 0.0 && f64::from(d.score) < self.lasting_clutter_score;
+        is_clutter && (place - counted).norm_squared() <= width2
     }
 
     /// ln Λ of a scan by whether its detection is news; where it is, it is what later ones are compared with.
@@ -47,9 +48,6 @@ impl Track {
         likelihood_ratio: f64,
         dt_s: f64,
     ) -> f64 {
-        if config.lasting_clutter_score <= 0.0 {
-            return likelihood_ratio;
-        }
         if config.says_nothing_new(detection, &detection.position, &self.counted) {
             config.confirmation.undo_prediction(&mut self.history, config.confirmation.survival(dt_s));
             return likelihood_ratio.min(1.0);
@@ -90,7 +88,11 @@ mod tests {
 
     #[test]
     fn what_stays_and_scores_as_lasting_clutter_does_is_no_evidence() {
-        assert!(reported(&config(0.0), 5.0, 0.0, 0.0) > 50);
+        // Some detectors give scores below 0.
+        for score in [5.0, -5.0] {
+            assert_eq!(reported(&config(0.0), score, 0.0, 0.0), reported(&config(0.0), 9.0, 0.0, 0.0));
+            assert!(reported(&config(0.0), score, 0.0, 0.0) > 50);
+        }
         for jitter_px in [0.0, 0.1] {
             assert_eq!(reported(&config(8.0), 5.0, 0.0, jitter_px), 0);
         }

@@ -28,6 +28,15 @@ pub enum Polarity {
 }
 
 impl Polarity {
+    /// The other one; of either there is none.
+    pub(crate) fn opposite(self) -> Option<Self> {
+        match self {
+            Self::Bright => Some(Self::Dark),
+            Self::Dark => Some(Self::Bright),
+            Self::Both => None,
+        }
+    }
+
     /// Whether `side` is looked for.
     pub fn has(self, side: Side) -> bool {
         matches!((self, side), (Self::Both, _) | (Self::Bright, Side::Bright) | (Self::Dark, Side::Dark))
