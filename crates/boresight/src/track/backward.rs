@@ -354,13 +354,10 @@ impl Walk<'_> {
                 kinematics.cov[(i, v)] = -kinematics.cov[(i, v)];
             }
         }
+        self.back.config.correlated_error.add_to(&mut kinematics);
         let [width_px, height_px] = self.side_px;
-        let extent = Extent {
-            left_px: kinematics.mean[0] - 0.5 * width_px,
-            top_px: kinematics.mean[2] - 0.5 * height_px,
-            width_px,
-            height_px,
-        };
+        let (left_px, top_px) = (kinematics.mean[0] - 0.5 * width_px, kinematics.mean[2] - 0.5 * height_px);
+        let extent = Extent { left_px, top_px, width_px, height_px };
         let status = if detection.is_some() { TrackStatus::Confirmed } else { TrackStatus::Coasting };
         // One that is confirmed by its hits is a target: nothing less is known of it.
         let score = self.back.existence.as_ref().map_or(1.0, |e| e.confirm_probability) as f32;

@@ -11,6 +11,7 @@
 mod cut;
 pub(in crate::track) mod motion;
 
+use super::correlated_error::CorrelatedErrorConfig;
 use super::filter::{AccelerationNoise, OrnsteinUhlenbeckConfig};
 use crate::validate::{check, not_negative};
 use crate::{Error, ErrorKind, Result, Timestamp};
@@ -28,6 +29,8 @@ pub struct SmoothConfig {
     pub density_per_height2_per_s3: f64,
     /// Velocities that are forgotten, in the place of the acceleration.
     pub forgetting: Option<OrnsteinUhlenbeckConfig>,
+    /// What the tracker added to the covariances of the rows: taken out before, added after.
+    pub correlated_error: CorrelatedErrorConfig,
     /// Which rows tell of which.
     pub method: SmoothMethod,
 }
@@ -50,6 +53,7 @@ impl Default for SmoothConfig {
             acceleration: AccelerationNoise::default(),
             density_per_height2_per_s3: 0.0,
             forgetting: None,
+            correlated_error: CorrelatedErrorConfig::default(),
             method: SmoothMethod::Rts,
         }
     }
@@ -64,6 +68,7 @@ impl SmoothConfig {
         let per_height2 = self.density_per_height2_per_s3;
         not_negative(at, "acceleration-density-per-height2-per-s3", per_height2, "as in the tracker")?;
         self.forgetting.as_ref().map_or(Ok(()), |c| c.validate(&format!("{at}.forgetting")))?;
+        self.correlated_error.validate(&format!("{at}.correlated-error"))?;
         match self.method {
             SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
             _ => Ok(()),
@@ -91,6 +96,10 @@ impl SmoothConfig {
 /// Times that do not ascend; a covariance that cannot be factored.
 pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &SmoothConfig) -> Result<usize> {
     config.validate("smooth")?;
+    let added = config.correlated_error;
+    if added != CorrelatedErrorConfig::default() {
+        beliefs.iter_mut().for_each(|b| added.take_from(b));
+    }
     let mut scans = scans_of(times, beliefs)?;
     let (mut first, mut n_parts) = (0, 0);
     while first < scans.len() {
@@ -103,6 +112,7 @@ pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &S
     }
     for (belief, scan) in beliefs.iter_mut().zip(&scans) {
         *belief = scan.belief;
+        added.add_to(belief);
     }
     Ok(n_parts)
 }

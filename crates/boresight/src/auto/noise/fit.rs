@@ -9,7 +9,7 @@
 //! wrong association costs a bounded amount and is not filtered in; after two in a row the series begins anew there. A weak prior (a factor of [`PRIOR_FACTOR`] is one deviation) holds what the data do not
 //! tell: the height's part where all boxes are alike.
 //! Symbols: ν innovation (px), S its variance (px²), θ the logarithms of c, e, f, a, b.
-//! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest.
+//! Limits: errors that last for several scans are no white noise; they count as motion, and the innovations stay honest ([`super::correlated`] asks how long they last).
 
 use super::forgotten::{Passed, Persistence};
 use crate::track::AccelerationNoise;
@@ -65,17 +65,17 @@ pub fn fit(series: &[Vec<Step>], before: Noise, least_density: f64, speed_std: f
     noise_of(most_probable(start, [least, [f64::INFINITY; 5]], likelihood))
 }
 
-/// The five numbers that make the logarithm of a likelihood and of the prior around `start` largest, between the lowest and the highest of each; the first is a factor on stated variances.
-pub(super) fn most_probable(
-    start: [f64; 5],
-    edges: [[f64; 5]; 2],
-    log_likelihood: impl Fn([f64; 5]) -> f64,
-) -> [f64; 5] {
+/// The numbers that make the logarithm of a likelihood and of the prior around `start` largest, between the lowest and the highest of each; the first is a factor on stated variances.
+pub(super) fn most_probable<const N: usize>(
+    start: [f64; N],
+    edges: [[f64; N]; 2],
+    log_likelihood: impl Fn([f64; N]) -> f64,
+) -> [f64; N] {
     let edges = edges.map(|edge| edge.map(f64::ln));
-    let start: [f64; 5] = std::array::from_fn(|i| start[i].ln().clamp(edges[0][i], edges[1][i]));
-    let deviations = [SCALE_PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR, PRIOR_FACTOR].map(f64::ln);
-    let cost = |x: &[f64; 5]| {
-        let prior: f64 = (0..5).map(|i| ((x[i] - start[i]) / deviations[i]).powi(2)).sum();
+    let start: [f64; N] = std::array::from_fn(|i| start[i].ln().clamp(edges[0][i], edges[1][i]));
+    let deviation = |i: usize| f64::ln(if i == 0 { SCALE_PRIOR_FACTOR } else { PRIOR_FACTOR });
+    let cost = |x: &[f64; N]| {
+        let prior: f64 = (0..N).map(|i| ((x[i] - start[i]) / deviation(i)).powi(2)).sum();
         0.5 * prior - log_likelihood(x.map(f64::exp))
     };
     search(start, STEPS, edges, cost).map(f64::exp)
@@ -102,6 +102,11 @@ pub fn fit_factors(
 }
 
 impl Noise {
+    /// Variance of a measurement that is stated with that variance, px², of a box of that height, px.
+    pub fn variance(&self, stated: f64, height_px: f64) -> f64 {
+        self.scale * stated + self.extra_px * self.extra_px + (self.extra_per_height * height_px).powi(2)
+    }
+
     /// With these factors on R and on q.
     pub fn times(&self, [r, q]: [f64; 2]) -> Self {
         Self {
@@ -156,15 +161,54 @@ fn noise_of([scale, extra_px, extra_per_height, density, density_per_height2]: [
     Noise { scale, extra_px, extra_per_height, density, density_per_height2 }
 }
 
+/// The belief of one axis, as far as a likelihood asks.
+pub(super) trait Scalar: Copy {
+    /// What a measurement is expected to be, px, and the variance of that, px².
+    fn expected(&self) -> [f64; 2];
+    /// Takes a measurement of that variance.
+    fn correct(&mut self, z: f64, r: f64);
+}
+
+impl Scalar for Axis {
+    fn expected(&self) -> [f64; 2] {
+        [self.x, self.xx]
+    }
+
+    fn correct(&mut self, z: f64, r: f64) {
+        Axis::correct(self, z, r);
+    }
+}
+
 /// Logarithm of the likelihood of all series.
 pub(super) fn log_likelihood(series: &[Vec<Step>], noise: &Noise, motion: Motion, area_px2: f64) -> f64 {
+    let begin = |speed_std: f64| move |z: f64, r: f64| Axis { x: z, v: 0.0, xx: r, xv: 0.0, vv: speed_std * speed_std };
+    match motion {
+        Motion::Accelerated(speed_std) => of_innovations(series, noise, area_px2, begin(speed_std), |axes, t, q| {
+            let step = step_noise(AccelerationNoise::Continuous(q), t);
+            axes.iter_mut().for_each(|axis| axis.predict(t, &step));
+        }),
+        Motion::Persistent(p) => {
+            // Most scans are as far apart as the two before.
+            let mut passed = Passed::NEVER;
+            of_innovations(series, noise, area_px2, begin(p.speed_std_px_per_s), |axes, t, _| {
+                if passed.dt_s != t {
+                    passed = p.after(t);
+                }
+                axes.iter_mut().for_each(|axis| passed.predict(axis));
+            })
+        }
+    }
+}
+
+/// The same with beliefs that `begin` at a measurement and its variance, and that `predict` takes over a time (s) with a density of acceleration.
+pub(super) fn of_innovations<A: Scalar>(
+    series: &[Vec<Step>],
+    noise: &Noise,
+    area_px2: f64,
+    begin: impl Fn(f64, f64) -> A,
+    mut predict: impl FnMut(&mut [A; 2], f64, f64),
+) -> f64 {
     let strange = STRANGE / area_px2;
-    let speed_std = match motion {
-        Motion::Accelerated(std) => std,
-        Motion::Persistent(p) => p.speed_std_px_per_s,
-    };
-    // Most scans are as far apart as the two before.
-    let mut passed = Passed::NEVER;
     let mut sum = 0.0;
     for steps in series {
         let Some(first) = steps.first() else { continue };
@@ -172,32 +216,16 @@ pub(super) fn log_likelihood(series: &[Vec<Step>], noise: &Noise, motion: Motion
         let middle = heights.len() / 2;
         let height = *heights.select_nth_unstable_by(middle, f64::total_cmp).1;
         let q = noise.density + noise.density_per_height2 * height * height;
-        let r = |s: &Step, a: usize| {
-            noise.scale * s.variance[a]
-                + noise.extra_px * noise.extra_px
-                + (noise.extra_per_height * s.height_px).powi(2)
-        };
-        let begin =
-            |s: &Step, a: usize| Axis { x: s.position[a], v: 0.0, xx: r(s, a), xv: 0.0, vv: speed_std * speed_std };
-        let mut axes = [0, 1].map(|a| begin(first, a));
+        let r = |s: &Step, a: usize| noise.variance(s.variance[a], s.height_px);
+        let begin = |s: &Step| [0, 1].map(|a| begin(s.position[a], r(s, a)));
+        let mut axes = begin(first);
         let (mut began, mut was_strange) = (0, false);
         for (k, s) in steps.iter().enumerate().skip(1) {
-            let t = s.dt_s;
             let (mut nis, mut det) = (0.0, 1.0);
-            match motion {
-                Motion::Accelerated(_) => {
-                    let step = step_noise(AccelerationNoise::Continuous(q), t);
-                    axes.iter_mut().for_each(|axis| axis.predict(t, &step));
-                }
-                Motion::Persistent(p) => {
-                    if passed.dt_s != t {
-                        passed = p.after(t);
-                    }
-                    axes.iter_mut().for_each(|axis| passed.predict(axis));
-                }
-            }
+            predict(&mut axes, s.dt_s, q);
             for (a, axis) in axes.iter_mut().enumerate() {
-                let (nu, var) = (s.position[a] - axis.x, axis.xx + r(s, a));
+                let [x, xx] = axis.expected();
+                let (nu, var) = (s.position[a] - x, xx + r(s, a));
                 nis += nu * nu / var;
                 det *= var;
             }
@@ -209,7 +237,7 @@ pub(super) fn log_likelihood(series: &[Vec<Step>], noise: &Noise, motion: Motion
             if own < strange && k > began + SETTLING {
                 // One is another thing's detection; the second is where the target is now.
                 if was_strange {
-                    axes = [0, 1].map(|a| begin(s, a));
+                    axes = begin(s);
                     began = k;
                 }
                 was_strange = !was_strange;

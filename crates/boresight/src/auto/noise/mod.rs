@@ -2,9 +2,11 @@
 //!
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
 //! series whose innovations are made as probable as possible.
+//! Errors that last from scan to scan ([`correlated`]) are told from motion and added to the covariances that are stated.
 //! Where the caller allows it, targets whose velocity is forgotten ([`persistence`]) get the model of such a motion.
 //! Limits: a filter that is not of constant velocity at first keeps what is assumed, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before ([`COPY`]); with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
+mod correlated;
 pub(super) mod fit;
 mod forgotten;
 mod persistence;
@@ -15,7 +17,7 @@ use super::quantile::{WITHIN_ONE, quantile};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
-use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
+use crate::track::{CorrelatedErrorConfig, FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use forgotten::Persistence;
@@ -114,6 +116,14 @@ pub fn learn(
     }
     t.merged_measurements.edge_std_px = round(size_std);
     put(&found, least_density, t);
+    // The motion of a camera that moves is known with errors that last as well.
+    let rests = |s: &Scan| s.camera_motion.is_none_or(|m| m.now_from_before.is_identity());
+    let may_last = unit == LengthUnit::Pixel && motion.is_none() && scans.iter().all(rests);
+    let lasts = if may_last { correlated::find(&series, &found, speed_std, area_px2) } else { None };
+    t.correlated_error = lasts.map_or_else(CorrelatedErrorConfig::default, |c| CorrelatedErrorConfig {
+        position_px: round(c.position_px),
+        velocity_px_per_s: round(c.velocity_px_per_s),
+    });
     // Points have no boxes.
     let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
     let px = unit.sign();
@@ -138,6 +148,12 @@ pub fn learn(
         t.extra_noise_px,
         part(t.extra_noise_per_height, " of a box height"),
     ));
+    if let Some(c) = lasts {
+        reasons.push(format!(
+            "Of that noise {:.3} px last for {:.2} to {:.2} s, which no innovation shows: covariances are stated with {:.3} px more.",
+            c.std_px, c.memories_s[0], c.memories_s[1], c.position_px
+        ));
+    }
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use super::fit::{self, LEAST, Motion, Noise, Step, log_likelihood, most_probable
 use super::forgotten::Persistence;
 
 /// Logarithm of the factor by which the innovations must be more probable: very strong evidence, 150 to 1 (R. E. Kass, A. E. Raftery, *J. Am. Stat. Assoc.* 90, 1995, 3.2).
-const LEAST_GAIN: f64 = 5.0;
+pub(super) const LEAST_GAIN: f64 = 5.0;
 /// Least memory in intervals: the steps of a twentieth are correlated by 3 %.
 const SHORTEST: f64 = 0.05;
 /// Longest memory that is looked for, in intervals.

@@ -28,7 +28,7 @@ pub(in crate::track) fn report(
 #[inline]
 pub(in crate::track) fn state_of(
     id: u64,
-    kinematics: Gaussian<4>,
+    mut kinematics: Gaussian<4>,
     appearance: &Appearance,
     history: &History,
     may_report: bool,
@@ -36,6 +36,7 @@ pub(in crate::track) fn state_of(
     config: &TrackerConfig,
 ) -> TrackState {
     let [width_px, height_px] = appearance.size;
+    config.correlated_error.add_to(&mut kinematics);
     TrackState {
         id: TrackId(id),
         status: status(history, may_report, outcome.hit),
