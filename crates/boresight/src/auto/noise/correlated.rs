@@ -319,14 +319,12 @@ mod tests {
     #[test]
     fn what_errors_that_last_leave_is_what_tracks_are_off_by() {
         let [stated, with] = nees(&[0.12, 0.49, 2.0]);
-        eprintln!("law {stated} {with}");
         assert!(stated > 1.8, "there is something to mend: {stated}");
         // 200 values are known to a tenth.
         assert!((0.75..1.3).contains(&with), "{with}, {stated} without");
         // Where all errors have one memory, three that stand for it take most of it away.
         for memory_s in [0.3, 0.8] {
             let [stated, with] = nees(&[memory_s]);
-            eprintln!("{memory_s} s: {stated} {with}");
             assert!(with > 0.7 && with - 1.0 < 0.4 * (stated - 1.0), "{memory_s} s: {with}, {stated} without");
         }
     }
