@@ -114,14 +114,14 @@ fn settings(args: &Args, own: bool) -> anyhow::Result<SmoothConfig> {
     let asked = asked.or(args.acceleration_density.map(AccelerationNoise::Continuous));
     let maker = if asked.is_none() { table_motion::maker(&args.tracks, own)? } else { None };
     let (acceleration, forgetting) = table_motion::of(asked, maker.as_ref(), 0.0);
-    let correlated_error = maker.as_ref().map(|(t, _)| t.correlated_error).unwrap_or_default();
+    let correlated_error_px = maker.as_ref().map_or(0.0, |(t, _)| t.correlated_error_px);
     let density_per_height2_per_s3 = maker.map_or(0.0, |(t, _)| t.acceleration_density_per_height2_per_s3);
     let method = match (args.lag, args.method) {
         (Some(lag), _) => SmoothMethod::FixedLag(lag),
         (None, Method::Rts) => SmoothMethod::Rts,
         (None, Method::SquareRoot) => SmoothMethod::SquareRoot,
     };
-    let config = SmoothConfig { acceleration, density_per_height2_per_s3, forgetting, correlated_error, method };
+    let config = SmoothConfig { acceleration, density_per_height2_per_s3, forgetting, correlated_error_px, method };
     config.validate("smooth")?;
     Ok(config)
 }

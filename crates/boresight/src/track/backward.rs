@@ -16,6 +16,7 @@
 use super::config::TrackerConfig;
 use super::confirm::existence::ExistenceConfig;
 use super::confirm::rule::ConfirmationConfig;
+use super::correlated_error;
 use super::initiation::InitiationConfig;
 use super::score_likelihood::{LogScore, ScoreLikelihoodConfig};
 use crate::associate::UniformGrid;
@@ -354,7 +355,7 @@ impl Walk<'_> {
                 kinematics.cov[(i, v)] = -kinematics.cov[(i, v)];
             }
         }
-        self.back.config.correlated_error.add_to(&mut kinematics);
+        correlated_error::add_to(&mut kinematics, self.back.config.correlated_error_px);
         let [width_px, height_px] = self.side_px;
         let (left_px, top_px) = (kinematics.mean[0] - 0.5 * width_px, kinematics.mean[2] - 0.5 * height_px);
         let extent = Extent { left_px, top_px, width_px, height_px };

@@ -7,7 +7,6 @@ use super::association_cost::AssociationCostConfig;
 use super::clutter::ClutterConfig;
 use super::confirm::motion_test::{MotionTestConfig, Report};
 use super::confirm::rule::ConfirmationConfig;
-use super::correlated_error::CorrelatedErrorConfig;
 use super::filter::{AccelerationNoise, DEFAULT_DENSITY_PX2_PER_S3, FilterConfig, TrackedFilter, presets};
 use super::initial_tracks::InitialTrackConfig;
 use super::initiation::InitiationConfig;
@@ -50,8 +49,9 @@ pub struct TrackerConfig {
     pub extra_noise_per_height: f64,
     /// Measurement noise added to each detection's own covariance, standard deviation per axis, px, 0 or more.
     pub extra_noise_px: f64,
-    /// What errors of measurements that last from scan to scan leave in a track: added to the covariances that are stated, not to gates. None by default.
-    pub correlated_error: CorrelatedErrorConfig,
+    /// What errors of measurements that last from scan to scan leave in a track's position, standard deviation per axis, px, 0 or more: added to the covariances that are stated, not to gates. 0: errors are
+    /// independent.
+    pub correlated_error_px: f64,
     /// How a radar's plots correct a track: `converted` once to positions, or `extended`, by range and azimuth linearised at each track's prediction. Of other detections
     /// it says nothing.
     pub radar_update: RadarUpdate,
@@ -132,7 +132,7 @@ impl Default for TrackerConfig {
             detection_covariance_scale: 1.0,
             extra_noise_per_height: 0.0,
             extra_noise_px: 0.3,
-            correlated_error: CorrelatedErrorConfig::default(),
+            correlated_error_px: 0.0,
             radar_update: RadarUpdate::default(),
             gate_probability: 0.99,
             max_speed_px_per_s: 150.0,
@@ -237,7 +237,7 @@ impl TrackerConfig {
         }
         positive(at, "detection-covariance-scale", self.detection_covariance_scale, "1 takes covariances as stated")?;
         not_negative(at, "extra-noise-px", self.extra_noise_px, "0.3 covers the heavy tails of thresholded centroids")?;
-        self.correlated_error.validate(&format!("{at}.correlated-error"))?;
+        not_negative(at, "correlated-error-px", self.correlated_error_px, "0 takes errors for independent")?;
         let mend = "0.99 keeps 99 % of true detections inside the gate";
         probability(at, "gate-probability", self.gate_probability, mend)?;
         positive(at, "max-speed-px-per-s", self.max_speed_px_per_s, "5 px per frame at 30 frames/s is 150")?;

@@ -1,85 +1,88 @@
 //! Errors of measurements that last: what they leave in a track is added to the covariance that is stated of it.
 //!
-//! Source: Y. Bar-Shalom, X.-R. Li, T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, 8.2 (autocorrelated measurement noise); S. F. Schmidt, *Advances in Control
-//! Systems* 3, 1966 (what is not estimated is considered in the covariance). A filter takes the errors of its measurements for independent from scan to scan. Those of a codec, which carries a
-//! displaced picture of a target on from frame to frame, are not: the mean of n of them is not √n times surer than one, and no innovation shows it.
-//! Departures: one number for the position and one for the velocity, of a track that has been followed for a while, instead of a cross covariance carried in each filter: gains, gates and
-//! innovations stay as they are. [`crate::auto`] learns the two from the likelihood of a first pass.
-//! Symbols: standard deviations per axis, px and px/s.
+//! Source: S. R. Rogers, *IEEE Trans. AES* 23(4), 1987 (a tracking filter with correlated measurement noise); S. F. Schmidt, *Advances in Control Systems* 3, 1966 (what is not estimated is considered in
+//! the covariance). A filter takes the errors of its measurements for independent from scan to scan. Those of a codec, which carries a displaced picture of a target on from frame to frame, are not:
+//! the mean of n of them is not √n times surer than one, and no innovation shows it.
+//! Departures: one number for the position of a track that has been followed for a while, instead of a cross covariance carried in each filter: gains, gates and innovations stay as they are.
+//! [`crate::auto`] learns it from the likelihood of a first pass; the velocity needs none, for such errors make it learn a larger q.
+//! Symbols: e standard deviation per axis, px (`tracker.correlated-error-px`).
 //! Limits: a track of some scans, whose own variance holds most of such an error already, is stated too wide by no more than it.
 
-use crate::Result;
-use crate::validate::not_negative;
 use boresight_filters::Gaussian;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use nalgebra::Matrix4;
 
-/// What errors of measurements that last from scan to scan leave in a track: added to the covariances that are stated of it, not to its gates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct CorrelatedErrorConfig {
-    /// Standard deviation of the position per axis, px, 0 or more.
-    pub position_px: f64,
-    /// Standard deviation of the velocity per axis, px/s, 0 or more.
-    pub velocity_px_per_s: f64,
+/// Adds it to the covariance of `[x, vx, y, vy]` (px, px/s).
+#[inline]
+pub(in crate::track) fn add_to(belief: &mut Gaussian<4>, error_px: f64) {
+    belief.cov[(0, 0)] += error_px * error_px;
+    belief.cov[(2, 2)] += error_px * error_px;
 }
 
-impl CorrelatedErrorConfig {
-    /// Checks all values; `at` names the place in the configuration.
-    /// # Errors
-    /// The first value outside its range.
-    pub fn validate(&self, at: &str) -> Result<()> {
-        not_negative(at, "position-px", self.position_px, "0 takes errors for independent from scan to scan")?;
-        not_negative(
-            at,
-            "velocity-px-per-s",
-            self.velocity_px_per_s,
-            "0 takes errors for independent from scan to scan",
-        )
+/// Takes it out of all rows of a track, and returns whether they hold it: those of a table that was made without stay as they are.
+pub(in crate::track) fn take_from(beliefs: &mut [Gaussian<4>], error_px: f64) -> bool {
+    let without = |b: &Gaussian<4>| {
+        let e2 = error_px * error_px;
+        b.cov - Matrix4::from_diagonal(&[e2, 0.0, e2, 0.0].into())
+    };
+    let held = error_px > 0.0 && beliefs.iter().all(|b| without(b).cholesky().is_some());
+    if held {
+        beliefs.iter_mut().for_each(|b| b.cov = without(b));
     }
-
-    /// Adds it to the covariance of `[x, vx, y, vy]` (px, px/s).
-    #[inline]
-    pub fn add_to(self, belief: &mut Gaussian<4>) {
-        for (i, variance) in self.variances().into_iter().enumerate() {
-            belief.cov[(i, i)] += variance;
-        }
-    }
-
-    /// Takes it out again; a belief that does not hold it, of a table that was made without, stays as it is.
-    pub(in crate::track) fn take_from(self, belief: &mut Gaussian<4>) {
-        let mut cov = belief.cov;
-        for (i, variance) in self.variances().into_iter().enumerate() {
-            cov[(i, i)] -= variance;
-        }
-        if cov.cholesky().is_some() {
-            belief.cov = cov;
-        }
-    }
-
-    fn variances(self) -> [f64; 4] {
-        let [p, v] = [self.position_px * self.position_px, self.velocity_px_per_s * self.velocity_px_per_s];
-        [p, v, p, v]
-    }
+    held
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix4, Vector4};
+    use crate::track::smooth::{SmoothConfig, smooth_track};
+    use crate::track::{TrackerConfig, build};
+    use crate::{Detection, FrameIndex, Scan, Timestamp, TrackState};
+
+    /// The states of a target that goes straight, known to 0.2 px, with that error in the configuration.
+    fn states(correlated_error_px: f64) -> (Vec<Timestamp>, Vec<TrackState>) {
+        let config = TrackerConfig { correlated_error_px, extra_noise_px: 0.0, ..TrackerConfig::default() };
+        let mut tracker = build(&config).unwrap();
+        let scan = |k: u64| {
+            let wobble = 0.2 * f64::from((k * 7 % 5) as u8) - 0.4;
+            let d = Detection::at([10.0 + k as f64, 20.0 + wobble].into(), nalgebra::Matrix2::identity() * 0.04);
+            let time = Timestamp::from_secs_f64(k as f64 * 0.04);
+            Scan { detections: vec![d], ..Scan::at(FrameIndex(k), time) }
+        };
+        let step = |k| {
+            let scan = scan(k);
+            Some((scan.time, tracker.step(&scan).unwrap().first()?.clone()))
+        };
+        (0..40).filter_map(step).unzip()
+    }
 
     #[test]
-    fn what_is_added_is_taken_out_again_where_it_is_held() {
-        let error = CorrelatedErrorConfig { position_px: 0.3, velocity_px_per_s: 2.0 };
-        let narrow =
-            Gaussian { mean: Vector4::zeros(), cov: Matrix4::from_diagonal(&Vector4::new(0.1, 5.0, 0.2, 6.0)) };
-        let mut wide = narrow;
-        error.add_to(&mut wide);
-        assert!((wide.cov[(0, 0)] - 0.19).abs() < 1e-12 && (wide.cov[(3, 3)] - 10.0).abs() < 1e-12);
-        error.take_from(&mut wide);
-        assert!((wide.cov - narrow.cov).abs().max() < 1e-12);
-        let mut sure = Gaussian { cov: narrow.cov * 0.01, ..narrow };
-        error.take_from(&mut sure);
-        assert_eq!(sure.cov, narrow.cov * 0.01);
+    fn positions_innovations_and_gates_stay_and_covariances_are_wider_by_it() {
+        let ((_, plain), (_, wide)) = (states(0.0), states(0.3));
+        assert!(plain.len() > 30 && plain.len() == wide.len());
+        for (p, w) in plain.iter().zip(&wide) {
+            assert_eq!((p.kinematics.mean, p.innovation, p.status), (w.kinematics.mean, w.innovation, w.status));
+            let more = w.kinematics.cov - p.kinematics.cov;
+            let expected = Matrix4::from_diagonal(&[0.09, 0.0, 0.09, 0.0].into());
+            assert!((more - expected).abs().max() < 1e-12, "{more}");
+        }
+    }
+
+    #[test]
+    fn rows_are_smoothed_as_without_it_and_hold_it_again() {
+        let config = |correlated_error_px| SmoothConfig { correlated_error_px, ..SmoothConfig::default() };
+        let smoothed = |of: f64, config| {
+            let (times, states) = states(of);
+            let mut beliefs: Vec<_> = states.iter().map(|s| s.kinematics).collect();
+            smooth_track(&times, &mut beliefs, &config).unwrap();
+            beliefs
+        };
+        let (plain, wide) = (smoothed(0.0, config(0.0)), smoothed(0.3, config(0.3)));
+        for (p, w) in plain.iter().zip(&wide) {
+            assert!((p.mean - w.mean).abs().max() < 1e-9, "{} {}", p.mean, w.mean);
+            assert!((w.cov[(0, 0)] - p.cov[(0, 0)] - 0.09).abs() < 1e-9);
+        }
+        // A table that was made without, surer than that: nothing is taken out, and nothing added.
+        let without = smoothed(0.0, config(0.3));
+        assert_eq!(without, plain);
     }
 }

@@ -11,7 +11,7 @@ mod clock;
 pub(crate) mod clutter;
 pub(crate) mod config;
 pub(crate) mod confirm;
-pub(crate) mod correlated_error;
+mod correlated_error;
 pub mod filter;
 pub(crate) mod gaps;
 pub(crate) mod initial_tracks;
@@ -48,7 +48,6 @@ pub use confirm::m_of_n::MOfNConfig;
 pub use confirm::motion_test::{MotionTestConfig, Report};
 pub use confirm::rule::ConfirmationConfig;
 pub use confirm::sprt::SprtConfig;
-pub use correlated_error::CorrelatedErrorConfig;
 pub use filter::{
     AccelerationNoise, FilterConfig, FormConfig, InnovationConfig, ModelConfig, OrnsteinUhlenbeckConfig, PRESETS,
     Preset, TrackFilter,

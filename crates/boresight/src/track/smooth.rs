@@ -11,7 +11,7 @@
 mod cut;
 pub(in crate::track) mod motion;
 
-use super::correlated_error::CorrelatedErrorConfig;
+use super::correlated_error;
 use super::filter::{AccelerationNoise, OrnsteinUhlenbeckConfig};
 use crate::validate::{check, not_negative};
 use crate::{Error, ErrorKind, Result, Timestamp};
@@ -29,8 +29,8 @@ pub struct SmoothConfig {
     pub density_per_height2_per_s3: f64,
     /// Velocities that are forgotten, in the place of the acceleration.
     pub forgetting: Option<OrnsteinUhlenbeckConfig>,
-    /// What the tracker added to the covariances of the rows: taken out before, added after.
-    pub correlated_error: CorrelatedErrorConfig,
+    /// What the tracker added to the positions' covariances, standard deviation, px, 0 or more: taken out before, added after.
+    pub correlated_error_px: f64,
     /// Which rows tell of which.
     pub method: SmoothMethod,
 }
@@ -53,7 +53,7 @@ impl Default for SmoothConfig {
             acceleration: AccelerationNoise::default(),
             density_per_height2_per_s3: 0.0,
             forgetting: None,
-            correlated_error: CorrelatedErrorConfig::default(),
+            correlated_error_px: 0.0,
             method: SmoothMethod::Rts,
         }
     }
@@ -68,7 +68,7 @@ impl SmoothConfig {
         let per_height2 = self.density_per_height2_per_s3;
         not_negative(at, "acceleration-density-per-height2-per-s3", per_height2, "as in the tracker")?;
         self.forgetting.as_ref().map_or(Ok(()), |c| c.validate(&format!("{at}.forgetting")))?;
-        self.correlated_error.validate(&format!("{at}.correlated-error"))?;
+        not_negative(at, "correlated-error-px", self.correlated_error_px, "as in the tracker")?;
         match self.method {
             SmoothMethod::FixedLag(lag) => check(lag >= 1, at, "lag", lag, "at least 1 row", "5 rows are usual"),
             _ => Ok(()),
@@ -96,10 +96,7 @@ impl SmoothConfig {
 /// Times that do not ascend; a covariance that cannot be factored.
 pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &SmoothConfig) -> Result<usize> {
     config.validate("smooth")?;
-    let added = config.correlated_error;
-    if added != CorrelatedErrorConfig::default() {
-        beliefs.iter_mut().for_each(|b| added.take_from(b));
-    }
+    let held = correlated_error::take_from(beliefs, config.correlated_error_px);
     let mut scans = scans_of(times, beliefs)?;
     let (mut first, mut n_parts) = (0, 0);
     while first < scans.len() {
@@ -112,7 +109,9 @@ pub fn smooth_track(times: &[Timestamp], beliefs: &mut [Gaussian<4>], config: &S
     }
     for (belief, scan) in beliefs.iter_mut().zip(&scans) {
         *belief = scan.belief;
-        added.add_to(belief);
+        if held {
+            correlated_error::add_to(belief, config.correlated_error_px);
+        }
     }
     Ok(n_parts)
 }

@@ -1,12 +1,13 @@
 //! Errors of measurements that last: how large they are and what they leave in a track.
 //!
-//! Source: first-order Gauss-Markov errors of the measurement as further states of each axis (Bar-Shalom, Li, Kirubarajan 2001, 8.2; their law, 4.7.1). A codec that moves a target's picture along by
+//! Source: first-order Gauss-Markov errors of the measurement as further states of each axis (A. Gelb (ed.), *Applied Optimal Estimation*, 1974, ch. 4; S. R. Rogers, *IEEE Trans. AES* 23(4), 1987). A codec that moves a target's picture along by
 //! its vectors and codes anew only what is off by more than its quantiser makes errors that last from some frames to seconds, no memory more than another: the sum of some Gauss-Markov errors of
 //! equal variance, whose memories are as far apart in their logarithms (flicker noise; A. van der Ziel, *Physica* 16, 1950), from [`SHORTEST`] intervals to [`LONGEST`] of a usual track. One number,
 //! their variance, is found with R and q by the likelihood of the innovations as in [`super::fit`], from the same series, and believed if they are far more probable with it than without ([`LEAST_GAIN`]).
 //! What they leave: the tracker keeps its filter, which takes errors for independent. Its error is followed as what it is, with the gains of that filter and the law of these, over a usual
-//! track; its variance beyond the one that the filter states is the result (an identity of linear filters with any gain: the same book, 5.6).
-//! Departures: one memory found with its variance is that of the most errors, some frames, and left tracks stated as sure as before: what lasts longer and is rarer is what a filter cannot average.
+//! track; its variance beyond the one that the filter states is the result (the covariance of a linear filter with any gain: Gelb, ch. 7).
+//! Departures: one memory found with its variance is that of the most errors, some frames, and left tracks stated as sure as before: what lasts longer and is rarer is what a filter cannot average. The velocity is left out: the q that was found without such errors makes its variance
+//! larger than they do.
 //! Symbols: per axis the error `[x, v, b...]` of position (px), velocity (px/s) and measurement (px); B variance of all b together (px²), τ their memories (s).
 //! Limits: one law for all targets of a run. A target that swings about its course, or a box that does, is told from such an error only by how it goes on: what is not told apart counts as an error
 //! and the covariances become wider. An error that stays for longer than a quarter of the tracks is where the target is. Cameras that move are not asked: their own errors last as well.
@@ -37,9 +38,8 @@ pub struct Correlated {
     /// Standard deviation of the errors that last, px, and their shortest and longest memory, s.
     pub std_px: f64,
     pub memories_s: [f64; 2],
-    /// Standard deviations that they leave in the position (px) and the velocity (px/s) of a usual track, per axis, beyond what the filter states.
+    /// Standard deviation that they leave in the position of a usual track, per axis, beyond what the filter states, px.
     pub position_px: f64,
-    pub velocity_px_per_s: f64,
 }
 
 /// The errors that last in these series, beside `white` noise and motion that was found without them; `speed_std` is that of first velocities, px/s, `area_px2` the field's.
@@ -67,9 +67,8 @@ pub fn find(series: &[Vec<Step>], white: &Noise, speed_std: f64, area_px2: f64) 
         return None;
     }
     let (noise, law) = parts(x);
-    let [position, velocity] = left(white, &noise, &law, &usual, speed_std);
-    let (position_px, velocity_px_per_s) = (position.sqrt(), velocity.sqrt());
-    Some(Correlated { std_px: x[3].sqrt(), memories_s: ends, position_px, velocity_px_per_s })
+    let position_px = left(white, &noise, &law, &usual, speed_std).sqrt();
+    Some(Correlated { std_px: x[3].sqrt(), memories_s: ends, position_px })
 }
 
 /// Series of every kind, for the longest are those of the targets that are measured best; without those shorter than half of a usual one, which false detections may have made.
@@ -217,8 +216,8 @@ fn log_likelihood(series: &[Vec<Step>], noise: &Noise, law: Law, speed_std: f64,
     })
 }
 
-/// Variances of the position (px²) and the velocity (px²/s²) at the end of a usual track of a filter that knows only `white`, beyond those that it states, where errors are as `noise` and `law` say.
-fn left(white: &Noise, noise: &Noise, law: &Law, usual: &Usual, speed_std: f64) -> [f64; 2] {
+/// Variance of the position at the end of a usual track of a filter that knows only `white`, beyond that which it states, where errors are as `noise` and `law` say, px².
+fn left(white: &Noise, noise: &Noise, law: &Law, usual: &Usual, speed_std: f64) -> f64 {
     let t = usual.interval_s;
     let r = |n: &Noise| n.variance(usual.stated, usual.height_px);
     let q = |n: &Noise| {
@@ -240,7 +239,7 @@ fn left(white: &Noise, noise: &Noise, law: &Law, usual: &Usual, speed_std: f64) 
         let crossed = gain * h.transpose();
         error.p += gain * gain.transpose() * (seen(&h) + r(noise)) - crossed - crossed.transpose();
     }
-    [(error.p[(0, 0)] - filter.xx).max(0.0), (error.p[(1, 1)] - filter.vv).max(0.0)]
+    (error.p[(0, 0)] - filter.xx).max(0.0)
 }
 
 #[cfg(test)]

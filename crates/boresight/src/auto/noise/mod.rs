@@ -17,7 +17,7 @@ use super::quantile::{WITHIN_ONE, quantile};
 use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
-use crate::track::{CorrelatedErrorConfig, FilterConfig, TrackerConfig, TrackerParameters};
+use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
 use crate::{Config, Result, Scan, TrackStatus};
 use fit::{Noise, Step, fit};
 use forgotten::Persistence;
@@ -120,10 +120,7 @@ pub fn learn(
     let rests = |s: &Scan| s.camera_motion.is_none_or(|m| m.now_from_before.is_identity());
     let may_last = unit == LengthUnit::Pixel && motion.is_none() && scans.iter().all(rests);
     let lasts = if may_last { correlated::find(&series, &found, speed_std, area_px2) } else { None };
-    t.correlated_error = lasts.map_or_else(CorrelatedErrorConfig::default, |c| CorrelatedErrorConfig {
-        position_px: round(c.position_px),
-        velocity_px_per_s: round(c.velocity_px_per_s),
-    });
+    t.correlated_error_px = lasts.map_or(0.0, |c| round(c.position_px));
     // Points have no boxes.
     let part = |value: f64, of: &str| if value > 0.0 { format!(" and {value:.4}{of}") } else { String::new() };
     let px = unit.sign();
@@ -305,6 +302,38 @@ mod tests {
             let found = learnt(std, digits);
             assert!((found / std).ln().abs() < 0.3, "{found} px, {std} is the truth");
         }
+    }
+
+    #[test]
+    fn errors_that_last_are_in_the_configuration_and_white_ones_are_not() {
+        let learnt = |std: f64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(7);
+            let mut normal = || rng.sample::<f64, _>(StandardNormal);
+            let mut errors = [[0.0; 2]; 12];
+            // Memories of ten frames.
+            let kept = f64::exp(-0.1);
+            let scans: Vec<Scan> = (0..200_u64)
+                .map(|k| {
+                    errors
+                        .iter_mut()
+                        .flatten()
+                        .for_each(|e| *e = kept * *e + std * (1.0 - kept * kept).sqrt() * normal());
+                    let place =
+                        |i: usize| [100.0 + 150.0 * (i % 4) as f64 + 0.5 * k as f64, 100.0 + 150.0 * (i / 4) as f64];
+                    let seen = |(i, e): (usize, &[f64; 2])| [0, 1].map(|a| place(i)[a] + e[a] + 0.1 * normal());
+                    let positions: Vec<[f64; 2]> = errors.iter().enumerate().map(seen).collect();
+                    let at = |p: [f64; 2]| Detection::at(p.into(), nalgebra::Matrix2::identity() * 0.01);
+                    let time = Timestamp::from_secs_f64(k as f64 * 0.04);
+                    Scan { detections: positions.into_iter().map(at).collect(), ..Scan::at(FrameIndex(k), time) }
+                })
+                .collect();
+            let (mut config, mut reasons) = (Config::default(), Vec::new());
+            learn(&scans, 6e5, LengthUnit::Pixel, Motions::Driven, &mut config, &mut reasons).unwrap();
+            (config.tracker.correlated_error_px, reasons.iter().any(|r| r.contains("no innovation shows")))
+        };
+        let (lasting, said) = learnt(0.06);
+        assert!((0.03..0.08).contains(&lasting) && said, "{lasting}");
+        assert_eq!(learnt(0.0), (0.0, false));
     }
 
     #[test]

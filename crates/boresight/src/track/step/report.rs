@@ -4,6 +4,7 @@ use super::super::appearance::Appearance;
 use super::super::config::TrackerConfig;
 use super::super::confirm::history::History;
 use super::super::confirm::status::status;
+use super::super::correlated_error;
 use super::super::single_track::{Outcome, Track};
 use crate::camera::CameraPath;
 use crate::{Extent, TrackId, TrackState};
@@ -36,7 +37,7 @@ pub(in crate::track) fn state_of(
     config: &TrackerConfig,
 ) -> TrackState {
     let [width_px, height_px] = appearance.size;
-    config.correlated_error.add_to(&mut kinematics);
+    correlated_error::add_to(&mut kinematics, config.correlated_error_px);
     TrackState {
         id: TrackId(id),
         status: status(history, may_report, outcome.hit),
