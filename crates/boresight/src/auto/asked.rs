@@ -77,7 +77,7 @@ pub fn configure(
         DetectorKind::Spot => {
             let seen = particles::count(frames, info, n_threads)?.seen;
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
-            particles::configure(&seen, info, interval_s, config, reasons);
+            particles::configure(&seen, frames, info, n_threads, interval_s, config, reasons)?;
         }
         DetectorKind::Local => {
             let seen = cells::count(frames, info, n_threads)?.0;

@@ -155,7 +155,7 @@ pub(super) fn choose_looked(
     {
         moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
-        particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+        particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
     } else {
         let cells = cells::look(frames, info, n_threads)?;
         // Cells are bright: where dark ones move beside them, both are looked for.
@@ -177,7 +177,7 @@ pub(super) fn choose_looked(
             None => None,
         };
         if let Some(seen) = spots_for_cells {
-            particles::configure(&seen, info, interval_s, &mut config, &mut reasons);
+            particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
         } else if let Some(seen) = cells {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {

@@ -6,10 +6,10 @@
 
 use super::looks;
 use super::near::Near;
-use super::particles::DIAMETER_PER_WIDTH;
 use super::spread::spread;
 use crate::vision::cfar::CfarConfig;
 use crate::vision::isolated::IsolatedConfig;
+use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
 use crate::vision::threshold::{SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, Scan, SourceInfo};
 

@@ -49,6 +49,7 @@ mod second_look;
 mod sighting_density;
 mod sightings;
 mod speed;
+mod spot_size;
 mod spot_threshold;
 mod spots;
 mod spread;

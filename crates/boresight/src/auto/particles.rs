@@ -6,6 +6,7 @@
 use super::digits::round;
 use super::looks;
 use super::scene::{Camera, Scene};
+use super::spot_size;
 use super::spread::spread;
 use super::stretch;
 use super::value_step::value_step;
@@ -13,6 +14,7 @@ use crate::camera::CameraConfig;
 use crate::tempo::Tempo;
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
+use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, SourceInfo};
 use statrs::distribution::{ContinuousCDF as _, Normal};
@@ -31,14 +33,19 @@ const SCORE: f64 = 3.0;
 const ASSUMED_WIDTH_PX: f64 = 3.0;
 /// Widest blob taken for a particle, px.
 const WIDEST_PX: u32 = 40;
-/// A soft-edged spot's diameter in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
-pub(super) const DIAMETER_PER_WIDTH: f64 = 2.45;
 
 /// Things of less across are spots, not cells, px.
 const SPOT_PX: f64 = 10.0;
 
+/// Most detections a frame.
+pub(super) const MOST_DETECTIONS: u32 = 20_000;
+/// Side of the smoothing box, applied twice, in units of the width at half height; half of the diameter at most.
+const SMOOTH_PER_WIDTH: f64 = 0.66;
+
 /// Expected false detections for each blob seen: the tracks' existence weighs them, and a dim particle is worth ten.
 pub(super) const FALSE_SHARE: f64 = 0.1;
+/// The same where sizes are compared by what they find.
+const FALSE_SHARE_COUNTED: f64 = 0.001;
 /// Least and largest threshold, standard deviations.
 const THRESHOLDS: [f64; 2] = [2.0, 5.0];
 
@@ -139,23 +146,43 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Co
     Ok(Counted { seen: best.unwrap_or(most), alike, fills: best.is_some() })
 }
 
-/// Threshold in standard deviations of the smoothed noise at which [`FALSE_SHARE`] of a frame's detections is expected to be noise: one independent look for
+/// Threshold in standard deviations of the smoothed noise at which this share of a frame's detections is expected to be noise: one independent look for
 /// each disc of the spot's size.
-fn threshold(particles: &Particles, size_px: f64, info: &SourceInfo) -> f64 {
+fn threshold(particles: &Particles, size_px: f64, false_share: f64, info: &SourceInfo) -> f64 {
     let looks = (info.width * info.height) as f64 / (0.25 * std::f64::consts::PI * size_px * size_px);
-    let tail = (FALSE_SHARE * particles.per_frame / looks).clamp(1e-12, 0.5);
+    let tail = (false_share * particles.per_frame / looks).clamp(1e-12, 0.5);
     Normal::standard().inverse_cdf(1.0 - tail).clamp(THRESHOLDS[0], THRESHOLDS[1])
 }
 
+/// The detector for spots of this diameter.
+fn spot_config(particles: &Particles, size_px: f64, false_share: f64, info: &SourceInfo) -> SpotConfig {
+    SpotConfig {
+        size_px: round(size_px),
+        k: round(threshold(particles, size_px, false_share, info)),
+        polarity: particles.polarity,
+        min_contrast: round(particles.step),
+        surround: 1.0,
+        smooth_px: Some(round((SMOOTH_PER_WIDTH * particles.width_px).min(0.5 * size_px).max(1.0))),
+    }
+}
+
 /// Writes detector and tracker.
+/// # Errors
+/// Frames of more than one size or pixel type.
 pub fn configure(
     particles: &Particles,
+    frames: &[Frame],
     info: &SourceInfo,
+    n_threads: usize,
     interval_s: f64,
     config: &mut Config,
     reasons: &mut Vec<String>,
-) {
-    let size_px = round((DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0));
+) -> Result<()> {
+    let whole_px = (DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0);
+    let at = |size_px: f64| spot_config(particles, size_px, FALSE_SHARE_COUNTED, info);
+    let size_px = spot_size::find(particles, frames, info, n_threads, at)?;
+    let spot = spot_config(particles, size_px, FALSE_SHARE, info);
+    let size_px = spot.size_px;
     let dark = particles.polarity == Polarity::Dark;
     reasons.push(format!(
         "Some {:.0} {} blobs a frame all over it, {:.1} px wide at half their height, nothing that moves as one: particles. So spots of {size_px} px are \
@@ -164,29 +191,22 @@ pub fn configure(
         if dark { "dark" } else { "bright" },
         particles.width_px
     ));
-    let spot = SpotConfig {
-        size_px,
-        k: round(threshold(particles, size_px, info)),
-        polarity: particles.polarity,
-        min_contrast: round(particles.step),
-        surround: 1.0,
-        smooth_px: Some(round((0.27 * size_px).max(1.0))),
-    };
     config.detector = DetectorConfig {
         threshold: ThresholdConfig::Spot(spot),
-        max_detections: Some(20_000),
+        max_detections: Some(MOST_DETECTIONS),
         ..DetectorConfig::default()
     };
     config.detector.camera = CameraConfig::Fixed;
     let tracker = &mut config.tracker;
     *tracker = stretch::tracker(Tempo::of(interval_s));
-    let step_px = 0.1 * size_px;
+    let step_px = 0.1 * whole_px;
     tracker.acceleration_density_px2_per_s3 = round(step_px * step_px / interval_s.powi(3));
-    tracker.max_speed_px_per_s = round(0.5 * size_px / interval_s);
+    tracker.max_speed_px_per_s = round(0.5 * whole_px / interval_s);
     tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
-    reasons.push(format!("None goes farther than half its size ({:.1} px) from frame to frame.", 0.5 * size_px));
+    reasons.push(format!("None goes farther than half its size ({:.1} px) from frame to frame.", 0.5 * whole_px));
+    Ok(())
 }
 
 #[cfg(test)]

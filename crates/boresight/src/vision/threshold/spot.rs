@@ -1,10 +1,11 @@
 //! Spot detector: small targets by their local contrast, one detection for each peak of a centre-minus-surround filter.
 //!
 //! Response D = S - B: S the frame smoothed by a box applied twice (close to a Gaussian of the optics), B the mean of a wider
-//! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
-//! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc of radius size/2 that is moved until
+//! box. A peak is the largest D within the target's width at half height, size/2.45; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
+//! on a grid; at least the k-th part of the least contrast) above its surroundings, and if D falls between it and every stronger one nearby (`spot/peaks.rs`). Position: centroid of the positive
+//! part of D in a disc that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
-//! edge, so that positions are not drawn to whole pixels; of two positions closer than size/2 the stronger stays.
+//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, up to size/2 or half the way to the next peak; of two positions closer than the width at half height the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
 //! enlarges it to 1/(1-q). The model ends where negative D is clipped: for peaks of a few deviations the truth is
@@ -22,8 +23,15 @@ use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
 mod disc;
+mod discs;
+mod peaks;
 
 use disc::{Moments, moments, part};
+use discs::{Disc, discs};
+use peaks::{Summit, separate};
+
+/// Diameter of a spot with its soft edge in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
+pub const DIAMETER_PER_WIDTH: f64 = 2.45;
 
 /// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
 const MOST_PULL: f64 = 0.7;
@@ -38,6 +46,7 @@ struct Spot {
     pull: f64,
     score: f32,
     peak: (usize, usize),
+    disc: Disc,
 }
 
 /// A spot of one sign as a detection, before the signs are compared.
@@ -56,13 +65,12 @@ pub struct SpotDetector {
     /// Odd sides of the smoothing and of the surrounding box, px.
     smooth: usize,
     surround: usize,
+    /// Half of the size, px: the largest disc, and how near a weaker peak must be told from this one.
     radius: usize,
-    /// Offsets inside the disc, row by row.
-    disc: Vec<(i32, i32)>,
-    /// The same by rows: each one's offset and how far it reaches to both sides.
-    spans: Vec<(i32, i32)>,
-    /// Σ_j (K * p_x)_j², px².
-    noise_gain: f64,
+    /// Offsets nearer than a spot's width at half height, in which a peak is the largest.
+    resolved: Vec<(i32, i32)>,
+    /// From the smallest to the largest.
+    discs: Vec<Disc>,
     /// A float frame without missing values.
     whole: Image<f32>,
     response: Image<f32>,
@@ -71,7 +79,8 @@ pub struct SpotDetector {
     noise: PixelNoise,
     level: Vec<f32>,
     /// Columns of the row where a pixel may be a peak.
-    summits: Vec<usize>,
+    columns: Vec<usize>,
+    summits: Vec<Summit>,
     spots: Vec<Spot>,
     keep: Vec<bool>,
     found: Vec<Found>,
@@ -100,29 +109,27 @@ impl SpotDetector {
         let smooth = odd(config.smooth_px.unwrap_or(config.size_px / 4.0).max(1.0));
         let surround = odd(config.size_px * config.surround).max(smooth + 2);
         let radius = ((config.size_px / 2.0).floor() as usize).max(1);
-        let r = radius as i32;
-        let disc: Vec<(i32, i32)> = (-r - 1..=r + 1)
-            .flat_map(|y| (-r - 1..=r + 1).map(move |x| (x, y)))
-            .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
+        let width = config.size_px / DIAMETER_PER_WIDTH;
+        let r = width.max(1.0) as i32;
+        let resolved = (-r..=r)
+            .flat_map(|y| (-r..=r).map(move |x| (x, y)))
+            .filter(|(x, y)| f64::from(x * x + y * y) <= (width * width).max(1.0))
             .collect();
-        let reach = |y: i32| disc.iter().filter(|o| o.1 == y).map(|o| o.0).max();
-        let spans = (-r - 1..=r + 1).filter_map(|y| Some((y, reach(y)?))).collect();
         let cell = (4.0 * config.size_px).max(32.0) as usize;
-        let noise_gain = noise_gain(&disc, radius, smooth, surround);
         Self {
             config: config.clone(),
             smooth,
             surround,
             radius,
-            disc,
-            spans,
-            noise_gain,
+            resolved,
+            discs: discs(config.size_px, radius, smooth, surround),
             whole: Image::default(),
             response: Image::default(),
             boxes: Boxes::new(smooth, surround),
             grid: BackgroundGrid::new(cell),
             noise: PixelNoise::default(),
             level: Vec::new(),
+            columns: Vec::new(),
             summits: Vec::new(),
             spots: Vec::new(),
             keep: Vec::new(),
@@ -193,28 +200,33 @@ impl SpotDetector {
     }
 
     fn find_peaks(&mut self) {
-        let mut spots = std::mem::take(&mut self.spots);
+        let (mut spots, mut summits) = (std::mem::take(&mut self.spots), std::mem::take(&mut self.summits));
         spots.clear();
+        summits.clear();
         let h = self.response.height();
         for y in 0..h {
             self.grid.level_row(y, self.config.k as f32, self.config.min_contrast as f32, 1.0, &mut self.level);
             let row = self.response.row(y);
             let above = if y > 0 { self.response.row(y - 1) } else { &[] };
             let below = if y + 1 < h { self.response.row(y + 1) } else { &[] };
-            self.summits.clear();
-            find_summits(Rows { above, row, below, level: &self.level }, &mut self.summits);
-            for &x in &self.summits {
+            self.columns.clear();
+            find_summits(Rows { above, row, below, level: &self.level }, &mut self.columns);
+            for &x in &self.columns {
                 if self.is_peak(x, y, row[x]) {
-                    spots.push(self.centre(x, y, row[x]));
+                    let (median, deviation) = self.grid.at(x as f64, y as f64);
+                    let deviation = deviation.max(self.least_deviation());
+                    summits.push(Summit { x, y, v: row[x], median, deviation, nearest2: usize::MAX, is_own: true });
                 }
             }
         }
-        self.spots = spots;
+        separate(&self.response, &mut summits, self.radius + 2, 2 * self.radius);
+        spots.extend(summits.iter().filter(|s| s.is_own).map(|s| self.centre(s)));
+        (self.spots, self.summits) = (spots, summits);
     }
 
-    /// Whether no pixel of the disc around (x, y) is larger; of equals the first in raster order is the peak.
+    /// Whether no pixel nearer than the width of a spot is larger; of equals the first in raster order is the peak.
     fn is_peak(&self, x: usize, y: usize, v: f32) -> bool {
-        self.disc.iter().all(|&(dx, dy)| {
+        self.resolved.iter().all(|&(dx, dy)| {
             let other = self.at(x as i64 + i64::from(dx), y as i64 + i64::from(dy));
             other.is_none_or(|o| o < v || (o == v && (dy, dx) >= (0, 0)))
         })
@@ -226,12 +238,13 @@ impl SpotDetector {
     }
 
     /// The centroid of the positive response in the disc, the disc moved until it is centred on it.
-    fn centre(&self, x: usize, y: usize, v: f32) -> Spot {
+    fn centre(&self, summit: &Summit) -> Spot {
         let (w, h) = (self.response.width() as f64, self.response.height() as f64);
-        let mut c = Vector2::new(x as f64, y as f64);
+        let mut c = Vector2::new(summit.x as f64, summit.y as f64);
+        let disc = self.disc(summit);
         let (mut mass, mut pull) = (0.0, 0.0);
         for _ in 0..30 {
-            let Moments { sum, moment, edge } = moments(&self.response, self.radius, c);
+            let Moments { sum, moment, edge } = moments(&self.response, disc.radius, c);
             if sum <= 0.0 {
                 break;
             }
@@ -247,9 +260,8 @@ impl SpotDetector {
                 break;
             }
         }
-        let (median, deviation) = self.grid.at(x as f64, y as f64);
-        let score = ((f64::from(v) - median) / deviation.max(self.least_deviation())).min(1e9) as f32;
-        Spot { position: c, mass, pull, score, peak: (x, y) }
+        let score = ((f64::from(summit.v) - summit.median) / summit.deviation).min(1e9) as f32;
+        Spot { position: c, mass, pull, score, peak: (summit.x, summit.y), disc }
     }
 
     /// Least deviation that a score counts in, counts: that of which the least contrast is k. Of a ground without noise, or of one that a codec has flattened in most places, half of the
@@ -258,9 +270,9 @@ impl SpotDetector {
         (self.config.min_contrast / self.config.k).max(1e-6)
     }
 
-    /// Of spots closer than size / 2 the strongest stays.
+    /// Of spots closer than their width at half height the strongest stays.
     fn drop_doubles(&mut self) {
-        let reach2 = (self.config.size_px / 2.0).powi(2);
+        let reach2 = (self.config.size_px / DIAMETER_PER_WIDTH).powi(2);
         self.keep.clear();
         self.keep.resize(self.spots.len(), true);
         // Spots come in raster order of their peaks, and no position is further from its peak than the disc moves.
@@ -280,16 +292,35 @@ impl SpotDetector {
         self.spots.retain(|_| keep.next().is_none_or(|k| *k));
     }
 
+    /// The disc in which noise moves the centroid of a peak the least, of those up to half the way to the nearest other one.
+    fn disc(&self, summit: &Summit) -> Disc {
+        let at = Vector2::new(summit.x as f64, summit.y as f64);
+        let smallest = self.discs[0];
+        let (mut best, mut least) = (smallest, f64::INFINITY);
+        let fits = |d: &&Disc| d.radius == smallest.radius || 4 * d.radius.pow(2) <= summit.nearest2;
+        for disc in self.discs.iter().take_while(fits) {
+            let Moments { sum, edge, .. } = moments(&self.response, disc.radius, at);
+            // As the covariance, but for the limit: a flat top leaves a small disc no hold at all.
+            let variance = disc.noise_gain / (sum - edge).max(0.0).powi(2);
+            if variance < least {
+                (best, least) = (*disc, variance);
+            }
+        }
+        best
+    }
+
     fn detection<T: Pixel>(&self, image: &Image<T>, spot: &Spot, noise: (f64, f64), sign: f32) -> Detection {
         let (cx, cy) = (spot.position.x.round() as i64, spot.position.y.round() as i64);
         let top = self.response.get(spot.peak.0, spot.peak.1).unwrap_or(0.0);
         // The pixels above half the peak, for the size.
         let (mut area, mut low, mut high) = (0, (cx, cy), (cx, cy));
         let mut peak = f32::NEG_INFINITY;
-        for &(dy, reach) in &self.spans {
-            let y = cy + i64::from(dy);
-            let (from, row) = part(&self.response, y, cx - i64::from(reach), cx + i64::from(reach));
-            let (_, pixels) = part(image, y, cx - i64::from(reach), cx + i64::from(reach));
+        // Those nearer than two pixels beyond the radius.
+        let outer = spot.disc.radius as i64 + 2;
+        for dy in 1 - outer..outer {
+            let (y, reach) = (cy + dy, (outer * outer - dy * dy - 1).isqrt());
+            let (from, row) = part(&self.response, y, cx - reach, cx + reach);
+            let (_, pixels) = part(image, y, cx - reach, cx + reach);
             for (x, (v, pixel)) in (from..).zip(row.iter().zip(pixels)) {
                 if *v >= 0.5 * top {
                     area += 1;
@@ -302,7 +333,8 @@ impl SpotDetector {
         // Rounding and clipping leave a little even without noise. A missing value counts as 0.
         let level = image.get(spot.peak.0, spot.peak.1).map_or(0.0, Pixel::value).max(0.0);
         let variance = (noise.0 + noise.1 * level).max(0.0);
-        let sd2 = variance * self.noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2) + 1e-4;
+        let Disc { noise_gain, share, .. } = spot.disc;
+        let sd2 = variance * noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2) + 1e-4;
         Detection {
             position: spot.position,
             cov: Matrix2::identity() * sd2,
@@ -314,7 +346,7 @@ impl SpotDetector {
             },
             area_px: area.max(1),
             peak: if peak.is_finite() { sign * peak } else { top },
-            sum: spot.mass,
+            sum: spot.mass / share,
             score: spot.score,
             class: None,
             velocity: None,
@@ -323,22 +355,6 @@ impl SpotDetector {
             plot: None,
         }
     }
-}
-
-/// Σ_j (K * p_x)_j² over all pixels j that the disc's weights see.
-fn noise_gain(disc: &[(i32, i32)], radius: usize, smooth: usize, surround: usize) -> f64 {
-    let reach = radius + 1 + (smooth - 1).max(surround / 2) + 1;
-    let n = 2 * reach + 1;
-    let mut weight = Image::filled(n, n, 0.0f32);
-    for &(dx, dy) in disc {
-        let (x, y) = (reach as i64 + i64::from(dx), reach as i64 + i64::from(dy));
-        let window = (radius as f64 + 0.5 - f64::from(dx * dx + dy * dy).sqrt()).clamp(0.0, 1.0);
-        weight.row_mut(y as usize)[x as usize] = dx as f32 * window as f32;
-    }
-    // The kernel is symmetric, so filtering the weights is the transposed filter.
-    let mut seen = Image::default();
-    Boxes::new(smooth, surround).run(&weight, &mut seen);
-    seen.as_slice().iter().map(|v| f64::from(*v).powi(2)).sum()
 }
 
 #[cfg(test)]

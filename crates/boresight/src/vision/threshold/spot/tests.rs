@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 const GROUND: f64 = 50.0;
+const LARGE: Disc = Disc { radius: 3, noise_gain: 1.0, share: 1.0 };
 
 /// A frame of 64 x 48 with Gaussian spots (x, y, height) of sigma 1.5 px.
 fn frame(spots: &[(f64, f64, f64)]) -> Image<f32> {
@@ -55,15 +56,18 @@ fn the_response_to_one_pixel_is_the_kernel_and_a_missing_value_takes_its_left_ne
 fn sizes_follow_from_the_targets_size() {
     let sizes = |config: SpotConfig| {
         let d = SpotDetector::new(&config);
-        (d.smooth, d.surround, d.radius, d.disc.len())
+        let discs: Vec<usize> = d.discs.iter().map(|d| d.radius).collect();
+        (d.smooth, d.surround, d.radius, d.resolved.len(), discs)
     };
-    // Discs: whole-pixel offsets nearer than radius + 2.
-    let inside = |r: i32| (-r..=r).flat_map(|y| (-r..=r).map(move |x| x * x + y * y)).filter(|d2| *d2 < r * r).count();
-    assert_eq!(sizes(SpotConfig::default()), (3, 11, 3, inside(5)));
-    assert_eq!(sizes(SpotConfig { size_px: 20.0, ..Default::default() }), (5, 31, 10, inside(12)));
+    // A peak is the largest of the whole-pixel offsets up to size / 2.45 away; discs have 0.2 to 0.5 of the size.
+    let inside =
+        |d2: i32| (-9..=9).flat_map(|y: i32| (-9..=9).map(move |x: i32| x * x + y * y)).filter(|v| *v <= d2).count();
+    assert_eq!(sizes(SpotConfig::default()), (3, 11, 3, inside(8), vec![1, 2, 3]));
+    let large = SpotConfig { size_px: 20.0, ..Default::default() };
+    assert_eq!(sizes(large), (5, 31, 10, inside(66), vec![4, 5, 6, 8, 10]));
     let narrow = SpotConfig { size_px: 4.0, surround: 1.0, smooth_px: Some(9.0), ..Default::default() };
-    assert_eq!(sizes(narrow), (9, 11, 2, inside(4)), "the surroundings are wider than the smoothing");
-    assert_eq!(sizes(SpotConfig { size_px: 1.9, ..Default::default() }), (1, 3, 1, inside(3)));
+    assert_eq!(sizes(narrow), (9, 11, 2, inside(2), vec![1, 2]), "the surroundings are wider than the smoothing");
+    assert_eq!(sizes(SpotConfig { size_px: 1.9, ..Default::default() }), (1, 3, 1, inside(1), vec![1]));
     assert_eq!([0.2, 1.0, 2.0, 2.6, 4.0, 4.6].map(odd), [1, 1, 3, 3, 5, 5]);
 }
 
@@ -73,21 +77,19 @@ fn the_gain_from_noise_to_position_is_that_of_the_kernel_written_out() {
         [SpotConfig::default(), SpotConfig { size_px: 11.0, surround: 1.0, smooth_px: Some(5.0), ..Default::default() }]
     {
         let d = SpotDetector::new(&config);
-        let mut sum = 0.0;
-        for y in -30..=30 {
-            for x in -30..=30 {
-                let seen: f64 = d
-                    .disc
-                    .iter()
-                    .map(|&(px, py)| {
-                        let window = (d.radius as f64 + 0.5 - f64::from(px).hypot(f64::from(py))).clamp(0.0, 1.0);
-                        f64::from(px) * window * kernel(d.smooth, d.surround, i64::from(px) - x, i64::from(py) - y)
-                    })
-                    .sum();
+        for disc in &d.discs {
+            let r = disc.radius as i64 + 1;
+            let mut sum = 0.0;
+            for (x, y) in (-30..=30).flat_map(|y| (-30..=30).map(move |x| (x, y))) {
+                let weighted = |(px, py): (i64, i64)| {
+                    let window = (disc.radius as f64 + 0.5 - (px as f64).hypot(py as f64)).clamp(0.0, 1.0);
+                    px as f64 * window * kernel(d.smooth, d.surround, px - x, py - y)
+                };
+                let seen: f64 = (-r..=r).flat_map(|py| (-r..=r).map(move |px| (px, py))).map(weighted).sum();
                 sum += seen * seen;
             }
+            assert!((disc.noise_gain / sum - 1.0).abs() < 1e-4, "{} {sum}", disc.noise_gain);
         }
-        assert!((d.noise_gain / sum - 1.0).abs() < 1e-4, "{} {sum}", d.noise_gain);
     }
 }
 
@@ -119,8 +121,9 @@ fn spots_of_both_signs_come_in_raster_order_without_each_others_rims() {
 }
 
 #[test]
-fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
-    let mut detector = SpotDetector::new(&SpotConfig { size_px: 8.0, ..Default::default() });
+fn neighbours_nearer_than_their_width_are_one_and_the_stronger_stays() {
+    // 9.8 px across are 4 px at half height.
+    let mut detector = SpotDetector::new(&SpotConfig { size_px: 9.8, ..Default::default() });
     let mut kept = |spots: &[(f64, f64, f64)]| -> Vec<f64> {
         detector.spots = spots
             .iter()
@@ -130,6 +133,7 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
                 pull: 0.0,
                 score: 1.0,
                 peak: (x as usize, y as usize),
+                disc: LARGE,
             })
             .collect();
         detector.drop_doubles();
@@ -138,7 +142,7 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
     assert_eq!(kept(&[(10.0, 10.0, 1.0), (13.9, 10.0, 2.0)]), [2.0]);
     assert_eq!(kept(&[(10.0, 10.0, 2.0), (10.0, 13.9, 1.0)]), [2.0]);
     assert_eq!(kept(&[(10.0, 10.0, 2.0), (12.0, 12.0, 2.0)]).len(), 1);
-    assert_eq!(kept(&[(10.0, 10.0, 1.0), (14.0, 10.0, 2.0)]), [1.0, 2.0], "exactly half the size apart");
+    assert_eq!(kept(&[(10.0, 10.0, 1.0), (14.0, 10.0, 2.0)]), [1.0, 2.0], "exactly the width apart");
     assert_eq!(kept(&[(10.0, 0.0, 1.0), (10.0, 3.0, 2.0)]), [2.0], "the first in the first row");
     assert_eq!(kept(&[(10.0, 10.0, 3.0), (40.0, 10.0, 1.0), (13.0, 11.0, 2.0), (40.0, 60.0, 4.0)]), [3.0, 1.0, 4.0]);
 }
@@ -150,6 +154,57 @@ fn two_equal_pixels_are_one_spot_between_them() {
     let found = detect(&image, &SpotConfig::default(), (1.0, 0.0));
     assert_eq!(found.len(), 1);
     assert!((found[0].position - Vector2::new(20.5, 20.0)).norm() < 0.02, "{}", found[0].position);
+}
+
+#[test]
+fn neighbours_that_a_valley_parts_are_two_and_hardly_draw_each_other() {
+    // Spots of 3.5 px at half height: 5 px apart there is a valley, 3 px apart none.
+    let found = |gap: f64, size_px: f64| {
+        let image = frame(&[(30.2, 20.0, 100.0), (30.2 + gap, 20.4, 90.0)]);
+        let config = SpotConfig { size_px, surround: 1.0, smooth_px: Some(3.0), ..Default::default() };
+        detect(&image, &config, (1.0, 0.0))
+    };
+    for (size_px, most) in [(8.6, 0.6), (3.5, 0.3)] {
+        let two = found(5.0, size_px);
+        assert_eq!((two.len(), found(3.0, size_px).len()), (2, 1), "{size_px}");
+        for (d, x) in two.iter().zip([30.2, 35.2]) {
+            assert!((d.position.x - x).abs() < most, "{size_px}: {}", d.position);
+        }
+    }
+}
+
+#[test]
+fn the_disc_is_that_in_which_noise_moves_a_centroid_the_least() {
+    let mut detector = SpotDetector::new(&SpotConfig { size_px: 20.0, surround: 1.0, ..Default::default() });
+    let radius = |detector: &mut SpotDetector, image: &Image<f32>, nearest2: usize| {
+        detector.fill_response(image);
+        let v = detector.response.row(24)[32];
+        let summit = Summit { x: 32, y: 24, v, median: 0.0, deviation: 1.0, nearest2, is_own: true };
+        detector.disc(&summit).radius
+    };
+    let image = |light: &dyn Fn(f64) -> f64| {
+        let value = |i: usize| light(((i % 64) as f64 - 32.0).hypot((i / 64) as f64 - 24.0)) as f32;
+        Image::from_vec(64, 48, (0..64 * 48).map(value).collect()).unwrap()
+    };
+    // A Gaussian of 20 px across, 8.2 at half height: 0.25 to 0.3 of that; a disc of 14 px needs its edge; beside a neighbour half of the way, the smallest at least.
+    let spot = image(&|r| 100.0 * (-r * r / (2.0 * 3.47 * 3.47)).exp());
+    assert!((5..=6).contains(&radius(&mut detector, &spot, usize::MAX)));
+    let disc = image(&|r| 100.0 / (1.0 + (3.0 * (r - 7.0)).exp()));
+    assert!(radius(&mut detector, &disc, usize::MAX) >= 8);
+    assert!(radius(&mut detector, &disc, 144) <= 6);
+    assert_eq!(radius(&mut detector, &spot, 9), 4);
+}
+
+#[test]
+fn what_a_disc_holds_is_counted_as_the_whole_spot() {
+    let config = SpotConfig { size_px: 8.6, surround: 1.0, smooth_px: Some(3.0), ..Default::default() };
+    let image = frame(&[(30.0, 20.0, 100.0)]);
+    let mut detector = SpotDetector::new(&config);
+    let mut found = Vec::new();
+    detector.detect(&image, (1.0, 0.0), &mut found);
+    assert!(detector.spots[0].disc.radius < detector.radius && detector.spots[0].disc.share < 0.9);
+    let whole = moments(&detector.response, detector.radius, Vector2::new(30.0, 20.0)).sum;
+    assert!((found[0].sum / whole - 1.0).abs() < 0.02, "{} {whole}", found[0].sum);
 }
 
 #[test]
@@ -185,8 +240,8 @@ fn size_peak_and_variance_are_read_from_the_response() {
         d.response.row_mut(y)[x] = r;
         frame.row_mut(y)[x] = v;
     }
-    d.noise_gain = 2.0;
-    let spot = |pull| Spot { position: Vector2::new(9.4, 9.2), mass: 10.0, pull, score: 4.0, peak: (9, 9) };
+    let disc = Disc { radius: 3, noise_gain: 2.0, share: 1.0 };
+    let spot = |pull| Spot { position: Vector2::new(9.4, 9.2), mass: 10.0, pull, score: 4.0, peak: (9, 9), disc };
     let bright = d.detection(&frame, &spot(0.5), (3.0, 0.1), 1.0);
     // Half the peak or more: (9, 9), (10, 9), (11, 9), (9, 10).
     assert_eq!(bright.extent, Extent { left_px: 8.5, top_px: 8.5, width_px: 3.0, height_px: 2.0 });
@@ -213,7 +268,9 @@ fn the_pull_of_the_disc_is_how_far_its_centroid_follows_it() {
     let mut d = SpotDetector::new(&SpotConfig::default());
     d.response = Image::filled(40, 40, 2.0);
     d.grid.refresh(&d.response);
-    let spot = d.centre(20, 20, 2.0);
+    d.discs = vec![LARGE];
+    let summit = Summit { x: 20, y: 20, v: 2.0, median: 0.0, deviation: 1.0, nearest2: usize::MAX, is_own: true };
+    let spot = d.centre(&summit);
     let (mut mass, mut edge) = (0.0, 0.0);
     for y in -5..=5 {
         for x in -5..=5 {
