@@ -172,11 +172,14 @@ pub(super) fn choose_looked(
             }
             None => None,
         };
-        let spots_for_cells = match &cells {
-            Some(_) => counted.map_or_else(|| particles::count(frames, info, n_threads), Ok)?.in_place_of_cells(),
+        // Before a camera that stands they were not counted.
+        let count = || counted.map_or_else(|| particles::count(frames, info, n_threads), Ok);
+        let spots_in_place = match &cells {
+            Some(_) => count()?.in_place_of_cells(),
+            None if evidence.are_particles() => count()?.in_place_of_isolated(),
             None => None,
         };
-        if let Some(seen) = spots_for_cells {
+        if let Some(seen) = spots_in_place {
             particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
         } else if let Some(seen) = cells {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);

@@ -74,6 +74,11 @@ pub struct Counted {
 }
 
 impl Counted {
+    /// What is there of blobs that are many, if they are particles.
+    pub fn in_place_of_isolated(self) -> Option<Particles> {
+        self.fills.then_some(self.seen)
+    }
+
     /// What is there of bright pieces that pass for cells, if at half of their height they are spots, of one size: how large a piece is that is cut at some deviations of the noise tells
     /// how bright a spot is.
     pub fn in_place_of_cells(self) -> Option<Particles> {

@@ -92,6 +92,23 @@ impl Seen {
         self.bright.per_frame.max(self.dark.per_frame) > MANY
     }
 
+    /// Whether they are that, but for few that move before the others, which stand.
+    pub fn are_particles(&self) -> bool {
+        let polarity = self.polarity();
+        let n_moving = self.bright.chains.moving.len() + self.dark.chains.moving.len();
+        let few_move = self.moves() && (n_moving as f64) < FEW_MOVE * self.per_frame(polarity);
+        self.per_frame(polarity) > MANY && !few_move
+    }
+
+    /// Blobs a frame of these polarities.
+    fn per_frame(&self, polarity: Polarity) -> f64 {
+        match polarity {
+            Polarity::Both => self.bright.per_frame + self.dark.per_frame,
+            Polarity::Dark => self.dark.per_frame,
+            Polarity::Bright => self.bright.per_frame,
+        }
+    }
+
     /// Whether anything moves as a target would.
     pub fn moves(&self) -> bool {
         self.bright.chains.is_sure() || self.dark.chains.is_sure()
@@ -203,10 +220,7 @@ const MOST_FAINT: f64 = 0.25;
 pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut Config, reasons: &mut Vec<String>) {
     let polarity = evidence.polarity();
     let seen = if polarity == Polarity::Dark { &evidence.dark } else { &evidence.bright };
-    let per_frame = match polarity {
-        Polarity::Both => evidence.bright.per_frame + evidence.dark.per_frame,
-        _ => seen.per_frame,
-    };
+    let per_frame = evidence.per_frame(polarity);
     reasons.push(if evidence.is_poor() && !evidence.moves() {
         "Nothing stands clear of its surroundings in these frames and nothing in them moves as a target would: small bright targets are looked for \
          (dark ones: --set detector.threshold.isolated.polarity=dark)."
@@ -247,8 +261,7 @@ pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut 
     tracker.min_initiation_score = INITIATION_SCORE;
     stretch::of_tracker(tempo, tracker);
     let n_moving = evidence.bright.chains.moving.len() + evidence.dark.chains.moving.len();
-    let few_move = evidence.moves() && (n_moving as f64) < FEW_MOVE * per_frame;
-    if per_frame > MANY && !few_move {
+    if evidence.are_particles() {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
         );
