@@ -131,7 +131,7 @@ impl Default for LocalConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct SpotConfig {
-    /// Diameter of the target with its soft edge, px, 2..=255. Larger finds larger targets and joins neighbours.
+    /// Diameter of the target with its soft edge, px, 2..=255. Larger finds larger and fainter targets; half of it tells clear neighbours apart.
     pub size_px: f64,
     /// Distance of the response from its local median in robust standard deviations, above 0.
     pub k: f64,
