@@ -38,7 +38,7 @@ const WIDEST_PX: u32 = 40;
 const SPOT_PX: f64 = 10.0;
 
 /// Most detections a frame.
-pub(super) const MOST_DETECTIONS: u32 = 20_000;
+const MOST_DETECTIONS: u32 = 20_000;
 /// Side of the smoothing box, applied twice, in units of the width at half height; half of the diameter at most.
 const SMOOTH_PER_WIDTH: f64 = 0.66;
 
@@ -171,6 +171,15 @@ fn spot_config(particles: &Particles, size_px: f64, false_share: f64, info: &Sou
     }
 }
 
+/// The same as a whole.
+fn detector(spot: SpotConfig) -> DetectorConfig {
+    DetectorConfig {
+        threshold: ThresholdConfig::Spot(spot),
+        max_detections: Some(MOST_DETECTIONS),
+        ..DetectorConfig::default()
+    }
+}
+
 /// Writes detector and tracker.
 /// # Errors
 /// Frames of more than one size or pixel type.
@@ -184,8 +193,8 @@ pub fn configure(
     reasons: &mut Vec<String>,
 ) -> Result<()> {
     let whole_px = (DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0);
-    let at = |size_px: f64| spot_config(particles, size_px, FALSE_SHARE_COUNTED, info);
-    let size_px = spot_size::find(particles, frames, info, n_threads, at)?;
+    let at = |size_px: f64| detector(spot_config(particles, size_px, FALSE_SHARE_COUNTED, info));
+    let size_px = spot_size::find(particles.width_px, particles.per_frame, frames, info, n_threads, at)?;
     let spot = spot_config(particles, size_px, FALSE_SHARE, info);
     let size_px = spot.size_px;
     let dark = particles.polarity == Polarity::Dark;
@@ -196,11 +205,7 @@ pub fn configure(
         if dark { "dark" } else { "bright" },
         particles.width_px
     ));
-    config.detector = DetectorConfig {
-        threshold: ThresholdConfig::Spot(spot),
-        max_detections: Some(MOST_DETECTIONS),
-        ..DetectorConfig::default()
-    };
+    config.detector = detector(spot);
     config.detector.camera = CameraConfig::Fixed;
     let tracker = &mut config.tracker;
     *tracker = stretch::tracker(Tempo::of(interval_s));

@@ -7,11 +7,9 @@
 
 use super::looks;
 use super::near::Near;
-use super::particles::{MOST_DETECTIONS, Particles};
 use super::spread::spread;
 use crate::vision::DetectorConfig;
 use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
-use crate::vision::threshold::{SpotConfig, ThresholdConfig};
 use crate::{Frame, Result, Scan, SourceInfo};
 
 /// Spots that are looked at, and the fewest and most pairs of frames for that: of 2000 a share of one in forty that is not found again is known to a seventh.
@@ -29,30 +27,27 @@ const FALL_APART: f64 = 0.5;
 /// Deviations by which more may be not found again than with the whole size.
 const BY_CHANCE: f64 = 3.0;
 
-/// The diameter to look for, px; `at` is what is looked for at a diameter.
+/// The diameter to look for, px, where so many blobs a frame of this width at half height are seen; `at` is what is looked for at a diameter.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub(super) fn find(
-    particles: &Particles,
+    width_px: f64,
+    per_frame: f64,
     frames: &[Frame],
     info: &SourceInfo,
     n_threads: usize,
-    at: impl Fn(f64) -> SpotConfig,
+    at: impl Fn(f64) -> DetectorConfig,
 ) -> Result<f64> {
     let firsts: Vec<usize> = (0..frames.len().saturating_sub(1)).collect();
-    let n_pairs = (SPOTS / particles.per_frame.max(1.0)).ceil().clamp(PAIRS.0, PAIRS.1) as usize;
+    let n_pairs = (SPOTS / per_frame.max(1.0)).ceil().clamp(PAIRS.0, PAIRS.1) as usize;
     let pairs: Vec<&Frame> = spread(&firsts, n_pairs).flat_map(|&k| [&frames[k], &frames[k + 1]]).collect();
-    let whole_px = (DIAMETERS[0] * particles.width_px).clamp(LEAST_PX, MOST_PX);
-    let scans = |size_px: f64| {
-        let threshold = ThresholdConfig::Spot(at(size_px));
-        let config = DetectorConfig { threshold, max_detections: Some(MOST_DETECTIONS), ..DetectorConfig::default() };
-        looks::scans(&config, pairs.iter().copied(), info, n_threads)
-    };
+    let whole_px = (DIAMETERS[0] * width_px).clamp(LEAST_PX, MOST_PX);
+    let scans = |size_px: f64| looks::scans(&at(size_px), pairs.iter().copied(), info, n_threads);
     let wide = scans(whole_px)?;
     let of_wide = Again::of(&wide, 0.5 * whole_px);
     let mut found = vec![(whole_px, of_wide)];
     for diameter in &DIAMETERS[1..] {
-        let size_px = (diameter * particles.width_px).clamp(LEAST_PX, MOST_PX);
+        let size_px = (diameter * width_px).clamp(LEAST_PX, MOST_PX);
         let narrow = scans(size_px)?;
         if falls_apart(&wide, &narrow, 0.5 * whole_px) > FALL_APART {
             break;
@@ -116,7 +111,7 @@ fn falls_apart(wide: &[Scan], narrow: &[Scan], radius_px: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::threshold::Polarity;
+    use crate::vision::threshold::{SpotConfig, ThresholdConfig};
     use crate::{FrameIndex, Image, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -145,8 +140,7 @@ mod tests {
         };
         let frames: Vec<Frame> = (0..4).map(&mut frame).collect();
         let (frames, info) = super::super::in_memory::described(frames);
-        let seen = Particles { polarity: Polarity::Bright, per_frame: n as f64, width_px, step: 0.0 };
-        let at = |size_px: f64| SpotConfig {
+        let spot = |size_px: f64| SpotConfig {
             size_px,
             k: 4.5,
             min_contrast: 0.0,
@@ -154,7 +148,11 @@ mod tests {
             smooth_px: Some((0.66 * width_px).min(0.5 * size_px)),
             ..SpotConfig::default()
         };
-        find(&seen, &frames, &info, 1, at).unwrap() / width_px
+        let at = |size_px: f64| DetectorConfig {
+            threshold: ThresholdConfig::Spot(spot(size_px)),
+            ..DetectorConfig::default()
+        };
+        find(width_px, n as f64, &frames, &info, 1, at).unwrap() / width_px
     }
 
     #[test]

@@ -27,11 +27,9 @@ mod discs;
 mod peaks;
 
 use disc::{Moments, moments, part};
+pub use discs::DIAMETER_PER_WIDTH;
 use discs::{Disc, discs};
-use peaks::{Summit, separate};
-
-/// Diameter of a spot with its soft edge in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
-pub const DIAMETER_PER_WIDTH: f64 = 2.45;
+use peaks::{SPLIT, Summit, separate};
 
 /// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
 const MOST_PULL: f64 = 0.7;
@@ -214,8 +212,20 @@ impl SpotDetector {
             for &x in &self.columns {
                 if self.is_peak(x, y, row[x]) {
                     let (median, deviation) = self.grid.at(x as f64, y as f64);
+                    // Where a codec has flattened the ground the noise of what it left is not known.
+                    let is_known = deviation >= self.least_deviation();
+                    let least_fall = if is_known { SPLIT * deviation } else { f64::INFINITY };
                     let deviation = deviation.max(self.least_deviation());
-                    summits.push(Summit { x, y, v: row[x], median, deviation, nearest2: usize::MAX, is_own: true });
+                    summits.push(Summit {
+                        x,
+                        y,
+                        v: row[x],
+                        median,
+                        deviation,
+                        least_fall,
+                        nearest2: usize::MAX,
+                        is_own: true,
+                    });
                 }
             }
         }

@@ -6,7 +6,10 @@
 use crate::Image;
 
 /// Fall that splits, deviations of the response: three of the difference of two responses, 3 √2, one of 740 by noise alone.
-const SPLIT: f64 = 4.243;
+pub(super) const SPLIT: f64 = 4.243;
+
+/// The same as a share of the stronger one: what optics and codecs leave beside a bright spot is a part of it.
+const SPLIT_SHARE: f64 = 0.1;
 
 /// A summit of the response.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +21,8 @@ pub(super) struct Summit {
     /// Median of the response around and its deviation, counts.
     pub(super) median: f64,
     pub(super) deviation: f64,
+    /// Least fall that splits it from a stronger one, counts.
+    pub(super) least_fall: f64,
     /// Square of the distance to the nearest other peak within reach, px²; the largest number there is without one.
     pub(super) nearest2: usize,
     /// Whether it is a target's own.
@@ -34,10 +39,10 @@ pub(super) fn separate(response: &Image<f32>, summits: &mut [Summit], beside: us
                 break;
             }
             // The first of equals is the stronger one.
-            let weaker = if a.v >= b.v { j } else { i };
+            let (weaker, strongest) = if a.v >= b.v { (j, a.v) } else { (i, b.v) };
             if summits[weaker].is_own && distance2(&a, &b) <= beside * beside {
                 let fall = f64::from(summits[weaker].v - lowest_between(response, &a, &b));
-                summits[weaker].is_own = fall >= SPLIT * summits[weaker].deviation;
+                summits[weaker].is_own = fall >= summits[weaker].least_fall.max(SPLIT_SHARE * f64::from(strongest));
             }
         }
     }
@@ -77,6 +82,7 @@ mod tests {
             v: response.row(y)[x],
             median: 0.0,
             deviation: 1.0,
+            least_fall: SPLIT,
             nearest2: usize::MAX,
             is_own: true,
         };
@@ -97,6 +103,9 @@ mod tests {
         // Farther away than that nothing is asked, and what is no peak is nobody's neighbour.
         assert_eq!(separated(&response, &places, 3, 3), [(true, NONE); 4]);
         assert_eq!(separated(&response, &places, 4, 30)[0], (true, 900));
+        // Beside one of 60 six are asked for.
+        response.row_mut(5)[44] = 60.0;
+        assert_eq!(separated(&response, &places, 6, 6)[2], (false, NONE));
     }
 
     #[test]
@@ -112,7 +121,16 @@ mod tests {
 
     #[test]
     fn the_way_between_two_summits_is_straight_whichever_comes_first() {
-        let at = |x, y| Summit { x, y, v: 9.0, median: 0.0, deviation: 1.0, nearest2: usize::MAX, is_own: true };
+        let at = |x, y| Summit {
+            x,
+            y,
+            v: 9.0,
+            median: 0.0,
+            deviation: 1.0,
+            least_fall: SPLIT,
+            nearest2: usize::MAX,
+            is_own: true,
+        };
         for (a, b) in [((3, 4), (9, 7)), ((9, 4), (3, 7)), ((5, 2), (5, 9)), ((2, 6), (8, 6)), ((4, 9), (6, 2))] {
             let mut response = Image::filled(12, 12, 9.0f32);
             // Half the way, within half a pixel.

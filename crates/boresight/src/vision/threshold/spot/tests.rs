@@ -179,7 +179,7 @@ fn the_disc_is_that_in_which_noise_moves_a_centroid_the_least() {
     let radius = |detector: &mut SpotDetector, image: &Image<f32>, nearest2: usize| {
         detector.fill_response(image);
         let v = detector.response.row(24)[32];
-        let summit = Summit { x: 32, y: 24, v, median: 0.0, deviation: 1.0, nearest2, is_own: true };
+        let summit = Summit { x: 32, y: 24, v, median: 0.0, deviation: 1.0, least_fall: SPLIT, nearest2, is_own: true };
         detector.disc(&summit).radius
     };
     let image = |light: &dyn Fn(f64) -> f64| {
@@ -269,7 +269,16 @@ fn the_pull_of_the_disc_is_how_far_its_centroid_follows_it() {
     d.response = Image::filled(40, 40, 2.0);
     d.grid.refresh(&d.response);
     d.discs = vec![LARGE];
-    let summit = Summit { x: 20, y: 20, v: 2.0, median: 0.0, deviation: 1.0, nearest2: usize::MAX, is_own: true };
+    let summit = Summit {
+        x: 20,
+        y: 20,
+        v: 2.0,
+        median: 0.0,
+        deviation: 1.0,
+        least_fall: SPLIT,
+        nearest2: usize::MAX,
+        is_own: true,
+    };
     let spot = d.centre(&summit);
     let (mut mass, mut edge) = (0.0, 0.0);
     for y in -5..=5 {
