@@ -1,11 +1,11 @@
 //! Spot detector: small targets by their local contrast, one detection for each peak of a centre-minus-surround filter.
 //!
 //! Response D = S - B: S the frame smoothed by a box applied twice (close to a Gaussian of the optics), B the mean of a wider
-//! box. A peak is the largest D within the target's width at half height, size/2.45; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
-//! on a grid; at least the k-th part of the least contrast) above its surroundings, and if D falls between it and every stronger one nearby (`spot/peaks.rs`). Position: centroid of the positive
-//! part of D in a disc that is moved until
+//! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
+//! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
-//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, up to size/2 or half the way to the next peak; of two positions closer than the width at half height the stronger stays.
+//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, up to size/2 or half the way to the next peak (`spot/peaks.rs`); of two
+//! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
 //! enlarges it to 1/(1-q). The model ends where negative D is clipped: for peaks of a few deviations the truth is
@@ -23,13 +23,11 @@ use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
 mod disc;
-mod discs;
 mod peaks;
 
-use disc::{Moments, moments, part};
-pub use discs::DIAMETER_PER_WIDTH;
-use discs::{Disc, discs};
-use peaks::{SPLIT, Summit, separate};
+pub use disc::DIAMETER_PER_WIDTH;
+use disc::{Disc, Moments, discs, moments, part};
+use peaks::{Summit, find_nearest};
 
 /// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
 const MOST_PULL: f64 = 0.7;
@@ -65,8 +63,8 @@ pub struct SpotDetector {
     surround: usize,
     /// Half of the size, px: the largest disc, and how near a weaker peak must be told from this one.
     radius: usize,
-    /// Offsets nearer than a spot's width at half height, in which a peak is the largest.
-    resolved: Vec<(i32, i32)>,
+    /// Offsets inside the largest disc, in which a peak is the largest.
+    disc_offsets: Vec<(i32, i32)>,
     /// From the smallest to the largest.
     discs: Vec<Disc>,
     /// A float frame without missing values.
@@ -107,11 +105,10 @@ impl SpotDetector {
         let smooth = odd(config.smooth_px.unwrap_or(config.size_px / 4.0).max(1.0));
         let surround = odd(config.size_px * config.surround).max(smooth + 2);
         let radius = ((config.size_px / 2.0).floor() as usize).max(1);
-        let width = config.size_px / DIAMETER_PER_WIDTH;
-        let r = width.max(1.0) as i32;
-        let resolved = (-r..=r)
-            .flat_map(|y| (-r..=r).map(move |x| (x, y)))
-            .filter(|(x, y)| f64::from(x * x + y * y) <= (width * width).max(1.0))
+        let r = radius as i32;
+        let disc_offsets = (-r - 1..=r + 1)
+            .flat_map(|y| (-r - 1..=r + 1).map(move |x| (x, y)))
+            .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
             .collect();
         let cell = (4.0 * config.size_px).max(32.0) as usize;
         Self {
@@ -119,7 +116,7 @@ impl SpotDetector {
             smooth,
             surround,
             radius,
-            resolved,
+            disc_offsets,
             discs: discs(config.size_px, radius, smooth, surround),
             whole: Image::default(),
             response: Image::default(),
@@ -212,31 +209,19 @@ impl SpotDetector {
             for &x in &self.columns {
                 if self.is_peak(x, y, row[x]) {
                     let (median, deviation) = self.grid.at(x as f64, y as f64);
-                    // Where a codec has flattened the ground the noise of what it left is not known.
-                    let is_known = deviation >= self.least_deviation();
-                    let least_fall = if is_known { SPLIT * deviation } else { f64::INFINITY };
                     let deviation = deviation.max(self.least_deviation());
-                    summits.push(Summit {
-                        x,
-                        y,
-                        v: row[x],
-                        median,
-                        deviation,
-                        least_fall,
-                        nearest2: usize::MAX,
-                        is_own: true,
-                    });
+                    summits.push(Summit { x, y, v: row[x], median, deviation, nearest2: usize::MAX });
                 }
             }
         }
-        separate(&self.response, &mut summits, self.radius + 2, 2 * self.radius);
-        spots.extend(summits.iter().filter(|s| s.is_own).map(|s| self.centre(s)));
+        find_nearest(&mut summits, 2 * self.radius);
+        spots.extend(summits.iter().map(|s| self.centre(s)));
         (self.spots, self.summits) = (spots, summits);
     }
 
-    /// Whether no pixel nearer than the width of a spot is larger; of equals the first in raster order is the peak.
+    /// Whether no pixel of the largest disc around (x, y) is larger; of equals the first in raster order is the peak.
     fn is_peak(&self, x: usize, y: usize, v: f32) -> bool {
-        self.resolved.iter().all(|&(dx, dy)| {
+        self.disc_offsets.iter().all(|&(dx, dy)| {
             let other = self.at(x as i64 + i64::from(dx), y as i64 + i64::from(dy));
             other.is_none_or(|o| o < v || (o == v && (dy, dx) >= (0, 0)))
         })
@@ -280,9 +265,9 @@ impl SpotDetector {
         (self.config.min_contrast / self.config.k).max(1e-6)
     }
 
-    /// Of spots closer than their width at half height the strongest stays.
+    /// Of spots closer than size / 2 the strongest stays.
     fn drop_doubles(&mut self) {
-        let reach2 = (self.config.size_px / DIAMETER_PER_WIDTH).powi(2);
+        let reach2 = (self.config.size_px / 2.0).powi(2);
         self.keep.clear();
         self.keep.resize(self.spots.len(), true);
         // Spots come in raster order of their peaks, and no position is further from its peak than the disc moves.
