@@ -192,18 +192,23 @@ pub fn configure(
     config: &mut Config,
     reasons: &mut Vec<String>,
 ) -> Result<()> {
-    let whole_px = (DIAMETER_PER_WIDTH * particles.width_px).clamp(3.0, 99.0);
+    let whole_px = spot_size::whole_px(particles.width_px);
     let at = |size_px: f64| detector(spot_config(particles, size_px, FALSE_SHARE_COUNTED, info));
     let size_px = spot_size::find(particles.width_px, particles.per_frame, frames, info, n_threads, at)?;
     let spot = spot_config(particles, size_px, FALSE_SHARE, info);
-    let size_px = spot.size_px;
     let dark = particles.polarity == Polarity::Dark;
     reasons.push(format!(
-        "Some {:.0} {} blobs a frame all over it, {:.1} px wide at half their height, nothing that moves as one: particles. So spots of {size_px} px are \
-         detected, one for each peak.",
+        "Some {:.0} {} blobs a frame all over it, {:.1} px wide at half their height, nothing that moves as one: particles. So spots of {} px are \
+         detected, one for each peak{}.",
         particles.per_frame,
         if dark { "dark" } else { "bright" },
-        particles.width_px
+        particles.width_px,
+        spot.size_px,
+        if size_px < whole_px {
+            format!(": as many are found again in the next frame as with their soft edge, {whole_px:.1} px, and neighbours draw each other less")
+        } else {
+            String::new()
+        },
     ));
     config.detector = detector(spot);
     config.detector.camera = CameraConfig::Fixed;
@@ -215,7 +220,10 @@ pub fn configure(
     tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);
-    reasons.push(format!("None goes farther than half its size ({:.1} px) from frame to frame.", 0.5 * whole_px));
+    reasons.push(format!(
+        "None goes farther than half its width with the soft edge ({:.1} px) from frame to frame.",
+        0.5 * whole_px
+    ));
     Ok(())
 }
 

@@ -3,20 +3,22 @@
 //! Source: our own. A filter as wide as the whole spot finds the faintest ones; one no wider than half of its height tells neighbours apart that the wide one joins, and their light moves
 //! its positions far less, but noise passes it more easily. Which of the two loses more is counted in pairs of frames, with a threshold at which hardly any noise is among them: how many
 //! are found, and found again in the next frame. A size at which a larger share of them is not, more than chance explains, finds what is none.
+//! Where the values' step hides the noise, as where a codec has flattened the ground, no threshold says how much of it is among them, and the wide filter stays.
 //! Limits: things with parts of their own, rings and discs, fall apart under a narrow filter; where most of them do, the wide one stays.
 
 use super::looks;
 use super::near::Near;
 use super::spread::spread;
-use crate::vision::DetectorConfig;
+use crate::vision::noise_level::noise_level;
 use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
-use crate::{Frame, Result, Scan, SourceInfo};
+use crate::vision::{DetectorConfig, Pixel};
+use crate::{Frame, Image, Pixels, Result, Scan, SourceInfo};
 
 /// Spots that are looked at, and the fewest and most pairs of frames for that: of 2000 a share of one in forty that is not found again is known to a seventh.
 const SPOTS: f64 = 2000.0;
 const PAIRS: (f64, f64) = (2.0, 6.0);
-/// Diameters in units of the spots' width at half height that are tried: with the soft edge, less it, and the width itself.
-const DIAMETERS: [f64; 3] = [DIAMETER_PER_WIDTH, 1.5, 1.0];
+/// Smaller diameters that are tried, in units of the spots' width at half height: without most of the soft edge, and the width itself.
+const SMALLER: [f64; 2] = [1.5, 1.0];
 /// Least and largest diameter, px.
 const LEAST_PX: f64 = 3.0;
 const MOST_PX: f64 = 99.0;
@@ -24,8 +26,15 @@ const MOST_PX: f64 = 99.0;
 const LOST: f64 = 0.02;
 /// Share of the spots that may fall apart into several.
 const FALL_APART: f64 = 0.5;
+/// Noise that is seen, steps of the values.
+const LEAST_NOISE_STEPS: f64 = 0.5;
 /// Deviations by which more may be not found again than with the whole size.
 const BY_CHANCE: f64 = 3.0;
+
+/// The diameter of spots with their soft edge, px.
+pub(super) fn whole_px(width_px: f64) -> f64 {
+    (DIAMETER_PER_WIDTH * width_px).clamp(LEAST_PX, MOST_PX)
+}
 
 /// The diameter to look for, px, where so many blobs a frame of this width at half height are seen; `at` is what is looked for at a diameter.
 /// # Errors
@@ -41,13 +50,15 @@ pub(super) fn find(
     let firsts: Vec<usize> = (0..frames.len().saturating_sub(1)).collect();
     let n_pairs = (SPOTS / per_frame.max(1.0)).ceil().clamp(PAIRS.0, PAIRS.1) as usize;
     let pairs: Vec<&Frame> = spread(&firsts, n_pairs).flat_map(|&k| [&frames[k], &frames[k + 1]]).collect();
-    let whole_px = (DIAMETERS[0] * width_px).clamp(LEAST_PX, MOST_PX);
+    let whole_px = whole_px(width_px);
+    if !pairs.iter().all(|frame| shows_noise(frame)) || pairs.is_empty() {
+        return Ok(whole_px);
+    }
     let scans = |size_px: f64| looks::scans(&at(size_px), pairs.iter().copied(), info, n_threads);
     let wide = scans(whole_px)?;
     let of_wide = Again::of(&wide, 0.5 * whole_px);
     let mut found = vec![(whole_px, of_wide)];
-    for diameter in &DIAMETERS[1..] {
-        let size_px = (diameter * width_px).clamp(LEAST_PX, MOST_PX);
+    for size_px in SMALLER.map(|diameter| (diameter * width_px).max(LEAST_PX)).into_iter().filter(|s| *s < whole_px) {
         let narrow = scans(size_px)?;
         if falls_apart(&wide, &narrow, 0.5 * whole_px) > FALL_APART {
             break;
@@ -58,11 +69,25 @@ pub(super) fn find(
         }
     }
     let most = found.iter().map(|(_, again)| again.n_again).max().unwrap_or(0);
-    let enough = found.iter().rev().find(|(_, again)| again.n_again as f64 >= (1.0 - LOST) * most as f64);
+    let is_enough = |again: &Again| again.n_again > 0 && again.n_again as f64 >= (1.0 - LOST) * most as f64;
+    let enough = found.iter().rev().find(|(_, again)| is_enough(again));
     Ok(enough.map_or(whole_px, |(size_px, _)| *size_px))
 }
 
-/// How many detections were found again in the next frame.
+/// Whether the noise of a grey frame is larger than half a step of its values: below that most neighbours are equal.
+fn shows_noise(frame: &Frame) -> bool {
+    fn exceeds<T: Pixel>(image: &Image<T>) -> bool {
+        noise_level(image, &mut Vec::new()) > LEAST_NOISE_STEPS * f64::from(T::STEP)
+    }
+    match &frame.pixels {
+        Pixels::Gray8(image) => exceeds(image),
+        Pixels::Gray16(image) => exceeds(image),
+        Pixels::GrayF32(image) => exceeds(image),
+        Pixels::Rgb8(_) => false,
+    }
+}
+
+/// How many detections were found again in the next frame, each the other's nearest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Again {
     n: usize,
@@ -112,13 +137,18 @@ fn falls_apart(wide: &[Scan], narrow: &[Scan], radius_px: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::vision::threshold::{SpotConfig, ThresholdConfig};
-    use crate::{FrameIndex, Image, Pixels, Timestamp};
+    use crate::{FrameIndex, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     /// The diameter for things of `width_px` at half height, `n` of them in 300 x 300 pixels at random, as bright at r px as `light` says in deviations of the noise.
     fn found(width_px: f64, n: usize, light: impl Fn(f64) -> f64) -> f64 {
+        found_in(4, width_px, n, light)
+    }
+
+    /// The same in so many frames.
+    fn found_in(n_frames: usize, width_px: f64, n: usize, light: impl Fn(f64) -> f64) -> f64 {
         const SIZE: usize = 300;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let places: Vec<[f64; 2]> = (0..n).map(|_| [(); 2].map(|()| SIZE as f64 * rng.random::<f64>())).collect();
@@ -139,7 +169,8 @@ mod tests {
             Frame { index: FrameIndex(k), time: Timestamp::from_secs_f64(0.1 * k as f64), pixels }
         };
         let frames: Vec<Frame> = (0..4).map(&mut frame).collect();
-        let (frames, info) = super::super::in_memory::described(frames);
+        let (mut frames, info) = super::super::in_memory::described(frames);
+        frames.truncate(n_frames);
         let spot = |size_px: f64| SpotConfig {
             size_px,
             k: 4.5,
@@ -164,6 +195,28 @@ mod tests {
     }
 
     #[test]
+    fn in_less_than_two_frames_nothing_is_found_again_and_the_whole_size_stays() {
+        let spot = |r: f64| 20.0 * (-r * r / (2.0 * 1.7 * 1.7)).exp();
+        assert_eq!([0, 1, 2].map(|n| found_in(n, 4.0, 60, spot)), [DIAMETER_PER_WIDTH, DIAMETER_PER_WIDTH, 1.0]);
+    }
+
+    #[test]
+    fn where_the_step_of_the_values_hides_the_noise_the_whole_size_stays() {
+        let frame = |pixels| Frame { index: FrameIndex(0), time: Timestamp::default(), pixels };
+        let noisy = |sd: f32| {
+            let mut rng = ChaCha8Rng::seed_from_u64(4);
+            let values = (0..100 * 100).map(|_| 50.5 + sd * rng.sample::<f32, _>(StandardNormal));
+            Image::from_vec(100, 100, values.collect::<Vec<f32>>()).unwrap()
+        };
+        let whole =
+            |image: Image<f32>| Image::from_vec(100, 100, image.as_slice().iter().map(|v| *v as u8).collect()).unwrap();
+        assert!(shows_noise(&frame(Pixels::Gray8(whole(noisy(1.0))))));
+        assert!(!shows_noise(&frame(Pixels::Gray8(whole(noisy(0.2))))));
+        assert!(shows_noise(&frame(Pixels::GrayF32(noisy(0.2)))));
+        assert!(!shows_noise(&frame(Pixels::GrayF32(noisy(0.0)))));
+    }
+
+    #[test]
     fn what_falls_apart_is_looked_for_as_a_whole() {
         // A ring 6 px in radius, as the optics show what lies out of focus: 14 px wide at half height, its parts no wider than 3: a filter of 14 px finds several.
         let ring = |r: f64| 12.0 * (-(r - 6.0) * (r - 6.0) / 2.0).exp();
@@ -178,7 +231,7 @@ mod tests {
         assert!(!again(1500, 75 + chance as usize).is_less_sure_than(&wide));
         assert!(again(1500, 76 + chance as usize).is_less_sure_than(&wide));
         assert!(!again(0, 0).is_less_sure_than(&again(0, 0)));
-        // Two that change places within reach, one that is gone, one that is nearest to another's.
+        // Two that move, one that is gone, one that is nearest to another's.
         let scan = |places: &[[f64; 2]]| {
             let of = |p: &[f64; 2]| crate::Detection::at((*p).into(), nalgebra::Matrix2::identity());
             Scan::default().with_detections(places.iter().map(of).collect())

@@ -94,10 +94,14 @@ impl Seen {
 
     /// Whether they are that, but for few that move before the others, which stand.
     pub fn are_particles(&self) -> bool {
-        let polarity = self.polarity();
-        let n_moving = self.bright.chains.moving.len() + self.dark.chains.moving.len();
-        let few_move = self.moves() && (n_moving as f64) < FEW_MOVE * self.per_frame(polarity);
-        self.per_frame(polarity) > MANY && !few_move
+        let per_frame = self.per_frame(self.polarity());
+        let few_move = self.moves() && (self.n_moving() as f64) < FEW_MOVE * per_frame;
+        per_frame > MANY && !few_move
+    }
+
+    /// Chains that move, of both polarities.
+    fn n_moving(&self) -> usize {
+        self.bright.chains.moving.len() + self.dark.chains.moving.len()
     }
 
     /// Blobs a frame of these polarities.
@@ -260,7 +264,6 @@ pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut 
     tracker.field_px = Some([info.width as f64, info.height as f64]);
     tracker.min_initiation_score = INITIATION_SCORE;
     stretch::of_tracker(tempo, tracker);
-    let n_moving = evidence.bright.chains.moving.len() + evidence.dark.chains.moving.len();
     if evidence.are_particles() {
         reasons.push(
             "So many that they are particles or cells: every one is tracked, whether it moves or not.".to_string(),
@@ -270,7 +273,10 @@ pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut 
     }
     tracker.report = Report::Moving;
     if per_frame > MANY {
-        reasons.push(format!("Of so many {n_moving} move and the others stand: stars or lamps before which something moves, no particles."));
+        reasons.push(format!(
+            "Of so many {} move and the others stand: stars or lamps before which something moves, no particles.",
+            evidence.n_moving()
+        ));
     }
     reasons.push(
         "A track is reported once it has moved farther than its covariance, the camera's motion and the wander of its outline explain: what stands \

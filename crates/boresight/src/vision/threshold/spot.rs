@@ -61,10 +61,10 @@ pub struct SpotDetector {
     /// Odd sides of the smoothing and of the surrounding box, px.
     smooth: usize,
     surround: usize,
-    /// Half of the size, px: the largest disc, and how near a weaker peak must be told from this one.
+    /// Half of the size, px: the radius of the largest disc.
     radius: usize,
-    /// Offsets inside the largest disc, in which a peak is the largest.
-    disc_offsets: Vec<(i32, i32)>,
+    /// Offsets nearer than two pixels beyond that, among which a peak is the largest.
+    peak_offsets: Vec<(i32, i32)>,
     /// From the smallest to the largest.
     discs: Vec<Disc>,
     /// A float frame without missing values.
@@ -106,7 +106,7 @@ impl SpotDetector {
         let surround = odd(config.size_px * config.surround).max(smooth + 2);
         let radius = ((config.size_px / 2.0).floor() as usize).max(1);
         let r = radius as i32;
-        let disc_offsets = (-r - 1..=r + 1)
+        let peak_offsets = (-r - 1..=r + 1)
             .flat_map(|y| (-r - 1..=r + 1).map(move |x| (x, y)))
             .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
             .collect();
@@ -116,7 +116,7 @@ impl SpotDetector {
             smooth,
             surround,
             radius,
-            disc_offsets,
+            peak_offsets,
             discs: discs(config.size_px, radius, smooth, surround),
             whole: Image::default(),
             response: Image::default(),
@@ -221,7 +221,7 @@ impl SpotDetector {
 
     /// Whether no pixel of the largest disc around (x, y) is larger; of equals the first in raster order is the peak.
     fn is_peak(&self, x: usize, y: usize, v: f32) -> bool {
-        self.disc_offsets.iter().all(|&(dx, dy)| {
+        self.peak_offsets.iter().all(|&(dx, dy)| {
             let other = self.at(x as i64 + i64::from(dx), y as i64 + i64::from(dy));
             other.is_none_or(|o| o < v || (o == v && (dy, dx) >= (0, 0)))
         })

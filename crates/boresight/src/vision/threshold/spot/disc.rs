@@ -99,15 +99,16 @@ pub(super) struct Disc {
     pub(super) share: f64,
 }
 
-/// The discs for spots of a size: from half of the width at half height, 0.2 of the size, to the whole spot. In white noise the centroid of a Gaussian is known best in one of 0.3, three
-/// quarters of the width, where its error is some 1.0 of the Cramér-Rao bound, 1.8 in that of half the size; one with a flat top needs its edges.
+/// The discs for spots of a size, from 0.3 of it to the whole spot. In white noise the centroid of a Gaussian is known best in one of 0.2 to 0.3, three quarters of the width at half height, where its error
+/// is some 1.0 of the Cramér-Rao bound, and 1.6 in that of half the size; a codec's noise is not white and wants the larger one, and what has a flat top its edges.
 pub(super) fn discs(size_px: f64, largest: usize, smooth: usize, surround: usize) -> Vec<Disc> {
     let mut discs: Vec<Disc> = Vec::new();
-    for part in [0.2, 0.25, 0.3, 0.4, 0.5] {
+    let share = shares(size_px, largest, smooth, surround);
+    for part in [0.3, 0.4, 0.5] {
         let radius = ((part * size_px).round() as usize).clamp(1, largest);
         if discs.last().is_none_or(|d| d.radius < radius) {
             let noise_gain = noise_gain(radius, smooth, surround);
-            discs.push(Disc { radius, noise_gain, share: share(size_px, radius, largest, smooth, surround) });
+            discs.push(Disc { radius, noise_gain, share: share(radius) });
         }
     }
     discs
@@ -130,18 +131,22 @@ fn noise_gain(radius: usize, smooth: usize, surround: usize) -> f64 {
     seen.as_slice().iter().map(|v| f64::from(*v).powi(2)).sum()
 }
 
-/// Part of the positive response to a Gaussian spot of this size in the disc of radius `largest` that lies in that of `radius`.
-fn share(size_px: f64, radius: usize, largest: usize, smooth: usize, surround: usize) -> f64 {
+/// Part of the positive response to a Gaussian spot of this size in the disc of radius `largest` that lies in that of a radius.
+fn shares(size_px: f64, largest: usize, smooth: usize, surround: usize) -> impl Fn(usize) -> f64 {
     let reach = largest + 1 + (smooth - 1).max(surround / 2) + 1;
     let scale = -0.5 * (DIAMETER_PER_WIDTH * WIDTH_PER_DEVIATION / size_px).powi(2);
     let profile: Vec<f64> = (0..=2 * reach).map(|i| (scale * (i as f64 - reach as f64).powi(2)).exp()).collect();
-    let light = profile.iter().flat_map(|y| profile.iter().map(move |x| (x * y) as f32)).collect();
-    let Some(light) = Image::from_vec(profile.len(), profile.len(), light) else { return 1.0 };
+    let mut light = Image::filled(profile.len(), profile.len(), 0.0f32);
+    for (y, v) in profile.iter().enumerate() {
+        light.row_mut(y).iter_mut().zip(&profile).for_each(|(p, u)| *p = (u * v) as f32);
+    }
     let mut response = Image::default();
     Boxes::new(smooth, surround).run(&light, &mut response);
-    let mass = |radius| moments(&response, radius, Vector2::new(reach as f64, reach as f64)).sum;
-    let share = mass(radius) / mass(largest);
-    if share.is_finite() && share > 0.0 { share } else { 1.0 }
+    let mass = move |radius| moments(&response, radius, Vector2::new(reach as f64, reach as f64)).sum;
+    move |radius| {
+        let share = mass(radius) / mass(largest);
+        if share.is_finite() && share > 0.0 { share } else { 1.0 }
+    }
 }
 
 #[cfg(test)]

@@ -57,15 +57,12 @@ fn sizes_follow_from_the_targets_size() {
     let sizes = |config: SpotConfig| {
         let d = SpotDetector::new(&config);
         let discs: Vec<usize> = d.discs.iter().map(|d| d.radius).collect();
-        (d.smooth, d.surround, d.radius, d.disc_offsets.len(), discs)
+        (d.smooth, d.surround, d.radius, d.peak_offsets.len(), discs)
     };
-    // A peak is the largest of the whole-pixel offsets nearer than radius + 2; discs have 0.2 to 0.5 of the size.
+    // A peak is the largest of the whole-pixel offsets nearer than radius + 2; discs have 0.3 to 0.5 of the size.
     let inside = |r: i32| (-r..=r).flat_map(|y| (-r..=r).map(move |x| x * x + y * y)).filter(|d2| *d2 < r * r).count();
-    assert_eq!(sizes(SpotConfig::default()), (3, 11, 3, inside(5), vec![1, 2, 3]));
-    assert_eq!(
-        sizes(SpotConfig { size_px: 20.0, ..Default::default() }),
-        (5, 31, 10, inside(12), vec![4, 5, 6, 8, 10])
-    );
+    assert_eq!(sizes(SpotConfig::default()), (3, 11, 3, inside(5), vec![2, 3]));
+    assert_eq!(sizes(SpotConfig { size_px: 20.0, ..Default::default() }), (5, 31, 10, inside(12), vec![6, 8, 10]));
     let narrow = SpotConfig { size_px: 4.0, surround: 1.0, smooth_px: Some(9.0), ..Default::default() };
     assert_eq!(sizes(narrow), (9, 11, 2, inside(4), vec![1, 2]), "the surroundings are wider than the smoothing");
     assert_eq!(sizes(SpotConfig { size_px: 1.9, ..Default::default() }), (1, 3, 1, inside(3), vec![1]));
@@ -181,13 +178,45 @@ fn the_disc_is_that_in_which_noise_moves_a_centroid_the_least() {
         let value = |i: usize| light(((i % 64) as f64 - 32.0).hypot((i / 64) as f64 - 24.0)) as f32;
         Image::from_vec(64, 48, (0..64 * 48).map(value).collect()).unwrap()
     };
-    // A Gaussian of 20 px across, 8.2 at half height: 0.25 to 0.3 of that; a disc of 14 px needs its edge; beside a neighbour half of the way, the smallest at least.
+    // A Gaussian of 20 px across, 8.2 at half height: 0.3 of that; a disc of 14 px needs its edge; beside a neighbour half of the way, the smallest at least.
     let spot = image(&|r| 100.0 * (-r * r / (2.0 * 3.47 * 3.47)).exp());
-    assert!((5..=6).contains(&radius(&mut detector, &spot, usize::MAX)));
+    assert_eq!(radius(&mut detector, &spot, usize::MAX), 6);
     let disc = image(&|r| 100.0 / (1.0 + (3.0 * (r - 7.0)).exp()));
     assert!(radius(&mut detector, &disc, usize::MAX) >= 8);
-    assert!(radius(&mut detector, &disc, 144) <= 6);
-    assert_eq!(radius(&mut detector, &spot, 9), 4);
+    assert_eq!(radius(&mut detector, &disc, 144), 6);
+    assert_eq!(radius(&mut detector, &disc, 9), 6);
+}
+
+#[test]
+fn a_centroid_in_noise_is_near_the_bound_and_one_over_the_whole_spot_is_not() {
+    // Light of deviation 1.5 px, 30 deviations of the noise high, looked for at 2.45 widths and at one.
+    let bound = {
+        let slope = |x: f64, y: f64| x / 2.25 * (-(x * x + y * y) / 4.5).exp();
+        let cells = (-12..=12).flat_map(|y| (-12..=12).map(move |x| (f64::from(x), f64::from(y))));
+        1.0 / (30.0 * cells.map(|(x, y)| slope(x, y).powi(2)).sum::<f64>().sqrt())
+    };
+    let ratio = |size_px: f64, only_largest: bool| {
+        let mut rng = ChaCha8Rng::seed_from_u64(13);
+        let config = SpotConfig { size_px, surround: 1.0, smooth_px: Some(3.0), ..Default::default() };
+        let mut detector = SpotDetector::new(&config);
+        if only_largest {
+            detector.discs.drain(..detector.discs.len() - 1);
+        }
+        let mut sum2 = 0.0;
+        for _ in 0..500 {
+            let truth = Vector2::new(30.0 + rng.random::<f64>(), 20.0 + rng.random::<f64>());
+            let mut image = frame(&[(truth.x, truth.y, 120.0)]);
+            image.as_mut_slice().iter_mut().for_each(|p| *p += 4.0 * rng.sample::<f32, _>(StandardNormal));
+            let mut found = Vec::new();
+            detector.detect(&image, (16.0, 0.0), &mut found);
+            sum2 += found.iter().map(|d| (d.position - truth).norm_squared()).fold(4.0, f64::min);
+        }
+        (sum2 / 1000.0).sqrt() / bound
+    };
+    let (whole, narrow, old) = (ratio(8.65, false), ratio(3.53, false), ratio(8.65, true));
+    println!("{whole} {narrow} {old}");
+    // Each is known to 2.2 %.
+    assert!(whole < 1.15 && narrow < 1.35 && old > 1.4, "{whole} {narrow} {old}");
 }
 
 #[test]
