@@ -12,7 +12,8 @@
 use super::digits::round;
 use super::first_scans::Shares;
 use super::noise::fit::{Noise, Step, fit_factors};
-use super::noise::{assumed, is_copy};
+use super::noise::follow::is_copy;
+use super::noise::given::assumed;
 use crate::camera::SteadyGround;
 use crate::track::{ModelConfig, TrackerConfig, TrackerParameters};
 use crate::{Scan, Timestamp, TrackState, TrackStatus};

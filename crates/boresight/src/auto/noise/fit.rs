@@ -179,6 +179,11 @@ impl Scalar for Axis {
     }
 }
 
+/// How many innovations of the series count.
+pub(super) fn n_judged(series: &[Vec<Step>]) -> usize {
+    series.iter().map(|steps| steps.len().saturating_sub(1 + SETTLING)).sum()
+}
+
 /// Logarithm of the likelihood of all series.
 pub(super) fn log_likelihood(series: &[Vec<Step>], noise: &Noise, motion: Motion, area_px2: f64) -> f64 {
     let begin = |speed_std: f64| move |z: f64, r: f64| Axis { x: z, v: 0.0, xx: r, xv: 0.0, vv: speed_std * speed_std };

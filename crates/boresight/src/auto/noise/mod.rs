@@ -3,52 +3,37 @@
 //! Source: our own; the estimate is in [`fit`]. The tracker runs with what was assumed; the detections of the tracks that it confirmed are the
 //! series whose innovations are made as probable as possible.
 //! Errors that last from scan to scan ([`correlated`]) are told from motion and added to the covariances that are stated.
-//! Where the caller allows it, targets whose velocity is forgotten ([`persistence`]) get the model of such a motion.
-//! Limits: a filter that is not of constant velocity at first keeps what is assumed, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before ([`COPY`]); with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
+//! Where the caller allows it, targets whose velocity is forgotten ([`forgetful`]) get the model of such a motion.
+//! Limits: a filter that is not of constant velocity at first keeps what is assumed, since what one model calls noise another calls motion; detections that several tracks share tell nothing, nor does a position that is the one before; with fewer than [`LEAST_STEPS`] of the others all stays as assumed.
 
 mod correlated;
 pub(super) mod fit;
+pub(super) mod follow;
+mod forgetful;
 mod forgotten;
+pub(super) mod given;
 mod persistence;
 
 use super::digits::round;
-use super::first_scans::{PROBE_FRAMES, Shares, first};
+use super::first_scans::first;
 use super::quantile::{WITHIN_ONE, quantile};
-use crate::camera::SteadyGround;
 use crate::io::LengthUnit;
 use crate::tempo::Tempo;
-use crate::track::{FilterConfig, TrackerConfig, TrackerParameters};
-use crate::{Config, Result, Scan, TrackStatus};
+use crate::track::{FilterConfig, TrackerParameters};
+use crate::{Config, Result, Scan};
 use fit::{Noise, Step, fit};
-use forgotten::Persistence;
+use follow::{Followed, follow};
+use forgetful::forgetful;
+use given::{assumed, put};
 use std::collections::BTreeMap;
 
 /// Fewer detections of confirmed tracks than this tell no noise: the innovations of these in two axes tell a variance to a quarter of itself, √(2 / 36), and the prior
 /// holds what they do not tell.
 const LEAST_STEPS: usize = 20;
-/// A position within this share of the stated deviation of the one before, along both axes, is a copy: what a codec copies differs by the digits of the ground measured around it, and two
-/// measurements come so near each other once in eight thousand.
-const COPY: f64 = 0.02;
-/// Probability that a target's detection lies in the gate, once the innovations are as wide as their covariances say: one true detection in
-/// ten thousand outside, a track's loss in some minutes of video. With 0.99 of covariances that were far too large the gate was as wide.
-const GATE_PROBABILITY: f64 = 0.9999;
 /// How long targets are one detection when they pass each other, s of video.
 const MERGED_S: f64 = 1.0;
-/// How often targets whose velocity is forgotten are followed again: each time the steps that were lost are nearer to none.
-const MOST_ROUNDS: usize = 6;
 /// Most detections that are fitted: more change the third digit.
 const MOST_STEPS: usize = 20_000;
-
-/// The noise that a tracker assumes.
-pub(super) fn assumed(p: &TrackerParameters) -> Noise {
-    Noise {
-        scale: p.detection_covariance_scale,
-        extra_px: p.extra_noise_px,
-        extra_per_height: p.extra_noise_per_height,
-        density: p.acceleration_density_px2_per_s3,
-        density_per_height2: p.acceleration_density_per_height2_per_s3,
-    }
-}
 
 /// The motions that targets may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,16 +42,6 @@ pub enum Motions {
     Driven,
     /// That, or a velocity that is forgotten: points, whose places are what is measured of them. Boxes and regions wander about their target.
     DrivenOrForgetful,
-}
-
-/// What is known of one track of the first pass.
-#[derive(Default)]
-struct Followed {
-    steps: Vec<Step>,
-    last_ns: i64,
-    /// Width and height of each detection, px.
-    sizes: [Vec<f64>; 2],
-    confirmed: bool,
 }
 
 /// Runs the tracker over `scans` as configured and replaces the assumed noise by what its tracks show; `area_px2` is the field's,
@@ -108,7 +83,7 @@ pub fn learn(
     // A filter that was named has the model that it was named with.
     if motions == Motions::DrivenOrForgetful && t.filter == FilterConfig::default() {
         let assume = persistence::Assumed { noise: before, least_density, speed_std, area_px2 };
-        if let Some((noise, forgets)) = forgetful(&series, scans, assume, t)? {
+        if let Some((noise, forgets)) = forgetful(&series, scans, assume, &found, t)? {
             found = Noise { density: found.density, density_per_height2: found.density_per_height2, ..noise };
             t.filter.model = forgets.model();
             motion = Some(forgets);
@@ -152,97 +127,6 @@ pub fn learn(
         ));
     }
     Ok(())
-}
-
-/// Runs the tracker over `scans` and returns what it confirmed.
-fn follow(scans: &[Scan], config: &TrackerConfig) -> Result<BTreeMap<u64, Followed>> {
-    let mut tracker = crate::track::build(config)?;
-    let mut tracks: BTreeMap<u64, Followed> = BTreeMap::new();
-    let (mut ground, mut on_ground) = (SteadyGround::default(), Scan::default());
-    let mut shares = Shares::default();
-    for scan in scans {
-        let states = tracker.step(scan)?;
-        ground = ground.after(scan);
-        ground.scan_on_ground(scan, &mut on_ground);
-        shares.count(scan.detections.len(), states);
-        for s in states {
-            let of = tracks.entry(s.id.0).or_default();
-            of.confirmed |= s.status != TrackStatus::Tentative;
-            let Some(j) = s.detection else { continue };
-            if !shares.is_one(j) {
-                continue;
-            }
-            let d = &on_ground.detections[j as usize];
-            let position = [d.position.x, d.position.y];
-            // A picture that is shown again, or a block that a codec copies, measures nothing anew; taken for measurements without error they would make the noise nothing.
-            if of.steps.last().is_some_and(|before| is_copy(position, before)) {
-                continue;
-            }
-            let seen_ns = scan.time.ns.saturating_sub_unsigned(d.age_ns);
-            let dt_s = if of.steps.is_empty() { 0.0 } else { (seen_ns - of.last_ns).max(0) as f64 * 1e-9 };
-            of.last_ns = seen_ns;
-            of.sizes[0].push(d.extent.width_px);
-            of.sizes[1].push(d.extent.height_px);
-            let variance = [d.cov[(0, 0)], d.cov[(1, 1)]];
-            of.steps.push(Step { dt_s, position, variance, height_px: d.extent.height_px, weight: 1.0 });
-        }
-    }
-    tracks.retain(|_, t| t.confirmed);
-    Ok(tracks)
-}
-
-/// Noise and motion of targets whose velocity is forgotten, if the series are of such ones. What was assumed before has lost them at their longer steps, and those that are left look like noise
-/// around a course: they are followed again with the simplest motion found, until that stays, and only then another may explain more.
-fn forgetful(
-    series: &[Vec<Step>],
-    scans: &[Scan],
-    assume: persistence::Assumed,
-    config: &TrackerConfig,
-) -> Result<Option<(Noise, Persistence)>> {
-    let Some(mut found) = persistence::better(series, assume).next() else { return Ok(None) };
-    let mut config = config.clone();
-    // Steps are looked at, not whose they are after a gap, and those of some scans say enough where targets are many.
-    config.reidentification.max_gap_s = 0.0;
-    let mut n = 0;
-    let enough = scans.iter().take_while(|s| (n < MOST_STEPS, n += s.detections.len()).0).count();
-    let scans = &scans[..enough.max(PROBE_FRAMES).min(scans.len())];
-    let mut round = 1;
-    loop {
-        put(&found.0, assume.least_density, &mut config);
-        config.filter.model = found.1.model();
-        let again: Vec<Vec<Step>> = follow(scans, &config)?.into_values().map(|t| t.steps).collect();
-        let mut ever_better = persistence::better(&again, assume);
-        // What is followed without loss and goes its way was lost before.
-        let Some(next) = ever_better.next() else { return Ok(None) };
-        if round == MOST_ROUNDS || next.1.is_nearly(&found.1) {
-            return Ok(Some(ever_better.last().unwrap_or(next)));
-        }
-        found = next;
-        round += 1;
-    }
-}
-
-/// Writes noise and motion into the tracker's configuration.
-fn put(found: &Noise, least_density: f64, t: &mut TrackerConfig) {
-    t.gate_probability = GATE_PROBABILITY;
-    t.detection_covariance_scale = round(found.scale);
-    t.extra_noise_px = or_none(found.extra_px, fit::LEAST);
-    t.extra_noise_per_height = or_none(found.extra_per_height, fit::LEAST);
-    t.acceleration_density_px2_per_s3 = round(found.density);
-    t.acceleration_density_per_height2_per_s3 = or_none(found.density_per_height2, least_density);
-}
-
-/// Whether a position is a copy of the one before.
-pub(super) fn is_copy(position: [f64; 2], before: &Step) -> bool {
-    (0..2).all(|axis| {
-        let far = position[axis] - before.position[axis];
-        far * far <= COPY * COPY * before.variance[axis]
-    })
-}
-
-/// Three digits of a number, 0 where the search has left it at its floor.
-fn or_none(v: f64, least: f64) -> f64 {
-    if v <= 2.0 * least { 0.0 } else { round(v) }
 }
 
 /// How far widths and heights change within that time, s, over √2: px. The place of a member of a merged measurement is an edge and half of its own

@@ -4,7 +4,7 @@
 //! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
 //! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
-//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, up to size/2 or half the way to the next peak (`spot/peaks.rs`); of two
+//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, from 0.3 of the size on, up to half the way to the next peak (`spot/peaks.rs`); of two
 //! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
@@ -61,7 +61,7 @@ pub struct SpotDetector {
     /// Odd sides of the smoothing and of the surrounding box, px.
     smooth: usize,
     surround: usize,
-    /// Half of the size, px: the radius of the largest disc.
+    /// Half of the size, px.
     radius: usize,
     /// Offsets nearer than two pixels beyond that, among which a peak is the largest.
     peak_offsets: Vec<(i32, i32)>,
@@ -117,7 +117,7 @@ impl SpotDetector {
             surround,
             radius,
             peak_offsets,
-            discs: discs(config.size_px, radius, smooth, surround),
+            discs: discs(config.size_px, smooth, surround),
             whole: Image::default(),
             response: Image::default(),
             boxes: Boxes::new(smooth, surround),
@@ -214,12 +214,12 @@ impl SpotDetector {
                 }
             }
         }
-        find_nearest(&mut summits, 2 * self.radius);
+        find_nearest(&mut summits, 2 * self.largest_disc().radius);
         spots.extend(summits.iter().map(|s| self.centre(s)));
         (self.spots, self.summits) = (spots, summits);
     }
 
-    /// Whether no pixel of the largest disc around (x, y) is larger; of equals the first in raster order is the peak.
+    /// Whether no pixel within half of the size around (x, y) is larger; of equals the first in raster order is the peak.
     fn is_peak(&self, x: usize, y: usize, v: f32) -> bool {
         self.peak_offsets.iter().all(|&(dx, dy)| {
             let other = self.at(x as i64 + i64::from(dx), y as i64 + i64::from(dy));
@@ -271,7 +271,7 @@ impl SpotDetector {
         self.keep.clear();
         self.keep.resize(self.spots.len(), true);
         // Spots come in raster order of their peaks, and no position is further from its peak than the disc moves.
-        let window = self.radius + 10;
+        let window = self.largest_disc().radius + 10;
         for i in 0..self.spots.len() {
             for j in i + 1..self.spots.len() {
                 let (a, b) = (&self.spots[i], &self.spots[j]);
@@ -287,7 +287,7 @@ impl SpotDetector {
         self.spots.retain(|_| keep.next().is_none_or(|k| *k));
     }
 
-    /// The disc in which noise moves the centroid of a peak the least, of those up to half the way to the nearest other one.
+    /// The disc from which on noise moves the centroid of a peak the more the larger it is, of those up to half the way to the nearest other one.
     fn disc(&self, summit: &Summit) -> Disc {
         let at = Vector2::new(summit.x as f64, summit.y as f64);
         let smallest = self.discs[0];
@@ -297,11 +297,16 @@ impl SpotDetector {
             let Moments { sum, edge, .. } = moments(&self.response, disc.radius, at);
             // As the covariance, but for the limit: a flat top leaves a small disc no hold at all.
             let variance = disc.noise_gain / (sum - edge).max(0.0).powi(2);
-            if variance < least {
-                (best, least) = (*disc, variance);
+            if variance >= least {
+                break;
             }
+            (best, least) = (*disc, variance);
         }
         best
+    }
+
+    fn largest_disc(&self) -> Disc {
+        self.discs[self.discs.len() - 1]
     }
 
     fn detection<T: Pixel>(&self, image: &Image<T>, spot: &Spot, noise: (f64, f64), sign: f32) -> Detection {

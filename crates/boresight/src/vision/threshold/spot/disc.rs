@@ -88,6 +88,9 @@ pub const DIAMETER_PER_WIDTH: f64 = 2.45;
 /// Width at half height of a Gaussian in units of its deviation.
 const WIDTH_PER_DEVIATION: f64 = 2.354_82;
 
+/// Least radius of a disc, px: in one of a pixel the centroid depends on where in its pixel a spot lies, by 0.02 to 0.2 px for deviations of 0.6 to 3 px, in one of two by 0.03 at most.
+const LEAST_RADIUS: usize = 2;
+
 /// A disc that a spot's centroid may be taken in.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
@@ -99,19 +102,14 @@ pub(super) struct Disc {
     pub(super) share: f64,
 }
 
-/// The discs for spots of a size, from 0.3 of it to the whole spot. In white noise the centroid of a Gaussian is known best in one of 0.2 to 0.3, three quarters of the width at half height, where its error
-/// is some 1.0 of the Cramér-Rao bound, and 1.6 in that of half the size; a codec's noise is not white and wants the larger one, and what has a flat top its edges.
-pub(super) fn discs(size_px: f64, largest: usize, smooth: usize, surround: usize) -> Vec<Disc> {
-    let mut discs: Vec<Disc> = Vec::new();
-    let share = shares(size_px, largest, smooth, surround);
-    for part in [0.3, 0.4, 0.5] {
-        let radius = ((part * size_px).round() as usize).clamp(1, largest);
-        if discs.last().is_none_or(|d| d.radius < radius) {
-            let noise_gain = noise_gain(radius, smooth, surround);
-            discs.push(Disc { radius, noise_gain, share: share(radius) });
-        }
-    }
-    discs
+/// The discs for spots of a size, from 0.3 of it, which suits one that is looked for with its soft edge, to 0.75, which suits one that is looked for at its width at half height: three quarters of
+/// that in both. In larger discs most of the response is cut off at 0, and the covariance, which takes it for linear, is too large.
+pub(super) fn discs(size_px: f64, smooth: usize, surround: usize) -> Vec<Disc> {
+    let mut radii = [0.3, 0.4, 0.5, 0.75].map(|part| ((part * size_px).round() as usize).max(LEAST_RADIUS)).to_vec();
+    radii.dedup();
+    let share = shares(size_px, radii[radii.len() - 1], smooth, surround);
+    let disc = |radius| Disc { radius, noise_gain: noise_gain(radius, smooth, surround), share: share(radius) };
+    radii.into_iter().map(disc).collect()
 }
 
 /// Σ_j (K * p_x)_j² over all pixels j that the weights of a disc see.

@@ -1,0 +1,72 @@
+//! Whether targets forget their velocity, from a first pass that took it for constant.
+//!
+//! Source: our own; the motions are told apart by [`super::persistence`], from tracks. Each motion has the tracks that it can follow: those whose velocity is forgotten leave one of constant velocity at
+//! their longer steps, and among many that diffuse or rest those that go somewhere leave the other one. So the scans are followed again, and in the end both are asked how much likelier the
+//! detections are as those of their tracks than as clutter.
+//! Limits: one motion for all targets, the one that explains more.
+
+use super::super::first_scans::PROBE_FRAMES;
+use super::fit::{Motion, Noise, Step, log_likelihood, n_judged};
+use super::follow::follow;
+use super::forgotten::Persistence;
+use super::given::put;
+use super::persistence::{self, Assumed};
+use crate::track::{ModelConfig, TrackerConfig};
+use crate::{Result, Scan};
+
+/// How often targets whose velocity is forgotten are followed again: each time the steps that were lost are nearer to none.
+const MOST_ROUNDS: usize = 6;
+/// Detections that are followed again: more change the third digit.
+const MOST_STEPS: usize = 20_000;
+
+/// Noise and motion of targets whose velocity is forgotten, if the series are of such ones. What was assumed before has lost them at their longer steps, and those that are left look like noise
+/// around a course: they are followed again with the simplest motion found, until that stays, and only then another may explain more.
+///
+/// `driven` is the noise of the same series with constant velocity: that motion stays if it explains more of the scans.
+pub(super) fn forgetful(
+    series: &[Vec<Step>],
+    scans: &[Scan],
+    assume: Assumed,
+    driven: &Noise,
+    config: &TrackerConfig,
+) -> Result<Option<(Noise, Persistence)>> {
+    let Some(mut found) = persistence::better(series, assume).next() else { return Ok(None) };
+    let mut config = config.clone();
+    // Steps are looked at, not whose they are after a gap, and those of some scans say enough where targets are many.
+    config.reidentification.max_gap_s = 0.0;
+    let mut n = 0;
+    let enough = scans.iter().take_while(|s| (n < MOST_STEPS, n += s.detections.len()).0).count();
+    let scans = &scans[..enough.max(PROBE_FRAMES).min(scans.len())];
+    let mut round = 1;
+    let found = loop {
+        put(&found.0, assume.least_density, &mut config);
+        config.filter.model = found.1.model();
+        let again = series_of(scans, &config)?;
+        let mut ever_better = persistence::better(&again, assume);
+        // What is followed without loss and goes its way was lost before.
+        let Some(next) = ever_better.next() else { return Ok(None) };
+        if round == MOST_ROUNDS || next.1.is_nearly(&found.1) {
+            break ever_better.last().unwrap_or(next);
+        }
+        found = next;
+        round += 1;
+    };
+    let Assumed { least_density, speed_std, area_px2, .. } = assume;
+    // What it costs to take a detection for clutter, as many of which lie about as there are detections of any kind.
+    let n_detections: usize = scans.iter().map(|s| s.detections.len()).sum();
+    let density = n_detections as f64 / (scans.len().max(1) as f64 * area_px2);
+    let mut gain = |noise: &Noise, model: ModelConfig, motion: Motion| -> Result<f64> {
+        put(noise, least_density, &mut config);
+        config.filter.model = model;
+        let series = series_of(scans, &config)?;
+        Ok(log_likelihood(&series, noise, motion, area_px2) - n_judged(&series) as f64 * density.ln())
+    };
+    let forgets = gain(&found.0, found.1.model(), Motion::Persistent(found.1))?;
+    let stays = gain(driven, ModelConfig::default(), Motion::Accelerated(speed_std))?;
+    Ok((forgets > stays).then_some(found))
+}
+
+/// The positions of the tracks that a configuration confirms.
+fn series_of(scans: &[Scan], config: &TrackerConfig) -> Result<Vec<Vec<Step>>> {
+    Ok(follow(scans, config)?.into_values().map(|t| t.steps).collect())
+}
