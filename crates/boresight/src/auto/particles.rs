@@ -237,24 +237,28 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// What is chosen for twelve frames of thirty things that diffuse by a pixel a frame, as bright at the distance r px as `light` says.
-    fn chosen(light: impl Fn(f64) -> f64) -> ThresholdConfig {
-        const SIZE: usize = 240;
+    const SIZE: usize = 240;
+
+    /// Twelve frames of things at these places that diffuse by so many pixels a frame, as bright at the distance r px as `light` says of each.
+    fn frames_of(mut at: Vec<[f64; 2]>, step_px: f64, light: impl Fn(usize, f64) -> f64) -> Vec<Frame> {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let mut at: Vec<[f64; 2]> =
-            (0..30).map(|i| [24.0 + 38.0 * f64::from(i % 6), 24.0 + 48.0 * f64::from(i / 6)]).collect();
-        let mut frame = |k: u64| {
-            at.iter_mut().flatten().for_each(|v| *v += rng.sample::<f64, _>(StandardNormal));
+        let frame = |k: u64| {
+            at.iter_mut().flatten().for_each(|v| *v += step_px * rng.sample::<f64, _>(StandardNormal));
             let value = |i: usize| {
                 let far = |p: &[f64; 2]| ((i % SIZE) as f64 - p[0]).hypot((i / SIZE) as f64 - p[1]);
-                200.0 + at.iter().map(|p| light(far(p))).sum::<f64>()
+                200.0 + at.iter().enumerate().map(|(i, p)| light(i, far(p))).sum::<f64>()
             };
             let values = (0..SIZE * SIZE).map(|i| (value(i) + 14.0 * rng.sample::<f64, _>(StandardNormal)) as u16);
             let pixels = Pixels::Gray16(Image::from_vec(SIZE, SIZE, values.collect()).unwrap());
             Frame { index: FrameIndex(k), time: Timestamp::from_secs_f64(0.1 * k as f64), pixels }
         };
-        let frames: Vec<Frame> = (0..12).map(&mut frame).collect();
-        let (frames, info) = described(frames);
+        (0..12).map(frame).collect()
+    }
+
+    /// What is chosen for thirty things that diffuse by a pixel a frame.
+    fn chosen(light: impl Fn(f64) -> f64) -> ThresholdConfig {
+        let at = (0..30).map(|i| [24.0 + 38.0 * f64::from(i % 6), 24.0 + 48.0 * f64::from(i / 6)]).collect();
+        let (frames, info) = described(frames_of(at, 1.0, |_, r| light(r)));
         choose(&frames, &info, &Config::default()).unwrap().config.detector.threshold
     }
 
@@ -265,5 +269,19 @@ mod tests {
         assert!(matches!(spots, ThresholdConfig::Spot(_)), "{spots:?}");
         let discs = chosen(|r| 200.0 / (1.0 + (2.0 * (r - 7.0)).exp()));
         assert!(matches!(discs, ThresholdConfig::Local(_)), "{discs:?}");
+    }
+
+    #[test]
+    fn many_spots_before_a_camera_that_stands_are_particles() {
+        // Of unlike brightness: the brightest ones are edges that stand.
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let at: Vec<[f64; 2]> = (0..110).map(|_| [(); 2].map(|()| SIZE as f64 * rng.random::<f64>())).collect();
+        let heights: Vec<f64> = at.iter().map(|_| 200.0 * (0.9 * rng.sample::<f64, _>(StandardNormal)).exp()).collect();
+        let frames = frames_of(at, 0.3, |i, r| heights[i] * (-r * r / 5.0).exp());
+        let (frames, info) = described(frames);
+        let scene = super::super::scene::look(&frames, &info).unwrap();
+        assert!(scene.camera == Camera::Fixed && scene.regions < LEAST, "{:?} {}", scene.camera, scene.regions);
+        let chosen = choose(&frames, &info, &Config::default()).unwrap().config.detector.threshold;
+        assert!(matches!(chosen, ThresholdConfig::Spot(_)), "{chosen:?}");
     }
 }

@@ -153,7 +153,7 @@ fn size_wander(tracks: &BTreeMap<u64, Followed>, merged_s: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::ModelConfig;
+    use crate::track::{ModelConfig, TrackerConfig};
     use crate::{Detection, FrameIndex, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -220,35 +220,46 @@ mod tests {
         assert_eq!(learnt(0.0), (0.0, false));
     }
 
-    #[test]
-    fn particles_that_diffuse_are_followed_again_until_what_is_learnt_stays() {
-        // Twelve far from each other with steps of 1.2 px an axis, of which what is assumed at first loses one in three.
+    /// What is learnt of twelve far from each other with steps of `step_px` an axis, and of so many that go 6 px in each of 150 scans.
+    fn learnt_of(step_px: f64, n_going: usize, motions: Motions) -> TrackerConfig {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
         let mut normal = || rng.sample::<f64, _>(StandardNormal);
         let mut at: Vec<[f64; 2]> =
             (0..12).map(|i| [100.0 + 200.0 * f64::from(i % 4), 100.0 + 200.0 * f64::from(i / 4)]).collect();
         let scans: Vec<Scan> = (0..150_u64)
             .map(|k| {
-                at.iter_mut().flatten().for_each(|v| *v += 1.2 * normal());
-                let seen = at.iter().map(|p| p.map(|v| v + 0.1 * normal()));
+                at.iter_mut().flatten().for_each(|v| *v += step_px * normal());
+                let going = (0..n_going).map(|i| [6.0 * k as f64, 40.0 + 120.0 * i as f64]);
+                let seen: Vec<[f64; 2]> = at.iter().copied().chain(going).collect();
+                let seen = seen.iter().map(|p| p.map(|v| v + 0.1 * normal()));
                 let detections = seen.map(|p| Detection::at(p.into(), nalgebra::Matrix2::identity() * 0.01)).collect();
                 let time = Timestamp::from_secs_f64(k as f64 * 0.04);
                 Scan { detections, ..Scan::at(FrameIndex(k), time) }
             })
             .collect();
-        let learnt = |motions| {
-            let mut config = Config::default();
-            config.tracker.acceleration_density_px2_per_s3 = 100.0;
-            config.tracker.max_speed_px_per_s = 150.0;
-            learn(&scans, 6e5, LengthUnit::Pixel, motions, &mut config, &mut Vec::new()).unwrap();
-            config.tracker
-        };
-        let tracker = learnt(Motions::DrivenOrForgetful);
+        let mut config = Config::default();
+        config.tracker.acceleration_density_px2_per_s3 = 100.0;
+        config.tracker.max_speed_px_per_s = 150.0;
+        learn(&scans, 6e5, LengthUnit::Pixel, motions, &mut config, &mut Vec::new()).unwrap();
+        config.tracker
+    }
+
+    #[test]
+    fn particles_that_diffuse_are_followed_again_until_what_is_learnt_stays() {
+        // What is assumed at first loses one step in three.
+        let tracker = learnt_of(1.2, 0, Motions::DrivenOrForgetful);
         let ModelConfig::OrnsteinUhlenbeck(c) = &tracker.filter.model else { panic!("{:?}", tracker.filter) };
         let grows = 2.0 * c.speed_std_px_per_s.powi(2) * c.memory_s;
         assert!((grows / 36.0).ln().abs() < 0.1, "1.2² px² in 0.04 s: {grows} px²/s");
         let std = (0.01 * tracker.detection_covariance_scale + tracker.extra_noise_px.powi(2)).sqrt();
         assert!(std < 0.25, "0.1 px is the truth: {std}");
-        assert!(learnt(Motions::Driven).filter.is_constant_velocity());
+        assert!(learnt_of(1.2, 0, Motions::Driven).filter.is_constant_velocity());
+    }
+
+    #[test]
+    fn before_many_at_rest_those_that_go_are_followed() {
+        let forgets = |n_going| !learnt_of(0.0, n_going, Motions::DrivenOrForgetful).filter.is_constant_velocity();
+        assert!(forgets(0), "what rests has no velocity");
+        assert!(!forgets(3), "of what goes 6 px a scan nothing would be followed");
     }
 }

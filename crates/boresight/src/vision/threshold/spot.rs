@@ -8,7 +8,7 @@
 //! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
-//! enlarges it to 1/(1-q). The model ends where negative D is clipped: for peaks of a few deviations the truth is
+//! enlarges it to 1/(1-q). A spot that is longer than the others may be two, and its position is as uncertain as its light is long (`spot/elongation.rs`). The model ends where negative D is clipped: for peaks of a few deviations the truth is
 //! somewhat larger. Pixels without a value (NaN) take their left neighbour's.
 //! Symbols: σ noise of one pixel (counts); p position in the disc (px).
 
@@ -23,10 +23,12 @@ use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
 mod disc;
+mod elongation;
 mod peaks;
 
 pub use disc::DIAMETER_PER_WIDTH;
 use disc::{Disc, Moments, discs, moments, part};
+use elongation::{Elongation, Moments2};
 use peaks::{Summit, find_nearest};
 
 /// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
@@ -43,6 +45,10 @@ struct Spot {
     score: f32,
     peak: (usize, usize),
     disc: Disc,
+    /// Where no other peak is near.
+    shape: Option<Moments2>,
+    /// What is added to the covariance, px², since it may be two.
+    doubt: Matrix2<f64>,
 }
 
 /// A spot of one sign as a detection, before the signs are compared.
@@ -67,6 +73,8 @@ pub struct SpotDetector {
     peak_offsets: Vec<(i32, i32)>,
     /// From the smallest to the largest.
     discs: Vec<Disc>,
+    elongation: Elongation,
+    shapes: Vec<(Option<Moments2>, f64)>,
     /// A float frame without missing values.
     whole: Image<f32>,
     response: Image<f32>,
@@ -111,13 +119,17 @@ impl SpotDetector {
             .filter(|(x, y)| x * x + y * y < (r + 2) * (r + 2))
             .collect();
         let cell = (4.0 * config.size_px).max(32.0) as usize;
+        let discs = discs(config.size_px, smooth, surround);
         Self {
             config: config.clone(),
             smooth,
             surround,
             radius,
             peak_offsets,
-            discs: discs(config.size_px, smooth, surround),
+            // Some two deviations of a spot: farther out is the light of others.
+            elongation: Elongation::new(discs[0].radius + 1),
+            shapes: Vec::new(),
+            discs,
             whole: Image::default(),
             response: Image::default(),
             boxes: Boxes::new(smooth, surround),
@@ -150,6 +162,7 @@ impl SpotDetector {
             self.grid.refresh(&self.response);
             self.find_peaks();
             self.drop_doubles();
+            self.doubt_long_ones();
             let mut found = std::mem::take(&mut self.found);
             found.extend(self.spots.iter().map(|s| Found {
                 detection: self.detection(image, s, noise, sign),
@@ -214,7 +227,7 @@ impl SpotDetector {
                 }
             }
         }
-        find_nearest(&mut summits, 2 * self.largest_disc().radius);
+        find_nearest(&mut summits, (2 * self.largest_disc().radius).max(self.elongation.alone_px()));
         spots.extend(summits.iter().map(|s| self.centre(s)));
         (self.spots, self.summits) = (spots, summits);
     }
@@ -256,7 +269,9 @@ impl SpotDetector {
             }
         }
         let score = ((f64::from(summit.v) - summit.median) / summit.deviation).min(1e9) as f32;
-        Spot { position: c, mass, pull, score, peak: (summit.x, summit.y), disc }
+        let is_alone = summit.nearest2 > self.elongation.alone_px().pow(2);
+        let shape = is_alone.then(|| self.elongation.measure(&self.response, c));
+        Spot { position: c, mass, pull, score, peak: (summit.x, summit.y), disc, shape, doubt: Matrix2::zeros() }
     }
 
     /// Least deviation that a score counts in, counts: that of which the least contrast is k. Of a ground without noise, or of one that a codec has flattened in most places, half of the
@@ -285,6 +300,14 @@ impl SpotDetector {
         }
         let mut keep = self.keep.iter();
         self.spots.retain(|_| keep.next().is_none_or(|k| *k));
+    }
+
+    /// Says of those that are longer than usual how uncertain that makes where one of two is.
+    fn doubt_long_ones(&mut self) {
+        self.shapes.clear();
+        self.shapes.extend(self.spots.iter().map(|s| (s.shape, s.mass / s.disc.share)));
+        let spots = &mut self.spots;
+        self.elongation.judge(&self.shapes, |i, doubt| spots[i].doubt = doubt);
     }
 
     /// The disc from which on noise moves the centroid of a peak the more the larger it is, of those up to half the way to the nearest other one.
@@ -337,7 +360,7 @@ impl SpotDetector {
         let sd2 = variance * noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2) + 1e-4;
         Detection {
             position: spot.position,
-            cov: Matrix2::identity() * sd2,
+            cov: Matrix2::identity() * sd2 + spot.doubt,
             extent: Extent {
                 left_px: low.0 as f64 - 0.5,
                 top_px: low.1 as f64 - 0.5,

@@ -131,6 +131,8 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
                 score: 1.0,
                 peak: (x as usize, y as usize),
                 disc: LARGE,
+                shape: None,
+                doubt: Matrix2::zeros(),
             })
             .collect();
         detector.drop_doubles();
@@ -218,9 +220,10 @@ fn a_centroid_in_noise_is_near_the_bound_and_its_covariance_is_right() {
         ((sum2 / 1000.0).sqrt() / bound, nees / 1000.0)
     };
     // The first is known to 2.2 %, the second to 4.5 %.
-    for size_px in [8.65, 3.53] {
+    // A filter no wider than half of the height sees less of the light: 1.33 by the same trial in numpy.
+    for (size_px, most) in [(8.65, 1.2), (3.53, 1.4)] {
         let (error, nees) = errors(size_px, false);
-        assert!(error < 1.2 && (nees - 1.0).abs() < 0.2, "{size_px}: {error} {nees}");
+        assert!(error < most && (nees - 1.0).abs() < 0.2, "{size_px}: {error} {nees}");
     }
     // Over the whole spot it was stated as half as sure as it is.
     assert!(errors(8.65, true).1 < 0.6);
@@ -273,7 +276,8 @@ fn size_peak_and_variance_are_read_from_the_response() {
         frame.row_mut(y)[x] = v;
     }
     let disc = Disc { radius: 3, noise_gain: 2.0, share: 1.0 };
-    let spot = |pull| Spot { position: Vector2::new(9.4, 9.2), mass: 10.0, pull, score: 4.0, peak: (9, 9), disc };
+    let (position, doubt) = (Vector2::new(9.4, 9.2), Matrix2::zeros());
+    let spot = |pull| Spot { position, mass: 10.0, pull, score: 4.0, peak: (9, 9), disc, shape: None, doubt };
     let bright = d.detection(&frame, &spot(0.5), (3.0, 0.1), 1.0);
     // Half the peak or more: (9, 9), (10, 9), (11, 9), (9, 10).
     assert_eq!(bright.extent, Extent { left_px: 8.5, top_px: 8.5, width_px: 3.0, height_px: 2.0 });

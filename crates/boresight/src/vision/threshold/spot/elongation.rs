@@ -1,0 +1,206 @@
+//! Spots that are longer than the others of a frame: two that make one peak, and what that adds to the covariance of the position.
+//!
+//! Source: our own. Of two alike at the distance d the position found lies between, d/2 from either, and their light has the variance d²/4 more along the line between them than that of one: by as
+//! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc; what the disc's edge hides of it is made good as for a Gaussian.
+//! Longer than usual: the difference of the eigenvalues of the moments stands [`SURE`] robust deviations above the median of the frame's spots; that holds what noise and the optics do. A fainter spot's is by as much
+//! less certain as it is fainter.
+//! Symbols: M second moments, px²; E their elongation, the vector of M_xx - M_yy and 2 M_xy, whose length is the difference of the eigenvalues.
+//! Limits: things that are long by themselves, if few of the frame's are, pass for two. Where another peak is near, its light makes a spot long: those are not asked.
+
+use crate::Image;
+use nalgebra::{Matrix2, Vector2};
+
+/// Fewest spots that tell what is usual.
+const LEAST: usize = 16;
+/// Deviations by which an elongation is more than usual: of Gaussian ones one in a thousand.
+const SURE: f64 = 3.0;
+/// Deviation of a Gaussian in units of the median magnitude.
+const PER_MEDIAN: f64 = 1.4826;
+/// Another peak is near within this many radii of the disc.
+const NEAR: f64 = 1.5;
+/// Steps of the table of Gaussians: variances from a hundredth of the squared radius to twice it.
+const STEPS: usize = 24;
+const VARIANCES: [f64; 2] = [0.01, 2.0];
+/// Variance along the longer axis of the Gaussians that tell what the edge hides, in units of that across it.
+const LONGER: f64 = 1.5;
+
+/// Second moments of a spot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Moments2 {
+    /// Half of the sum of the eigenvalues, px².
+    mean: f64,
+    /// M_xx - M_yy and 2 M_xy, px².
+    long: [f64; 2],
+}
+
+impl Moments2 {
+    fn length(&self) -> f64 {
+        self.long[0].hypot(self.long[1])
+    }
+}
+
+/// What is usual, and what the disc's edge hides.
+#[derive(Clone, Debug)]
+pub(super) struct Elongation {
+    /// Radius of the disc, px.
+    radius: usize,
+    /// Mean eigenvalue of the moments that a Gaussian has in the disc, growing, and by how much less its elongation is there, px² in px².
+    table: [(f64, f64); STEPS],
+    sorted: Vec<f64>,
+}
+
+impl Elongation {
+    pub(super) fn new(radius: usize) -> Self {
+        let r2 = (radius * radius) as f64;
+        let ratio = (VARIANCES[1] / VARIANCES[0]).powf(1.0 / (STEPS - 1) as f64);
+        let side = 2 * radius + 3;
+        let c = Vector2::new(radius as f64 + 1.0, radius as f64 + 1.0);
+        let table = std::array::from_fn(|i| {
+            let across = VARIANCES[0] * ratio.powi(i as i32) * r2;
+            let of = |along: f64| {
+                let value = |p: usize| {
+                    let (x, y) = ((p % side) as f64 - c.x, (p / side) as f64 - c.y);
+                    (-0.5 * (x * x / along + y * y / across)).exp() as f32
+                };
+                let image = Image::from_vec(side, side, (0..side * side).map(value).collect());
+                image.map_or(Moments2::default(), |image| second_moments(&image, radius, c))
+            };
+            (of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across))
+        });
+        Self { radius, table, sorted: Vec::new() }
+    }
+
+    /// Another peak is near up to this distance, px.
+    pub(super) fn alone_px(&self) -> usize {
+        (NEAR * self.radius as f64).ceil() as usize
+    }
+
+    /// The moments of a spot at a place.
+    pub(super) fn measure(&self, response: &Image<f32>, c: Vector2<f64>) -> Moments2 {
+        second_moments(response, self.radius, c)
+    }
+
+    /// What is to be added to the covariance of each spot's position, px², from the moments of those that are asked and all masses.
+    pub(super) fn judge(&mut self, spots: &[(Option<Moments2>, f64)], mut put: impl FnMut(usize, Matrix2<f64>)) {
+        let asked = || spots.iter().enumerate().filter_map(|(i, (m, mass))| m.map(|m| (i, m, *mass)));
+        if asked().count() < LEAST {
+            return;
+        }
+        let sorted = &mut self.sorted;
+        let mut median = |values: &mut dyn Iterator<Item = f64>| {
+            sorted.clear();
+            sorted.extend(values);
+            let middle = sorted.len() / 2;
+            *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        let usual = median(&mut asked().map(|(_, m, _)| m.length()));
+        let deviation = PER_MEDIAN * median(&mut asked().map(|(_, m, _)| (m.length() - usual).abs()));
+        let mass = median(&mut asked().map(|(.., mass)| mass));
+        let mean = median(&mut asked().map(|(_, m, _)| m.mean));
+        let shown = self.shown(mean);
+        for (i, m, own) in asked() {
+            let more = m.length() - usual;
+            if more > SURE * deviation * (mass / own).max(1.0) {
+                // Half of one and one along the axis, of the length 1.
+                let [c, s] = m.long.map(|e| e / m.length());
+                put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * more / shown));
+            }
+        }
+    }
+
+    /// Part of an elongation that the disc shows of a spot of usual moments.
+    fn shown(&self, mean: f64) -> f64 {
+        let k = self.table.partition_point(|t| t.0 < mean).clamp(1, STEPS - 1);
+        let ([a, of_a], [b, of_b]) = (<[f64; 2]>::from(self.table[k - 1]), <[f64; 2]>::from(self.table[k]));
+        let part = ((mean - a) / (b - a)).clamp(0.0, 1.0);
+        of_a + part * (of_b - of_a)
+    }
+}
+
+/// Second moments of the positive response about `c` in a disc with a soft edge.
+fn second_moments(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments2 {
+    let (inner2, outer2) = ((radius as f64 - 0.5).powi(2), (radius as f64 + 0.5).powi(2));
+    let within = |c: f64, size: usize| {
+        let outer = radius as f64 + 0.5;
+        ((c - outer).ceil().max(0.0) as usize, ((c + outer).floor() + 1.0).clamp(0.0, size as f64) as usize)
+    };
+    let ((left, right), (top, bottom)) = (within(c.x, response.width()), within(c.y, response.height()));
+    let [mut sum, mut xx, mut xy, mut yy] = [0.0; 4];
+    for row in top..bottom {
+        let y = row as f64 - c.y;
+        for (at, v) in (left..right).zip(&response.row(row)[left.min(right)..right]) {
+            let x = at as f64 - c.x;
+            let weight = ((outer2 - x * x - y * y) / (outer2 - inner2)).clamp(0.0, 1.0);
+            let v = weight * f64::from(v.max(0.0));
+            sum += v;
+            xx += v * x * x;
+            xy += v * x * y;
+            yy += v * y * y;
+        }
+    }
+    if sum <= 0.0 {
+        return Moments2::default();
+    }
+    Moments2 { mean: 0.5 * (xx + yy) / sum, long: [(xx - yy) / sum, 2.0 * xy / sum] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const C: Vector2<f64> = Vector2::new(12.3, 11.8);
+
+    /// Spots of deviation 1.5 px at these places beside the middle.
+    fn response(at: &[[f64; 2]]) -> Image<f32> {
+        let value = |i: usize| {
+            let d2 = |p: &[f64; 2]| ((i % 25) as f64 - C.x - p[0]).powi(2) + ((i / 25) as f64 - C.y - p[1]).powi(2);
+            at.iter().map(|p| (-d2(p) / 4.5).exp()).sum::<f64>() as f32
+        };
+        Image::from_vec(25, 25, (0..625).map(value).collect()).unwrap()
+    }
+
+    #[test]
+    fn a_pair_is_as_uncertain_along_its_line_as_half_of_its_distance() {
+        let mut elongation = Elongation::new(4);
+        let one = elongation.measure(&response(&[[0.0, 0.0]]), C);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for d in [2.0, 2.5, 3.0] {
+            let along = Vector2::new(0.6, 0.8) * (0.5 * d);
+            let pair = elongation.measure(&response(&[[along.x, along.y], [-along.x, -along.y]]), C);
+            // The others differ by what noise does.
+            let mut spots: Vec<(Option<Moments2>, f64)> = (0..40)
+                .map(|_| {
+                    let noisy = one.long.map(|e| e + 0.05 * rng.sample::<f64, _>(StandardNormal));
+                    (Some(Moments2 { long: noisy, ..one }), 10.0)
+                })
+                .collect();
+            spots[0].0 = Some(pair);
+            spots.push((None, 10.0));
+            let mut added = Vec::new();
+            elongation.judge(&spots, |i, m| added.push((i, m)));
+            let (i, m) = added[0];
+            let way = along.normalize();
+            let (of, across) = (way.dot(&(m * way)), Vector2::new(-way.y, way.x));
+            assert!(i == 0 && (of / (0.25 * d * d) - 1.0).abs() < 0.3, "{d}: {of}");
+            assert!(across.dot(&(m * across)).abs() < 1e-9, "{m}");
+            assert!(added.len() <= 2, "{added:?}");
+            // So faint that noise may do that.
+            spots[0].1 = 0.1;
+            added.clear();
+            elongation.judge(&spots, |i, m| added.push((i, m)));
+            assert!(added.iter().all(|(i, _)| *i != 0));
+            // Of so few none is unusual.
+            elongation.judge(&spots[..LEAST - 1], |_, _| unreachable!());
+        }
+    }
+
+    #[test]
+    fn moments_are_those_of_the_light_where_the_disc_holds_all_of_it() {
+        let m = second_moments(&response(&[[1.0, 0.0], [-1.0, 0.0]]), 9, C);
+        assert!((m.mean - 2.75).abs() < 0.03 && (m.long[0] - 1.0).abs() < 0.03 && m.long[1].abs() < 0.01, "{m:?}");
+        assert_eq!(second_moments(&Image::filled(9, 9, -1.0), 3, C), Moments2::default());
+    }
+}
