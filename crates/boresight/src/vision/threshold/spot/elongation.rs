@@ -185,7 +185,7 @@ mod tests {
             let way = along.normalize();
             let (of, across) = (way.dot(&(m * way)), Vector2::new(-way.y, way.x));
             assert!(i == 0 && (of / (0.25 * d * d) - 1.0).abs() < 0.3, "{d}: {of}");
-            assert!(across.dot(&(m * across)).abs() < 1e-9, "{m}");
+            assert!(across.dot(&(m * across)).abs() < 1e-3, "{m}");
             assert!(added.len() <= 2, "{added:?}");
             // So faint that noise may do that.
             spots[0].1 = 0.1;
