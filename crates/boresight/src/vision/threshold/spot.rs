@@ -4,11 +4,11 @@
 //! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
 //! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
-//! edge, so that positions are not drawn to whole pixels, and in the disc in which noise moves it the least, from 0.3 of the size on, up to half the way to the next peak (`spot/peaks.rs`); of two
+//! edge, so that positions are not drawn to whole pixels; the disc has half of the size, less where another peak is near: no more than half of the way to it (`spot/peaks.rs`). Of two
 //! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
-//! enlarges it to 1/(1-q). A spot that is longer than the others may be two, and its position is as uncertain as its light is long (`spot/elongation.rs`). The model ends where negative D is clipped: for peaks of a few deviations the truth is
+//! enlarges it to 1/(1-q). What negative D of the outer parts is cut off adds no noise, so the least covariance of the disc and of smaller ones counts: with that of a disc of four deviations alone, e² is half of what is stated. A spot that is longer than the others may be two, and its position is as uncertain as its light is long (`spot/elongation.rs`). The model ends where negative D is clipped: for peaks of a few deviations the truth is
 //! somewhat larger. Pixels without a value (NaN) take their left neighbour's.
 //! Symbols: σ noise of one pixel (counts); p position in the disc (px).
 
@@ -127,7 +127,7 @@ impl SpotDetector {
             radius,
             peak_offsets,
             // Some two deviations of a spot: farther out is the light of others.
-            elongation: Elongation::new(discs[0].radius + 1),
+            elongation: Elongation::new(discs[0].radius + 1, radius as f64 + 2.0),
             shapes: Vec::new(),
             discs,
             whole: Image::default(),
@@ -306,26 +306,26 @@ impl SpotDetector {
     fn doubt_long_ones(&mut self) {
         self.shapes.clear();
         self.shapes.extend(self.spots.iter().map(|s| (s.shape, s.mass / s.disc.share)));
-        let spots = &mut self.spots;
-        self.elongation.judge(&self.shapes, |i, doubt| spots[i].doubt = doubt);
+        let (spots, area_px2) = (&mut self.spots, self.response.as_slice().len() as f64);
+        self.elongation.judge(&self.shapes, area_px2, |i, doubt| spots[i].doubt = doubt);
     }
 
-    /// The disc from which on noise moves the centroid of a peak the more the larger it is, of those up to half the way to the nearest other one.
+    /// The largest disc that reaches no farther than half of the way to the nearest other peak, or the smallest there is.
     fn disc(&self, summit: &Summit) -> Disc {
-        let at = Vector2::new(summit.x as f64, summit.y as f64);
-        let smallest = self.discs[0];
-        let (mut best, mut least) = (smallest, f64::INFINITY);
-        let fits = |d: &&Disc| d.radius == smallest.radius || 4 * d.radius.pow(2) <= summit.nearest2;
-        for disc in self.discs.iter().take_while(fits) {
-            let Moments { sum, edge, .. } = moments(&self.response, disc.radius, at);
-            // As the covariance, but for the limit: a flat top leaves a small disc no hold at all.
-            let variance = disc.noise_gain / (sum - edge).max(0.0).powi(2);
-            if variance >= least {
-                break;
-            }
-            (best, least) = (*disc, variance);
-        }
-        best
+        let fits = |d: &&Disc| 4 * d.radius.pow(2) <= summit.nearest2;
+        *self.discs.iter().rev().find(fits).unwrap_or(&self.discs[0])
+    }
+
+    /// Variance of a spot's position along an axis for noise of this variance of a pixel, px²: the least of its disc and of smaller ones. What a larger disc has in addition is mostly cut off at 0, where
+    /// noise does nothing.
+    fn variance_px2(&self, spot: &Spot, pixel: f64) -> f64 {
+        let own = pixel * spot.disc.noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2);
+        let smaller = self.discs.iter().take_while(|d| d.radius < spot.disc.radius).map(|d| {
+            let Moments { sum, edge, .. } = moments(&self.response, d.radius, spot.position);
+            // Of a flat top it has no hold at all.
+            pixel * d.noise_gain / (sum - edge).max(0.0).powi(2)
+        });
+        smaller.fold(own, f64::min)
     }
 
     fn largest_disc(&self) -> Disc {
@@ -356,8 +356,7 @@ impl SpotDetector {
         // Rounding and clipping leave a little even without noise. A missing value counts as 0.
         let level = image.get(spot.peak.0, spot.peak.1).map_or(0.0, Pixel::value).max(0.0);
         let variance = (noise.0 + noise.1 * level).max(0.0);
-        let Disc { noise_gain, share, .. } = spot.disc;
-        let sd2 = variance * noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2) + 1e-4;
+        let sd2 = self.variance_px2(spot, variance) + 1e-4;
         Detection {
             position: spot.position,
             cov: Matrix2::identity() * sd2 + spot.doubt,
@@ -369,7 +368,7 @@ impl SpotDetector {
             },
             area_px: area.max(1),
             peak: if peak.is_finite() { sign * peak } else { top },
-            sum: spot.mass / share,
+            sum: spot.mass / spot.disc.share,
             score: spot.score,
             class: None,
             velocity: None,

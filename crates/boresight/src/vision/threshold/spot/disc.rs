@@ -91,6 +91,9 @@ const WIDTH_PER_DEVIATION: f64 = 2.354_82;
 /// Least radius of a disc, px: in one of a pixel the centroid depends on where in its pixel a spot lies, by 0.02 to 0.2 px for deviations of 0.6 to 3 px, in one of two by 0.03 at most.
 const LEAST_RADIUS: usize = 2;
 
+/// Radii of the discs in units of the size.
+const PARTS: [f64; 3] = [0.3, 0.4, 0.5];
+
 /// A disc that a spot's centroid may be taken in.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
@@ -102,10 +105,9 @@ pub(super) struct Disc {
     pub(super) share: f64,
 }
 
-/// The discs for spots of a size, from 0.3 of it, which suits one that is looked for with its soft edge, to 0.75, which suits one that is looked for at its width at half height: three quarters of
-/// that in both. In larger discs most of the response is cut off at 0, and the covariance, which takes it for linear, is too large.
+/// The discs for spots of a size: half of it, and smaller ones for spots whose neighbour is near, down to 0.3 of it.
 pub(super) fn discs(size_px: f64, smooth: usize, surround: usize) -> Vec<Disc> {
-    let mut radii = [0.3, 0.4, 0.5, 0.75].map(|part| ((part * size_px).round() as usize).max(LEAST_RADIUS)).to_vec();
+    let mut radii = PARTS.map(|part| ((part * size_px).floor() as usize).max(LEAST_RADIUS)).to_vec();
     radii.dedup();
     let share = shares(size_px, radii[radii.len() - 1], smooth, surround);
     let disc = |radius| Disc { radius, noise_gain: noise_gain(radius, smooth, surround), share: share(radius) };

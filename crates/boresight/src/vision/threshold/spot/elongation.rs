@@ -3,9 +3,10 @@
 //! Source: our own. Of two alike at the distance d the position found lies between, d/2 from either, and their light has the variance d²/4 more along the line between them than that of one: by as
 //! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc; what the disc's edge hides of it is made good as for a Gaussian.
 //! Longer than usual: the difference of the eigenvalues of the moments stands [`SURE`] robust deviations above the median of the frame's spots; that holds what noise and the optics do. A fainter spot's is by as much
-//! less certain as it is fainter.
+//! less certain as it is fainter. Not all that are long are two: of n spots in an area A some n² π D² / 2A are pairs nearer than D by chance, D twice the deviation of a spot's response (C. M. Sparrow, *Astrophys. J.* 44,
+//! 1916: up to there two Gaussians have one peak), or what the detector makes one peak of; if more are long, each may be two with the probability that remains.
 //! Symbols: M second moments, px²; E their elongation, the vector of M_xx - M_yy and 2 M_xy, whose length is the difference of the eigenvalues.
-//! Limits: things that are long by themselves, if few of the frame's are, pass for two. Where another peak is near, its light makes a spot long: those are not asked.
+//! Limits: spots lie anywhere; of two as of any two, whatever their distance. Where another peak is near, its light makes a spot long: those are not asked.
 
 use crate::Image;
 use nalgebra::{Matrix2, Vector2};
@@ -44,13 +45,15 @@ impl Moments2 {
 pub(super) struct Elongation {
     /// Radius of the disc, px.
     radius: usize,
-    /// Mean eigenvalue of the moments that a Gaussian has in the disc, growing, and by how much less its elongation is there, px² in px².
-    table: [(f64, f64); STEPS],
+    /// Of peaks within this distance the detector takes the larger one, px.
+    one_px: f64,
+    /// Of Gaussians that grow: the mean eigenvalue of the moments in the disc, the part of an elongation that is seen there, and the variance, px².
+    table: [[f64; 3]; STEPS],
     sorted: Vec<f64>,
 }
 
 impl Elongation {
-    pub(super) fn new(radius: usize) -> Self {
+    pub(super) fn new(radius: usize, one_px: f64) -> Self {
         let r2 = (radius * radius) as f64;
         let ratio = (VARIANCES[1] / VARIANCES[0]).powf(1.0 / (STEPS - 1) as f64);
         let side = 2 * radius + 3;
@@ -65,9 +68,9 @@ impl Elongation {
                 let image = Image::from_vec(side, side, (0..side * side).map(value).collect());
                 image.map_or(Moments2::default(), |image| second_moments(&image, radius, c))
             };
-            (of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across))
+            [of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across), across]
         });
-        Self { radius, table, sorted: Vec::new() }
+        Self { radius, one_px, table, sorted: Vec::new() }
     }
 
     /// Another peak is near up to this distance, px.
@@ -80,8 +83,13 @@ impl Elongation {
         second_moments(response, self.radius, c)
     }
 
-    /// What is to be added to the covariance of each spot's position, px², from the moments of those that are asked and all masses.
-    pub(super) fn judge(&mut self, spots: &[(Option<Moments2>, f64)], mut put: impl FnMut(usize, Matrix2<f64>)) {
+    /// What is to be added to the covariance of each spot's position, px², from the moments of those that are asked and all masses, in a frame of that area, px².
+    pub(super) fn judge(
+        &mut self,
+        spots: &[(Option<Moments2>, f64)],
+        area_px2: f64,
+        mut put: impl FnMut(usize, Matrix2<f64>),
+    ) {
         let asked = || spots.iter().enumerate().filter_map(|(i, (m, mass))| m.map(|m| (i, m, *mass)));
         if asked().count() < LEAST {
             return;
@@ -97,23 +105,25 @@ impl Elongation {
         let deviation = PER_MEDIAN * median(&mut asked().map(|(_, m, _)| (m.length() - usual).abs()));
         let mass = median(&mut asked().map(|(.., mass)| mass));
         let mean = median(&mut asked().map(|(_, m, _)| m.mean));
-        let shown = self.shown(mean);
-        for (i, m, own) in asked() {
-            let more = m.length() - usual;
-            if more > SURE * deviation * (mass / own).max(1.0) {
-                // Half of one and one along the axis, of the length 1.
-                let [c, s] = m.long.map(|e| e / m.length());
-                put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * more / shown));
-            }
+        let [shown, variance] = self.usual(mean);
+        let is_long = |m: &Moments2, own: f64| m.length() - usual > SURE * deviation * (mass / own).max(1.0);
+        let n_long = asked().filter(|(_, m, own)| is_long(m, *own)).count();
+        let one2 = (4.0 * variance).max(self.one_px * self.one_px);
+        let n_pairs = 0.5 * (spots.len() as f64).powi(2) * std::f64::consts::PI * one2 / area_px2;
+        let two = (n_pairs / n_long.max(1) as f64).min(1.0);
+        for (i, m, _) in asked().filter(|(_, m, own)| is_long(m, *own)) {
+            // Half of one and one along the axis, of the length 1.
+            let [c, s] = m.long.map(|e| e / m.length());
+            put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * two * (m.length() - usual) / shown));
         }
     }
 
-    /// Part of an elongation that the disc shows of a spot of usual moments.
-    fn shown(&self, mean: f64) -> f64 {
-        let k = self.table.partition_point(|t| t.0 < mean).clamp(1, STEPS - 1);
-        let ([a, of_a], [b, of_b]) = (<[f64; 2]>::from(self.table[k - 1]), <[f64; 2]>::from(self.table[k]));
-        let part = ((mean - a) / (b - a)).clamp(0.0, 1.0);
-        of_a + part * (of_b - of_a)
+    /// Part of an elongation that the disc shows of a spot with that mean of the moments, and its variance, px².
+    fn usual(&self, mean: f64) -> [f64; 2] {
+        let k = self.table.partition_point(|t| t[0] < mean).clamp(1, STEPS - 1);
+        let (a, b) = (self.table[k - 1], self.table[k]);
+        let part = ((mean - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
+        [1, 2].map(|i| a[i] + part * (b[i] - a[i]))
     }
 }
 
@@ -164,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_pair_is_as_uncertain_along_its_line_as_half_of_its_distance() {
-        let mut elongation = Elongation::new(4);
+        let mut elongation = Elongation::new(4, 3.0);
         let one = elongation.measure(&response(&[[0.0, 0.0]]), C);
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for d in [2.0, 2.5, 3.0] {
@@ -180,20 +190,24 @@ mod tests {
             spots[0].0 = Some(pair);
             spots.push((None, 10.0));
             let mut added = Vec::new();
-            elongation.judge(&spots, |i, m| added.push((i, m)));
+            elongation.judge(&spots, 1e4, |i, m| added.push((i, m)));
             let (i, m) = added[0];
             let way = along.normalize();
             let (of, across) = (way.dot(&(m * way)), Vector2::new(-way.y, way.x));
             assert!(i == 0 && (of / (0.25 * d * d) - 1.0).abs() < 0.3, "{d}: {of}");
             assert!(across.dot(&(m * across)).abs() < 1e-3, "{m}");
             assert!(added.len() <= 2, "{added:?}");
+            // In a hundred times the area hardly any two lie so near each other: most that are long are so by themselves.
+            added.clear();
+            elongation.judge(&spots, 1e6, |i, m| added.push((i, m)));
+            assert!(way.dot(&(added[0].1 * way)) < 0.05 * of);
             // So faint that noise may do that.
             spots[0].1 = 0.1;
             added.clear();
-            elongation.judge(&spots, |i, m| added.push((i, m)));
+            elongation.judge(&spots, 1e4, |i, m| added.push((i, m)));
             assert!(added.iter().all(|(i, _)| *i != 0));
             // Of so few none is unusual.
-            elongation.judge(&spots[..LEAST - 1], |_, _| unreachable!());
+            elongation.judge(&spots[..LEAST - 1], 1e4, |_, _| unreachable!());
         }
     }
 
