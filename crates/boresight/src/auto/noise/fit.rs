@@ -54,6 +54,8 @@ const FACTOR_STEPS: [f64; 2] = [0.4, 0.02];
 const SCALE_PRIOR_FACTOR: f64 = 2.0;
 /// Least value of any of the five numbers: nothing beside a pixel and a second of video.
 pub const LEAST: f64 = 1e-6;
+/// Most detections that are fitted: more change the third digit.
+pub const MOST_STEPS: usize = 20_000;
 /// Innovations that every series gives before they count: its velocity is not known at first.
 const SETTLING: usize = 2;
 

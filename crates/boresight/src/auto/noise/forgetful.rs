@@ -6,7 +6,7 @@
 //! Limits: one motion for all targets, the one that explains more.
 
 use super::super::first_scans::PROBE_FRAMES;
-use super::fit::{Motion, Noise, Step, log_likelihood, n_judged};
+use super::fit::{MOST_STEPS, Motion, Noise, Step, log_likelihood, n_judged};
 use super::follow::follow;
 use super::forgotten::Persistence;
 use super::given::put;
@@ -16,8 +16,6 @@ use crate::{Result, Scan};
 
 /// How often targets whose velocity is forgotten are followed again: each time the steps that were lost are nearer to none.
 const MOST_ROUNDS: usize = 6;
-/// Detections that are followed again: more change the third digit.
-const MOST_STEPS: usize = 20_000;
 
 /// Noise and motion of targets whose velocity is forgotten, if the series are of such ones. What was assumed before has lost them at their longer steps, and those that are left look like noise
 /// around a course: they are followed again with the simplest motion found, until that stays, and only then another may explain more.

@@ -21,7 +21,7 @@ use crate::io::LengthUnit;
 use crate::tempo::Tempo;
 use crate::track::{FilterConfig, TrackerParameters};
 use crate::{Config, Result, Scan};
-use fit::{Noise, Step, fit};
+use fit::{MOST_STEPS, Noise, Step, fit};
 use follow::{Followed, follow};
 use forgetful::forgetful;
 use given::{assumed, put};
@@ -32,8 +32,6 @@ use std::collections::BTreeMap;
 const LEAST_STEPS: usize = 20;
 /// How long targets are one detection when they pass each other, s of video.
 const MERGED_S: f64 = 1.0;
-/// Most detections that are fitted: more change the third digit.
-const MOST_STEPS: usize = 20_000;
 
 /// The motions that targets may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@
 //! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error
-//! enlarges it to 1/(1-q). What negative D of the outer parts is cut off adds no noise, so the least covariance of the disc and of smaller ones counts: with that of a disc of four deviations alone, e² is half of what is stated. A spot that is longer than the others may be two, and its position is as uncertain as its light is long (`spot/elongation.rs`). The model ends where negative D is clipped: for peaks of a few deviations the truth is
+//! enlarges it to 1/(1-q). Where the outer parts of D are negative they are cut off and add no noise, so the lesser covariance of the disc and of the smallest one counts: by that of the largest alone e² is half of what is stated (test). A spot that is longer than the others may be two, and its position is as uncertain as its light is long (`spot/elongation.rs`). The model ends where negative D is clipped: for peaks of a few deviations the truth is
 //! somewhat larger. Pixels without a value (NaN) take their left neighbour's.
 //! Symbols: σ noise of one pixel (counts); p position in the disc (px).
 
@@ -133,7 +133,7 @@ impl SpotDetector {
             whole: Image::default(),
             response: Image::default(),
             boxes: Boxes::new(smooth, surround),
-            grid: BackgroundGrid::new(cell),
+            grid: BackgroundGrid::of_smoothed(cell, smooth),
             noise: PixelNoise::default(),
             level: Vec::new(),
             columns: Vec::new(),
@@ -316,16 +316,17 @@ impl SpotDetector {
         *self.discs.iter().rev().find(fits).unwrap_or(&self.discs[0])
     }
 
-    /// Variance of a spot's position along an axis for noise of this variance of a pixel, px²: the least of its disc and of smaller ones. What a larger disc has in addition is mostly cut off at 0, where
-    /// noise does nothing.
+    /// Variance of a spot's position along an axis for noise of this variance of a pixel, px²: the lesser of its disc and of the smallest. What a larger disc has in addition is mostly cut off at 0,
+    /// where noise does nothing.
     fn variance_px2(&self, spot: &Spot, pixel: f64) -> f64 {
         let own = pixel * spot.disc.noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2);
-        let smaller = self.discs.iter().take_while(|d| d.radius < spot.disc.radius).map(|d| {
-            let Moments { sum, edge, .. } = moments(&self.response, d.radius, spot.position);
-            // Of a flat top it has no hold at all.
-            pixel * d.noise_gain / (sum - edge).max(0.0).powi(2)
-        });
-        smaller.fold(own, f64::min)
+        let smallest = &self.discs[0];
+        if smallest.radius >= spot.disc.radius {
+            return own;
+        }
+        let Moments { sum, edge, .. } = moments(&self.response, smallest.radius, spot.position);
+        // Of a flat top it has no hold at all.
+        own.min(pixel * smallest.noise_gain / (sum - edge).max(0.0).powi(2))
     }
 
     fn largest_disc(&self) -> Disc {

@@ -38,23 +38,42 @@ pub(super) fn moments(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> 
 
 #[inline(always)]
 fn moments_vectors<S: Simd>(simd: S, response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments {
-    let outer = radius as f64 + 0.5;
-    let (width, height) = (response.width(), response.height());
-    // The pixels whose middles lie in the square around the disc.
-    let within = |c: f64, size: usize| {
-        ((c - outer).ceil().max(0.0) as usize, ((c + outer).floor() + 1.0).clamp(0.0, size as f64) as usize)
-    };
-    let ((left, right), (top, bottom)) = (within(c.x, width), within(c.y, height));
+    let reach = radius as f64 + 0.5;
     let splat = |v| f64x4::splat(simd, v);
-    let (zero, one, half, outer) = (splat(0.0), splat(1.0), splat(0.5), splat(outer));
-    let steps = f64x4::from_slice(simd, &[0.0, 1.0, 2.0, 3.0]);
+    let (zero, one, half, outer) = (splat(0.0), splat(1.0), splat(0.5), splat(reach));
     let [mut sum, mut x, mut y, mut edge] = [zero; 4];
+    around(simd, response, reach, c, |d, px, py| {
+        let r = (px * px + py * py).sqrt();
+        let window = (outer - r).max(zero).min(one);
+        // Neither outside nor inside.
+        let soft = window.simd_lt(one).select(d * r, zero);
+        edge += window.simd_gt(zero).select(half * soft, zero);
+        let d = window * d;
+        sum += d;
+        x += d * px;
+        y += d * py;
+    });
+    let moment = Vector2::new(x.reduce_sum(), y.reduce_sum());
+    Moments { sum: sum.reduce_sum(), moment, edge: edge.reduce_sum() }
+}
+
+/// Hands over the positive response in the square of so many pixels to each side of `c`, four pixels of a row side by side, with their places from `c`, px. What it hands over beyond the square lies farther away
+/// than `reach`.
+#[inline(always)]
+pub(super) fn around<S: Simd>(
+    simd: S,
+    response: &Image<f32>,
+    reach: f64,
+    c: Vector2<f64>,
+    mut take: impl FnMut(f64x4<S>, f64x4<S>, f64x4<S>),
+) {
+    let ((left, right), (top, bottom)) = (span(c.x, reach, response.width()), span(c.y, reach, response.height()));
+    let splat = |v| f64x4::splat(simd, v);
+    let steps = f64x4::from_slice(simd, &[0.0, 1.0, 2.0, 3.0]);
     for row in top..bottom {
         let pixels = response.row(row);
         let py = splat(row as f64 - c.y);
-        let py2 = py * py;
         for at in (left..right).step_by(LANES) {
-            // What is read beyond the disc has no weight.
             let read = match pixels.get(at..at + LANES) {
                 Some(lanes) => f32x8::from_slice(simd, lanes),
                 None => {
@@ -66,21 +85,17 @@ fn moments_vectors<S: Simd>(simd: S, response: &Image<f32>, radius: usize, c: Ve
             };
             let (low, high) = read.max(f32x8::splat(simd, 0.0)).widen();
             let px = steps + splat(at as f64 - c.x);
+            // One place that takes, so that the compiler puts it here: called, it would be without this processor's vectors.
             for (d, px) in [(low, px), (high, px + splat(4.0))] {
-                let r = (px * px + py2).sqrt();
-                let window = (outer - r).max(zero).min(one);
-                // Neither outside nor inside.
-                let soft = window.simd_lt(one).select(d * r, zero);
-                edge += window.simd_gt(zero).select(half * soft, zero);
-                let d = window * d;
-                sum += d;
-                x += d * px;
-                y += d * py;
+                take(d, px, py);
             }
         }
     }
-    let moment = Vector2::new(x.reduce_sum(), y.reduce_sum());
-    Moments { sum: sum.reduce_sum(), moment, edge: edge.reduce_sum() }
+}
+
+/// The pixels of a row or column of that size whose middles lie within `reach` of `c`: the first, and the one after the last.
+fn span(c: f64, reach: f64, size: usize) -> (usize, usize) {
+    ((c - reach).ceil().max(0.0) as usize, ((c + reach).floor() + 1.0).clamp(0.0, size as f64) as usize)
 }
 
 /// Diameter of a spot with its soft edge in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
@@ -131,7 +146,7 @@ fn noise_gain(radius: usize, smooth: usize, surround: usize) -> f64 {
     seen.as_slice().iter().map(|v| f64::from(*v).powi(2)).sum()
 }
 
-/// Part of the positive response to a Gaussian spot of this size in the disc of radius `largest` that lies in that of a radius.
+/// Part of the positive response to a Gaussian spot that has this size with its soft edge, in the disc of radius `largest`, that lies in that of a radius. Of one whose size is its width at half height it is less.
 fn shares(size_px: f64, largest: usize, smooth: usize, surround: usize) -> impl Fn(usize) -> f64 {
     let reach = largest + 1 + (smooth - 1).max(surround / 2) + 1;
     let scale = -0.5 * (DIAMETER_PER_WIDTH * WIDTH_PER_DEVIATION / size_px).powi(2);

@@ -6,17 +6,19 @@
 //! less certain as it is fainter. Not all that are long are two: of n spots in an area A some n² π D² / 2A are pairs nearer than D by chance, D twice the deviation of a spot's response (C. M. Sparrow, *Astrophys. J.* 44,
 //! 1916: up to there two Gaussians have one peak), or what the detector makes one peak of; if more are long, each may be two with the probability that remains.
 //! Symbols: M second moments, px²; E their elongation, the vector of M_xx - M_yy and 2 M_xy, whose length is the difference of the eigenvalues.
-//! Limits: spots lie anywhere; of two as of any two, whatever their distance. Where another peak is near, its light makes a spot long: those are not asked.
+//! Limits: spots lie independently of each other; in swarms more are two. Where another peak is near, its light makes a spot long: those are not asked.
 
+use super::disc::around;
 use crate::Image;
+use crate::vision::threshold::grid::median_and_deviation;
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch, f64x4};
 use nalgebra::{Matrix2, Vector2};
 
 /// Fewest spots that tell what is usual.
 const LEAST: usize = 16;
 /// Deviations by which an elongation is more than usual: of Gaussian ones one in a thousand.
 const SURE: f64 = 3.0;
-/// Deviation of a Gaussian in units of the median magnitude.
-const PER_MEDIAN: f64 = 1.4826;
 /// Another peak is near within this many radii of the disc.
 const NEAR: f64 = 1.5;
 /// Steps of the table of Gaussians: variances from a hundredth of the squared radius to twice it.
@@ -49,7 +51,7 @@ pub(super) struct Elongation {
     one_px: f64,
     /// Of Gaussians that grow: the mean eigenvalue of the moments in the disc, the part of an elongation that is seen there, and the variance, px².
     table: [[f64; 3]; STEPS],
-    sorted: Vec<f64>,
+    values: Vec<f32>,
 }
 
 impl Elongation {
@@ -70,7 +72,7 @@ impl Elongation {
             };
             [of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across), across]
         });
-        Self { radius, one_px, table, sorted: Vec::new() }
+        Self { radius, one_px, table, values: Vec::new() }
     }
 
     /// Another peak is near up to this distance, px.
@@ -94,32 +96,31 @@ impl Elongation {
         if asked().count() < LEAST {
             return;
         }
-        let sorted = &mut self.sorted;
-        let mut median = |values: &mut dyn Iterator<Item = f64>| {
-            sorted.clear();
-            sorted.extend(values);
-            let middle = sorted.len() / 2;
-            *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+        let values = &mut self.values;
+        let mut usual = |value: fn(&Moments2, f64) -> f64| {
+            values.clear();
+            values.extend(asked().map(|(_, m, mass)| value(&m, mass) as f32));
+            let (median, deviation) = median_and_deviation(values, 0.0);
+            [median, deviation].map(f64::from)
         };
-        let usual = median(&mut asked().map(|(_, m, _)| m.length()));
-        let deviation = PER_MEDIAN * median(&mut asked().map(|(_, m, _)| (m.length() - usual).abs()));
-        let mass = median(&mut asked().map(|(.., mass)| mass));
-        let mean = median(&mut asked().map(|(_, m, _)| m.mean));
-        let [shown, variance] = self.usual(mean);
-        let is_long = |m: &Moments2, own: f64| m.length() - usual > SURE * deviation * (mass / own).max(1.0);
-        let n_long = asked().filter(|(_, m, own)| is_long(m, *own)).count();
+        let [length, deviation] = usual(|m, _| m.length());
+        let [mass, _] = usual(|_, mass| mass);
+        let [mean, _] = usual(|m, _| m.mean);
+        let [shown, variance] = self.of_gaussian(mean);
+        let least_more = |own: f64| SURE * deviation * (mass / own).max(1.0);
+        let long = || asked().filter(|(_, m, own)| m.length() - length > least_more(*own));
         let one2 = (4.0 * variance).max(self.one_px * self.one_px);
         let n_pairs = 0.5 * (spots.len() as f64).powi(2) * std::f64::consts::PI * one2 / area_px2;
-        let two = (n_pairs / n_long.max(1) as f64).min(1.0);
-        for (i, m, _) in asked().filter(|(_, m, own)| is_long(m, *own)) {
+        let two = (n_pairs / long().count().max(1) as f64).min(1.0);
+        for (i, m, _) in long() {
             // Half of one and one along the axis, of the length 1.
             let [c, s] = m.long.map(|e| e / m.length());
-            put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * two * (m.length() - usual) / shown));
+            put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * two * (m.length() - length) / shown));
         }
     }
 
     /// Part of an elongation that the disc shows of a spot with that mean of the moments, and its variance, px².
-    fn usual(&self, mean: f64) -> [f64; 2] {
+    fn of_gaussian(&self, mean: f64) -> [f64; 2] {
         let k = self.table.partition_point(|t| t[0] < mean).clamp(1, STEPS - 1);
         let (a, b) = (self.table[k - 1], self.table[k]);
         let part = ((mean - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
@@ -129,25 +130,26 @@ impl Elongation {
 
 /// Second moments of the positive response about `c` in a disc with a soft edge.
 fn second_moments(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments2 {
-    let (inner2, outer2) = ((radius as f64 - 0.5).powi(2), (radius as f64 + 0.5).powi(2));
-    let within = |c: f64, size: usize| {
-        let outer = radius as f64 + 0.5;
-        ((c - outer).ceil().max(0.0) as usize, ((c + outer).floor() + 1.0).clamp(0.0, size as f64) as usize)
-    };
-    let ((left, right), (top, bottom)) = (within(c.x, response.width()), within(c.y, response.height()));
-    let [mut sum, mut xx, mut xy, mut yy] = [0.0; 4];
-    for row in top..bottom {
-        let y = row as f64 - c.y;
-        for (at, v) in (left..right).zip(&response.row(row)[left.min(right)..right]) {
-            let x = at as f64 - c.x;
-            let weight = ((outer2 - x * x - y * y) / (outer2 - inner2)).clamp(0.0, 1.0);
-            let v = weight * f64::from(v.max(0.0));
-            sum += v;
-            xx += v * x * x;
-            xy += v * x * y;
-            yy += v * y * y;
-        }
-    }
+    dispatch!(Level::new(), simd => second_moments_vectors(simd, response, radius, c))
+}
+
+#[inline(always)]
+fn second_moments_vectors<S: Simd>(simd: S, response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments2 {
+    let reach = radius as f64 + 0.5;
+    let splat = |v| f64x4::splat(simd, v);
+    let (zero, one) = (splat(0.0), splat(1.0));
+    // From 1 at half a pixel within the radius to 0 at half a pixel beyond, along the square of the distance.
+    let (outer2, per_width) = (splat(reach * reach), splat(1.0 / (2.0 * reach - 1.0)));
+    let [mut sum, mut xx, mut xy, mut yy] = [zero; 4];
+    around(simd, response, reach, c, |d, x, y| {
+        let (x2, y2) = (x * x, y * y);
+        let d = ((outer2 - x2 - y2) * per_width).max(zero).min(one) * d;
+        sum += d;
+        xx += d * x2;
+        xy += d * x * y;
+        yy += d * y2;
+    });
+    let [sum, xx, xy, yy] = [sum, xx, xy, yy].map(|v| v.reduce_sum());
     if sum <= 0.0 {
         return Moments2::default();
     }
