@@ -75,7 +75,10 @@ pub fn configure(
         }
         DetectorKind::Steadied => steadied::configure_asked(frames, scene, tempo, info, config, reasons)?,
         DetectorKind::Spot => {
-            let seen = particles::count(frames, info, n_threads)?.seen;
+            let seen = match cells::look(frames, info, n_threads)? {
+                Some(cells::Pieces::Spots(seen)) => seen,
+                _ => particles::count(frames, info, n_threads)?.seen,
+            };
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));
             particles::configure(&seen, frames, info, n_threads, interval_s, config, reasons)?;
         }

@@ -1,13 +1,16 @@
-//! Several compact bright things of one kind on an even dark ground: cells, nuclei, droplets under a fluorescence microscope.
+//! Several compact bright things of one kind on an even dark ground: cells, nuclei, droplets under a fluorescence microscope; or spots, if their light falls off as a Gaussian's.
 //!
 //! Source: our own. The frame is smoothed (5 x 5 mean: nuclei are textured, dim ones are hardly above the noise) and cut at k robust deviations
 //! above its median, over the whole frame. Cells are there if most of what is cut out lies in pieces of one size that fill their boxes as
-//! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not.
+//! an ellipse does (π/4 = 0.79); woods, horizons and clouds do not. Where the pieces' profile ([`super::profile`]) is a Gaussian's they are spots, of whatever size: each has one peak, by which those that touch are told apart and
+//! placed better than by the piece.
 
 use super::digits::round;
 use super::evidence::Evidence;
 use super::ground::Ground;
 use super::looks;
+use super::particles::Particles;
+use super::profile;
 use super::spread::spread;
 use super::stretch;
 use super::value_step::value_step;
@@ -18,7 +21,7 @@ use crate::vision::spatial::{SpatialConfig, WindowConfig};
 use crate::vision::threshold::{LocalConfig, Polarity, ThresholdConfig};
 use crate::{Config, Detection, Frame, Result, SourceInfo};
 
-/// Least cells a frame.
+/// Least pieces a frame.
 const LEAST: f64 = 6.0;
 /// Frames looked at.
 const LOOKS: usize = 4;
@@ -30,6 +33,14 @@ const CUT_OUT: [f64; 2] = [0.005, 0.4];
 const MOST_SPREAD: f64 = 3.0;
 /// Area of a cell where none was seen, px.
 const ASSUMED_AREA_PX: f64 = 400.0;
+/// Side of the square that the mean is taken over, px.
+const WINDOW_PX: usize = 5;
+/// Pixels of the smallest piece that counts: the mean makes fewer of a single pixel.
+const LEAST_PIECE_PX: u32 = (WINDOW_PX * WINDOW_PX + 1) as u32;
+/// Pixels of the smallest cell: a thing of less than 10 px across is a spot.
+const LEAST_CELL_PX: f64 = 60.0;
+/// Largest exponent of the profile of spots: a Gaussian's is 2; nuclei have 4 and more, discs of 12 px with soft edges, after the mean, some 2.8.
+const MOST_EXPONENT: f64 = 2.3;
 
 /// Least height of a cell's pixels above the ground, steps of their values.
 const LEAST_STEPS: f64 = 2.5;
@@ -45,14 +56,32 @@ pub struct Cells {
     pub step: f64,
 }
 
-/// The detector, with a least area that lets everything but specks through.
-fn detector(info: &SourceInfo, min_area_px: u32, step: f64) -> DetectorConfig {
+/// What the frames are full of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pieces {
+    /// Things with an edge.
+    Cells(Cells),
+    /// Things without.
+    Spots(Particles),
+}
+
+/// The least height of a piece.
+fn level(info: &SourceInfo, step: f64) -> LocalConfig {
     // One cell of the background's grid holds the whole frame.
     let cell_px = info.width.max(info.height).clamp(4, 4096) as u32;
-    let local = LocalConfig { k: 5.0, polarity: Polarity::Bright, cell_px, min_contrast: round(LEAST_STEPS * step) };
+    LocalConfig { k: 5.0, polarity: Polarity::Bright, cell_px, min_contrast: round(LEAST_STEPS * step) }
+}
+
+/// The window of the mean.
+fn window() -> WindowConfig {
+    WindowConfig { size: WINDOW_PX, ..WindowConfig::default() }
+}
+
+/// The detector, with a least area that lets everything but specks through.
+fn detector(info: &SourceInfo, min_area_px: u32, step: f64) -> DetectorConfig {
     let mut config = DetectorConfig {
-        filter: SpatialConfig::Mean(WindowConfig { size: 5, ..WindowConfig::default() }),
-        threshold: ThresholdConfig::Local(local),
+        filter: SpatialConfig::Mean(window()),
+        threshold: ThresholdConfig::Local(level(info, step)),
         max_detections: Some(5000),
         ..DetectorConfig::default()
     };
@@ -68,45 +97,81 @@ fn is_compact(d: &Detection) -> bool {
     (0.55..=0.9).contains(&fill) && w.max(h) <= 2.5 * w.min(h)
 }
 
-/// Cells, if the frames are of that kind.
-/// # Errors
-/// Frames of more than one size or pixel type.
-pub fn look(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Cells>> {
-    let (seen, fits) = count(frames, info, n_threads)?;
-    Ok(fits.then_some(seen))
+/// Areas of compact pieces, and what is cut out beside them.
+#[derive(Clone, Debug, Default)]
+struct Areas {
+    /// From the smallest to the largest, px.
+    sorted: Vec<f64>,
+    all_px: f64,
+    looks: f64,
 }
 
-/// The compact pieces in the frames, and whether they are cells.
+impl Areas {
+    fn at(&self, share: f64) -> Option<f64> {
+        self.sorted.get((share * self.sorted.len() as f64) as usize).copied()
+    }
+
+    fn per_frame(&self) -> f64 {
+        self.sorted.len() as f64 / self.looks
+    }
+
+    /// Those of cells, of which smaller pieces are none.
+    fn of_cells(mut self) -> Self {
+        self.sorted.retain(|a| *a >= LEAST_CELL_PX);
+        self
+    }
+
+    /// Whether most of what is cut out of frames of so many pixels is compact and of one size.
+    fn are_of_one_kind(&self, pixels: f64) -> bool {
+        let share = self.all_px / (self.looks * pixels.max(1.0));
+        self.per_frame() >= LEAST
+            && (CUT_OUT[0]..=CUT_OUT[1]).contains(&share)
+            && self.sorted.iter().sum::<f64>() >= COMPACT_SHARE * self.all_px
+            && self.at(0.75) <= self.at(0.25).map(|a| MOST_SPREAD * a)
+    }
+}
+
+/// Cells or spots, if the frames are of that kind.
 /// # Errors
 /// Frames of more than one size or pixel type.
-pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Cells, bool)> {
+pub fn look(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Pieces>> {
+    Ok(count(frames, info, n_threads)?.1)
+}
+
+/// The compact pieces in the frames, as if they were cells, and what they are.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Cells, Option<Pieces>)> {
     let pixels = (info.width * info.height) as f64;
-    // A thing of less than 10 px across is a spot, not a cell.
-    let specks = 60;
     let step = value_step(frames);
-    let scans = looks::scans(&detector(info, specks, step), spread(frames, LOOKS), info, n_threads)?;
-    let (mut areas, mut compact, mut all, mut looks) = (Vec::new(), 0.0, 0.0, 0usize);
-    for scan in &scans {
-        looks += 1;
-        for d in &scan.detections {
-            let area = f64::from(d.area_px);
-            all += area;
-            if is_compact(d) {
-                compact += area;
-                areas.push(area);
-            }
-        }
+    let looked = spread(frames, LOOKS);
+    let looked: Vec<&Frame> = looked.collect();
+    let mut scans = looks::scans(&detector(info, LEAST_PIECE_PX, step), looked.iter().copied(), info, n_threads)?;
+    let mut areas = Areas { looks: scans.len().max(1) as f64, ..Areas::default() };
+    for scan in &mut scans {
+        areas.all_px += scan.detections.iter().map(|d| f64::from(d.area_px)).sum::<f64>();
+        scan.detections.retain(is_compact);
+        areas.sorted.extend(scan.detections.iter().map(|d| f64::from(d.area_px)));
     }
-    areas.sort_by(f64::total_cmp);
-    let at = |share: f64| areas.get((share * areas.len() as f64) as usize).copied().unwrap_or(0.0);
-    let looks = looks.max(1) as f64;
-    let (per_frame, share) = (areas.len() as f64 / looks, all / (looks * pixels.max(1.0)));
-    let fits = per_frame >= LEAST
-        && (CUT_OUT[0]..=CUT_OUT[1]).contains(&share)
-        && compact >= COMPACT_SHARE * all
-        && at(0.75) <= MOST_SPREAD * at(0.25);
-    let area_px = if areas.is_empty() { ASSUMED_AREA_PX } else { at(0.5) };
-    Ok((Cells { per_frame, area_px, step }, fits))
+    areas.sorted.sort_by(f64::total_cmp);
+    let spots = if areas.are_of_one_kind(pixels) {
+        let seen = profile::of(&looked, &scans, &window(), &level(info, step))?;
+        seen.filter(|p| p.exponent <= MOST_EXPONENT).map(|p| Particles {
+            polarity: Polarity::Bright,
+            per_frame: areas.per_frame(),
+            width_px: p.width_px,
+            step,
+        })
+    } else {
+        None
+    };
+    let areas = areas.of_cells();
+    let cells = Cells { per_frame: areas.per_frame(), area_px: areas.at(0.5).unwrap_or(ASSUMED_AREA_PX), step };
+    let kind = match spots {
+        Some(spots) => Some(Pieces::Spots(spots)),
+        None => areas.are_of_one_kind(pixels).then_some(Pieces::Cells(cells)),
+    };
+    Ok((cells, kind))
 }
 
 /// The chains of the pieces that would be detected, in the frames at these places; `ground` is the first one's in each.
@@ -127,7 +192,7 @@ pub fn chains(
 
 /// Least area of a cell among such, px.
 fn least_area(cells: &Cells) -> u32 {
-    round((0.1 * cells.area_px).max(60.0)) as u32
+    round((0.1 * cells.area_px).max(LEAST_CELL_PX)) as u32
 }
 
 /// Writes detector and tracker.
@@ -189,7 +254,7 @@ mod tests {
     #[test]
     fn discs_of_one_size_are_cells_and_bars_are_not() {
         let (discs, info) = frames(true);
-        let cells = look(&discs, &info, 1).unwrap().expect("twelve discs");
+        let Some(Pieces::Cells(cells)) = look(&discs, &info, 1).unwrap() else { panic!("twelve discs") };
         // The 5 x 5 mean spreads a disc of radius 14 by up to 2 px: between pi 14² and pi 16².
         assert!(cells.per_frame == 12.0 && (615.0..=804.0).contains(&cells.area_px), "{cells:?}");
         let (bars, info) = frames(false);

@@ -5,6 +5,7 @@
 //! whatever was chosen.
 
 use super::asked;
+use super::cells::Pieces;
 use super::digits::round;
 use super::interval::interval_s;
 use super::request::Request;
@@ -157,31 +158,36 @@ pub(super) fn choose_looked(
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
         particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
     } else {
-        let cells = cells::look(frames, info, n_threads)?;
-        // Cells are bright: where dark ones move beside them, both are looked for.
+        let pieces = cells::look(frames, info, n_threads)?;
+        // Pieces are bright: where dark ones move beside them, both are looked for.
         let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info, n_threads)?;
         let evidence = spots::look_beside(dark, frames, &scene.ground, info, n_threads)?;
-        let cells = match cells.filter(|_| evidence.polarity() != Polarity::Both) {
-            Some(seen) => {
+        // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
+        let alone = &evidence.bright.chains;
+        let most_move = |per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
+        let pieces = match pieces.filter(|_| evidence.polarity() != Polarity::Both) {
+            Some(Pieces::Cells(seen)) => {
                 let places = growing(frames.len());
                 let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
-                let alone = &evidence.bright.chains;
-                let most_move = 2.0 * alone.moving.len() as f64 > seen.per_frame;
-                Some(seen).filter(|_| !(most_move && alone.is_surely_more_than(&own)))
+                Some(Pieces::Cells(seen)).filter(|_| !(most_move(seen.per_frame) && alone.is_surely_more_than(&own)))
+            }
+            Some(Pieces::Spots(seen)) => {
+                let are_too_fast = || alone.fastest_px_per_s() > Some(seen.most_px_per_s(interval_s));
+                Some(Pieces::Spots(seen)).filter(|_| !(most_move(seen.per_frame) && are_too_fast()))
             }
             None => None,
         };
         // Before a camera that stands they were not counted.
         let count = || counted.map_or_else(|| particles::count(frames, info, n_threads), Ok);
-        let spots_in_place = match &cells {
-            Some(_) => count()?.in_place_of_cells(),
+        let spots_in_place = match &pieces {
+            Some(Pieces::Spots(seen)) => Some(*seen),
+            Some(Pieces::Cells(_)) => None,
             None if evidence.are_particles() => count()?.in_place_of_isolated(),
             None => None,
         };
         if let Some(seen) = spots_in_place {
             particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
-        } else if let Some(seen) = cells {
+        } else if let Some(Pieces::Cells(seen)) = pieces {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {
             let steadied = steadied::look_beside(&evidence, frames, scene, tempo, info, n_threads)?;

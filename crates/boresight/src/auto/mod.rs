@@ -40,6 +40,7 @@ mod particles;
 mod pieces;
 #[cfg(feature = "report")]
 mod preview;
+mod profile;
 mod quantile;
 mod radar;
 mod request;

@@ -14,7 +14,6 @@ use crate::camera::CameraConfig;
 use crate::tempo::Tempo;
 use crate::vision::config::DetectorConfig;
 use crate::vision::isolated::IsolatedConfig;
-use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
 use crate::vision::threshold::{Polarity, SpotConfig, ThresholdConfig};
 use crate::{Config, Frame, Result, SourceInfo};
 use statrs::distribution::{ContinuousCDF as _, Normal};
@@ -33,9 +32,6 @@ const SCORE: f64 = 3.0;
 const ASSUMED_WIDTH_PX: f64 = 3.0;
 /// Widest blob taken for a particle, px.
 const WIDEST_PX: u32 = 40;
-
-/// Things of less across are spots, not cells, px.
-const SPOT_PX: f64 = 10.0;
 
 /// Most detections a frame.
 const MOST_DETECTIONS: u32 = 20_000;
@@ -62,14 +58,19 @@ pub struct Particles {
     pub step: f64,
 }
 
+impl Particles {
+    /// Largest speed that is followed, px/s: half of the width with the soft edge from frame to frame.
+    pub fn most_px_per_s(&self, interval_s: f64) -> f64 {
+        0.5 * spot_size::whole_px(self.width_px) / interval_s
+    }
+}
+
 /// Blobs in the frames, and what they are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
     /// What was seen.
     pub seen: Particles,
-    /// Whether they are of one size, and of one sign.
-    alike: bool,
-    /// Whether they are that, many, and all over the frame.
+    /// Whether they are of one size and sign, many, and all over the frame.
     fills: bool,
 }
 
@@ -77,13 +78,6 @@ impl Counted {
     /// What is there of blobs that are many, if they are particles.
     pub fn in_place_of_isolated(self) -> Option<Particles> {
         self.fills.then_some(self.seen)
-    }
-
-    /// What is there of bright pieces that pass for cells, if at half of their height they are spots, of one size: how large a piece is that is cut at some deviations of the noise tells
-    /// how bright a spot is.
-    pub fn in_place_of_cells(self) -> Option<Particles> {
-        let are_spots = self.seen.polarity == Polarity::Bright && DIAMETER_PER_WIDTH * self.seen.width_px < SPOT_PX;
-        (are_spots && self.alike).then_some(self.seen)
     }
 }
 
@@ -111,7 +105,7 @@ pub fn look(
 pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Counted> {
     let step = value_step(frames);
     let none = Particles { polarity: Polarity::Bright, per_frame: 0.0, width_px: ASSUMED_WIDTH_PX, step };
-    let (mut best, mut most, mut most_alike, mut counts) = (None::<Particles>, none, false, [0.0; 2]);
+    let (mut best, mut most, mut counts) = (None::<Particles>, none, [0.0; 2]);
     for (polarity, count) in [Polarity::Bright, Polarity::Dark].into_iter().zip(&mut counts) {
         let isolated =
             IsolatedConfig { polarity, min_score: SCORE, max_side_px: WIDEST_PX, ..IsolatedConfig::default() };
@@ -141,14 +135,13 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Co
             best = Some(seen);
         }
         if per_frame > most.per_frame {
-            (most, most_alike) = (seen, alike);
+            most = seen;
         }
     }
     // Texture, and what a codec makes of noise, is as often dark as bright.
     let other = counts[0].min(counts[1]);
     let best = best.filter(|b| b.per_frame >= MOST_SIDED * other && b.per_frame - other >= LEAST);
-    let alike = best.is_some() || (most_alike && most.per_frame >= MOST_SIDED * other);
-    Ok(Counted { seen: best.unwrap_or(most), alike, fills: best.is_some() })
+    Ok(Counted { seen: best.unwrap_or(most), fills: best.is_some() })
 }
 
 /// Threshold in standard deviations of the smoothed noise at which this share of a frame's detections is expected to be noise: one independent look for
@@ -216,7 +209,7 @@ pub fn configure(
     *tracker = stretch::tracker(Tempo::of(interval_s));
     let step_px = 0.1 * whole_px;
     tracker.acceleration_density_px2_per_s3 = round(step_px * step_px / interval_s.powi(3));
-    tracker.max_speed_px_per_s = round(0.5 * whole_px / interval_s);
+    tracker.max_speed_px_per_s = round(particles.most_px_per_s(interval_s));
     tracker.coast_s = round(3.0 * interval_s);
     tracker.coast_scans = 3;
     tracker.field_px = Some([info.width as f64, info.height as f64]);

@@ -176,6 +176,11 @@ fn edges_stand(edges_moved: Option<f64>) -> bool {
     edges_moved.is_some_and(|share| share <= 0.03)
 }
 
+/// The pixels as grey.
+pub(super) fn grey_of(pixels: &Pixels) -> Image<f32> {
+    grid(pixels, 1)
+}
+
 /// Every `step`-th pixel both ways, as grey.
 fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
     fn take<P: Copy>(image: &Image<P>, step: usize, value: impl Fn(P) -> f32) -> Image<f32> {
