@@ -2,6 +2,7 @@
 //!
 //! Source: our own. Each is configured as where it is chosen; a size that nothing in the frames shows is assumed and said to be.
 
+use super::cells::Pieces;
 use super::request::DetectorKind;
 use super::scene::{Camera, Scene};
 use super::second_look::Second;
@@ -76,7 +77,7 @@ pub fn configure(
         DetectorKind::Steadied => steadied::configure_asked(frames, scene, tempo, info, config, reasons)?,
         DetectorKind::Spot => {
             let seen = match cells::look(frames, info, n_threads)? {
-                Some(cells::Pieces::Spots(seen)) => seen,
+                Some(Pieces::Spots(seen) | Pieces::FewSpots(seen)) => seen,
                 _ => particles::count(frames, info, n_threads)?.seen,
             };
             reasons.extend((seen.per_frame <= 0.0).then(|| NOTHING_SEEN.to_string()));

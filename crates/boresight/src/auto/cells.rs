@@ -21,8 +21,9 @@ use crate::vision::spatial::{SpatialConfig, WindowConfig};
 use crate::vision::threshold::{LocalConfig, Polarity, ThresholdConfig};
 use crate::{Config, Detection, Frame, Result, SourceInfo};
 
-/// Least pieces a frame.
+/// Least pieces a frame, and least spots.
 const LEAST: f64 = 6.0;
+const LEAST_SPOTS: f64 = 1.0;
 /// Frames looked at.
 const LOOKS: usize = 4;
 /// Least share of the cut-out area that lies in compact pieces.
@@ -63,6 +64,8 @@ pub enum Pieces {
     Cells(Cells),
     /// Things without.
     Spots(Particles),
+    /// The same, but so few or small that isolated targets are as well, if they stand clear.
+    FewSpots(Particles),
 }
 
 /// The least height of a piece.
@@ -121,13 +124,22 @@ impl Areas {
         self
     }
 
-    /// Whether most of what is cut out of frames of so many pixels is compact and of one size.
+    /// Whether there are any and most of what is cut out of frames of so many pixels is compact and of one size.
     fn are_of_one_kind(&self, pixels: f64) -> bool {
-        let share = self.all_px / (self.looks * pixels.max(1.0));
-        self.per_frame() >= LEAST
-            && (CUT_OUT[0]..=CUT_OUT[1]).contains(&share)
+        self.per_frame() >= LEAST_SPOTS
+            && self.share(pixels) <= CUT_OUT[1]
             && self.sorted.iter().sum::<f64>() >= COMPACT_SHARE * self.all_px
             && self.at(0.75) <= self.at(0.25).map(|a| MOST_SPREAD * a)
+    }
+
+    /// Whether they are as many as cells are.
+    fn are_many(&self, pixels: f64) -> bool {
+        self.per_frame() >= LEAST && self.share(pixels) >= CUT_OUT[0]
+    }
+
+    /// Share of frames of so many pixels that is cut out.
+    fn share(&self, pixels: f64) -> f64 {
+        self.all_px / (self.looks * pixels.max(1.0))
     }
 }
 
@@ -154,6 +166,7 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(C
         areas.sorted.extend(scan.detections.iter().map(|d| f64::from(d.area_px)));
     }
     areas.sorted.sort_by(f64::total_cmp);
+    let are_many = areas.are_many(pixels);
     let spots = if areas.are_of_one_kind(pixels) {
         let seen = profile::of(&looked, &scans, &window(), &level(info, step))?;
         seen.filter(|p| p.exponent <= MOST_EXPONENT).map(|p| Particles {
@@ -168,8 +181,9 @@ pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(C
     let areas = areas.of_cells();
     let cells = Cells { per_frame: areas.per_frame(), area_px: areas.at(0.5).unwrap_or(ASSUMED_AREA_PX), step };
     let kind = match spots {
-        Some(spots) => Some(Pieces::Spots(spots)),
-        None => areas.are_of_one_kind(pixels).then_some(Pieces::Cells(cells)),
+        Some(spots) if are_many => Some(Pieces::Spots(spots)),
+        Some(spots) => Some(Pieces::FewSpots(spots)),
+        None => (areas.are_of_one_kind(pixels) && areas.are_many(pixels)).then_some(Pieces::Cells(cells)),
     };
     Ok((cells, kind))
 }

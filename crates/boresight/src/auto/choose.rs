@@ -8,6 +8,7 @@ use super::asked;
 use super::cells::Pieces;
 use super::digits::round;
 use super::interval::interval_s;
+use super::particles::Particles;
 use super::request::Request;
 use super::scene::{self, Camera, Scene};
 use super::second_look::Second;
@@ -165,6 +166,7 @@ pub(super) fn choose_looked(
         // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
         let alone = &evidence.bright.chains;
         let most_move = |per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
+        let are_too_fast = |seen: &Particles| alone.fastest_px_per_s() > Some(seen.most_px_per_s(interval_s));
         let pieces = match pieces.filter(|_| evidence.polarity() != Polarity::Both) {
             Some(Pieces::Cells(seen)) => {
                 let places = growing(frames.len());
@@ -172,21 +174,27 @@ pub(super) fn choose_looked(
                 Some(Pieces::Cells(seen)).filter(|_| !(most_move(seen.per_frame) && alone.is_surely_more_than(&own)))
             }
             Some(Pieces::Spots(seen)) => {
-                let are_too_fast = || alone.fastest_px_per_s() > Some(seen.most_px_per_s(interval_s));
-                Some(Pieces::Spots(seen)).filter(|_| !(most_move(seen.per_frame) && are_too_fast()))
+                Some(Pieces::Spots(seen)).filter(|_| !(most_move(seen.per_frame) && are_too_fast(&seen)))
+            }
+            // What stands clear is told by its surroundings; the light of a wide spot falls off too slowly for that.
+            Some(Pieces::FewSpots(seen)) => {
+                Some(Pieces::FewSpots(seen)).filter(|_| evidence.is_poor() && !are_too_fast(&seen))
             }
             None => None,
         };
         // Before a camera that stands they were not counted.
         let count = || counted.map_or_else(|| particles::count(frames, info, n_threads), Ok);
         let spots_in_place = match &pieces {
-            Some(Pieces::Spots(seen)) => Some(*seen),
+            Some(Pieces::Spots(seen) | Pieces::FewSpots(seen)) => Some(*seen),
             Some(Pieces::Cells(_)) => None,
             None if evidence.are_particles() => count()?.in_place_of_isolated(),
             None => None,
         };
         if let Some(seen) = spots_in_place {
             particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
+            if let Some(Pieces::FewSpots(_)) = pieces {
+                spots::report_what_moves(&mut config.tracker, &mut reasons);
+            }
         } else if let Some(Pieces::Cells(seen)) = pieces {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
         } else {

@@ -130,10 +130,12 @@ fn deviation_of(s2: f64, side: f64, height: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cells;
     use super::super::in_memory::described;
+    use super::super::{cells, choose};
     use super::*;
-    use crate::{FrameIndex, Pixels, Timestamp};
+    use crate::track::Report;
+    use crate::vision::threshold::{Polarity, ThresholdConfig};
+    use crate::{Config, FrameIndex, Pixels, SourceInfo, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -142,15 +144,28 @@ mod tests {
 
     /// What the frames are full of: forty things (no farther apart than 28 px, or they have no room) as bright at the distance r px as `light` says, in deviations of the noise, times one to two, farther apart than `apart_px`.
     fn pieces(apart_px: f64, light: impl Fn(f64) -> f64) -> Option<cells::Pieces> {
+        let (frames, info) = frames(40, 2, 0.0, apart_px, light);
+        cells::look(&frames, &info, 1).unwrap()
+    }
+
+    /// So many frames of so many such things, which diffuse by `step_px` a frame.
+    fn frames(
+        n: usize,
+        n_frames: u64,
+        step_px: f64,
+        apart_px: f64,
+        light: impl Fn(f64) -> f64,
+    ) -> (Vec<Frame>, SourceInfo) {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let mut at: Vec<[f64; 3]> = Vec::new();
-        while at.len() < 40 {
+        while at.len() < n {
             let [x, y] = [(); 2].map(|()| 15.0 + (SIDE as f64 - 30.0) * rng.random::<f64>());
             if at.iter().all(|p| (p[0] - x).hypot(p[1] - y) > apart_px) {
                 at.push([x, y, 1.0 + rng.random::<f64>()]);
             }
         }
         let mut frame = |k: u64| {
+            at.iter_mut().flat_map(|p| &mut p[..2]).for_each(|v| *v += step_px * rng.sample::<f64, _>(StandardNormal));
             let value = |i: usize| {
                 let far = |p: &[f64; 3]| p[2] * light(((i % SIDE) as f64 - p[0]).hypot((i / SIDE) as f64 - p[1]));
                 at.iter().map(far).sum::<f64>() + rng.sample::<f64, _>(StandardNormal)
@@ -159,15 +174,16 @@ mod tests {
             let pixels = Pixels::Gray16(Image::from_vec(SIDE, SIDE, values).unwrap());
             Frame { index: FrameIndex(k), time: Timestamp::from_secs_f64(0.1 * k as f64), pixels }
         };
-        let (frames, info) = described((0..2).map(&mut frame).collect());
-        cells::look(&frames, &info, 1).unwrap()
+        described((0..n_frames).map(&mut frame).collect())
     }
 
     #[test]
     fn gaussians_of_any_width_and_height_are_spots_of_that_width() {
-        for (deviation, height) in [(1.3, 8.0), (1.3, 30.0), (2.0, 6.0), (3.0, 6.0), (3.0, 40.0), (5.0, 10.0)] {
+        for (deviation, height) in [(1.3f64, 8.0), (1.3, 30.0), (2.0, 6.0), (3.0, 6.0), (3.0, 40.0), (5.0, 10.0)] {
             let seen = pieces(f64::min(9.0 * deviation, 28.0), |r| height * (-0.5 * (r / deviation).powi(2)).exp());
-            let Some(cells::Pieces::Spots(spots)) = seen else { panic!("{deviation} {height}: {seen:?}") };
+            let Some(cells::Pieces::Spots(spots) | cells::Pieces::FewSpots(spots)) = seen else {
+                panic!("{deviation} {height}: {seen:?}")
+            };
             let ratio = spots.width_px / (WIDTH_PER_DEVIATION * deviation);
             assert!((0.93..1.07).contains(&ratio), "{deviation} {height}: {ratio}");
         }
@@ -177,6 +193,16 @@ mod tests {
     fn faint_spots_that_touch_are_spots() {
         let seen = pieces(3.0, |r| 9.0 * (-0.5 * (r / 2.0).powi(2)).exp());
         assert!(matches!(seen, Some(cells::Pieces::Spots(_))), "{seen:?}");
+    }
+
+    #[test]
+    fn a_few_wide_spots_are_found_though_nothing_stands_clear_and_reported_as_they_move() {
+        let light = |r: f64| 10.0 * (-0.5 * (r / 2.6).powi(2)).exp();
+        let (frames, info) = frames(3, 24, 0.5, 40.0, light);
+        let chosen = choose(&frames, &info, &Config::default()).unwrap().config;
+        let ThresholdConfig::Spot(spot) = &chosen.detector.threshold else { panic!("{:?}", chosen.detector) };
+        assert!(spot.polarity == Polarity::Bright && spot.size_px > 5.5, "{spot:?}");
+        assert_eq!(chosen.tracker.report, Report::Moving);
     }
 
     #[test]

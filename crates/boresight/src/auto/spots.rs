@@ -271,13 +271,18 @@ pub fn configure(evidence: &Seen, tempo: Tempo, info: &SourceInfo, config: &mut 
         tracker.min_initiation_score = WEAK_INITIATION_SCORE;
         return;
     }
-    tracker.report = Report::Moving;
     if per_frame > MANY {
         reasons.push(format!(
             "Of so many {} move and the others stand: stars or lamps before which something moves, no particles.",
             evidence.n_moving()
         ));
     }
+    report_what_moves(tracker, reasons);
+}
+
+/// Has tracks reported that are seen to move.
+pub(super) fn report_what_moves(tracker: &mut TrackerConfig, reasons: &mut Vec<String>) {
+    tracker.report = Report::Moving;
     reasons.push(
         "A track is reported once it has moved farther than its covariance, the camera's motion and the wander of its outline explain: what stands \
          still is taken for scenery. Report that too with --set tracker.report=all."
