@@ -69,10 +69,10 @@ pub enum Pieces {
 }
 
 /// The least height of a piece.
-fn level(info: &SourceInfo, step: f64) -> LocalConfig {
+fn level(polarity: Polarity, info: &SourceInfo, step: f64) -> LocalConfig {
     // One cell of the background's grid holds the whole frame.
     let cell_px = info.width.max(info.height).clamp(4, 4096) as u32;
-    LocalConfig { k: 5.0, polarity: Polarity::Bright, cell_px, min_contrast: round(LEAST_STEPS * step) }
+    LocalConfig { k: 5.0, polarity, cell_px, min_contrast: round(LEAST_STEPS * step) }
 }
 
 /// The window of the mean.
@@ -81,10 +81,10 @@ fn window() -> WindowConfig {
 }
 
 /// The detector, with a least area that lets everything but specks through.
-fn detector(info: &SourceInfo, min_area_px: u32, step: f64) -> DetectorConfig {
+fn detector(polarity: Polarity, info: &SourceInfo, min_area_px: u32, step: f64) -> DetectorConfig {
     let mut config = DetectorConfig {
         filter: SpatialConfig::Mean(window()),
-        threshold: ThresholdConfig::Local(level(info, step)),
+        threshold: ThresholdConfig::Local(level(polarity, info, step)),
         max_detections: Some(5000),
         ..DetectorConfig::default()
     };
@@ -106,7 +106,9 @@ struct Areas {
     /// From the smallest to the largest, px.
     sorted: Vec<f64>,
     all_px: f64,
+    /// Frames looked at, and the pixels of one.
     looks: f64,
+    pixels: f64,
 }
 
 impl Areas {
@@ -124,68 +126,79 @@ impl Areas {
         self
     }
 
-    /// Whether there are any and most of what is cut out of frames of so many pixels is compact and of one size.
-    fn are_of_one_kind(&self, pixels: f64) -> bool {
+    /// Whether there are any and most of what is cut out is compact and of one size.
+    fn are_of_one_kind(&self) -> bool {
         self.per_frame() >= LEAST_SPOTS
-            && self.share(pixels) <= CUT_OUT[1]
+            && self.share() <= CUT_OUT[1]
             && self.sorted.iter().sum::<f64>() >= COMPACT_SHARE * self.all_px
             && self.at(0.75) <= self.at(0.25).map(|a| MOST_SPREAD * a)
     }
 
     /// Whether they are as many as cells are.
-    fn are_many(&self, pixels: f64) -> bool {
-        self.per_frame() >= LEAST && self.share(pixels) >= CUT_OUT[0]
+    fn are_many(&self) -> bool {
+        self.per_frame() >= LEAST && self.share() >= CUT_OUT[0]
     }
 
-    /// Share of frames of so many pixels that is cut out.
-    fn share(&self, pixels: f64) -> f64 {
-        self.all_px / (self.looks * pixels.max(1.0))
+    /// Share of the frames that is cut out.
+    fn share(&self) -> f64 {
+        self.all_px / (self.looks * self.pixels)
     }
 }
 
-/// Cells or spots, if the frames are of that kind.
+/// Cells or spots, if the frames are of that kind: bright, or else dark spots.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<Option<Pieces>> {
-    Ok(count(frames, info, n_threads)?.1)
+    let (_, bright) = count(frames, info, n_threads)?;
+    match bright {
+        Some(_) => Ok(bright),
+        None => Ok(cut_out(Polarity::Dark, frames, info, n_threads)?.1),
+    }
 }
 
-/// The compact pieces in the frames, as if they were cells, and what they are.
+/// The bright compact pieces in the frames, as if they were cells, and what they are.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn count(frames: &[Frame], info: &SourceInfo, n_threads: usize) -> Result<(Cells, Option<Pieces>)> {
-    let pixels = (info.width * info.height) as f64;
+    let (areas, spots) = cut_out(Polarity::Bright, frames, info, n_threads)?;
+    let areas = areas.of_cells();
+    let cells = Cells {
+        per_frame: areas.per_frame(),
+        area_px: areas.at(0.5).unwrap_or(ASSUMED_AREA_PX),
+        step: value_step(frames),
+    };
+    let are_cells = spots.is_none() && areas.are_of_one_kind() && areas.are_many();
+    Ok((cells, spots.or(are_cells.then_some(Pieces::Cells(cells)))))
+}
+
+/// The compact pieces of this polarity in the frames, and the spots that they are, if their light falls off so.
+fn cut_out(
+    polarity: Polarity,
+    frames: &[Frame],
+    info: &SourceInfo,
+    n_threads: usize,
+) -> Result<(Areas, Option<Pieces>)> {
     let step = value_step(frames);
-    let looked = spread(frames, LOOKS);
-    let looked: Vec<&Frame> = looked.collect();
-    let mut scans = looks::scans(&detector(info, LEAST_PIECE_PX, step), looked.iter().copied(), info, n_threads)?;
-    let mut areas = Areas { looks: scans.len().max(1) as f64, ..Areas::default() };
+    let looked: Vec<&Frame> = spread(frames, LOOKS).collect();
+    let detector = detector(polarity, info, LEAST_PIECE_PX, step);
+    let mut scans = looks::scans(&detector, looked.iter().copied(), info, n_threads)?;
+    let looks = scans.len().max(1) as f64;
+    let mut areas = Areas { looks, pixels: (info.width * info.height).max(1) as f64, ..Areas::default() };
     for scan in &mut scans {
         areas.all_px += scan.detections.iter().map(|d| f64::from(d.area_px)).sum::<f64>();
         scan.detections.retain(is_compact);
         areas.sorted.extend(scan.detections.iter().map(|d| f64::from(d.area_px)));
     }
     areas.sorted.sort_by(f64::total_cmp);
-    let are_many = areas.are_many(pixels);
-    let spots = if areas.are_of_one_kind(pixels) {
-        let seen = profile::of(&looked, &scans, &window(), &level(info, step))?;
-        seen.filter(|p| p.exponent <= MOST_EXPONENT).map(|p| Particles {
-            polarity: Polarity::Bright,
-            per_frame: areas.per_frame(),
-            width_px: p.width_px,
-            step,
-        })
-    } else {
-        None
-    };
-    let areas = areas.of_cells();
-    let cells = Cells { per_frame: areas.per_frame(), area_px: areas.at(0.5).unwrap_or(ASSUMED_AREA_PX), step };
-    let kind = match spots {
-        Some(spots) if are_many => Some(Pieces::Spots(spots)),
-        Some(spots) => Some(Pieces::FewSpots(spots)),
-        None => (areas.are_of_one_kind(pixels) && areas.are_many(pixels)).then_some(Pieces::Cells(cells)),
-    };
-    Ok((cells, kind))
+    if !areas.are_of_one_kind() {
+        return Ok((areas, None));
+    }
+    let seen = profile::of(&looked, &scans, &window(), &level(polarity, info, step))?;
+    let spots = seen.filter(|p| p.exponent <= MOST_EXPONENT).map(|p| {
+        let spots = Particles { polarity, per_frame: areas.per_frame(), width_px: p.width_px, step };
+        if areas.are_many() { Pieces::Spots(spots) } else { Pieces::FewSpots(spots) }
+    });
+    Ok((areas, spots))
 }
 
 /// The chains of the pieces that would be detected, in the frames at these places; `ground` is the first one's in each.
@@ -199,7 +212,7 @@ pub fn chains(
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Evidence> {
-    let detector = detector(info, least_area(cells), cells.step);
+    let detector = detector(Polarity::Bright, info, least_area(cells), cells.step);
     let scans = looks::scans(&detector, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     Ok(Evidence::of_looks(&scans, places, ground, info))
 }
@@ -218,7 +231,7 @@ pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut
          smoothed frame's median is detected, in pieces of {least} px or more.",
         cells.per_frame
     ));
-    config.detector = detector(info, least, cells.step);
+    config.detector = detector(Polarity::Bright, info, least, cells.step);
     let tracker = &mut config.tracker;
     *tracker = stretch::tracker(Tempo::of(interval_s));
     tracker.extra_noise_px = round((0.03 * side).max(0.5));

@@ -7,6 +7,7 @@
 use super::asked;
 use super::cells::Pieces;
 use super::digits::round;
+use super::evidence::Evidence;
 use super::interval::interval_s;
 use super::particles::Particles;
 use super::request::Request;
@@ -160,21 +161,24 @@ pub(super) fn choose_looked(
         particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
     } else {
         let pieces = cells::look(frames, info, n_threads)?;
-        // Pieces are bright: where dark ones move beside them, both are looked for.
         let dark = spots::look_for(Polarity::Dark, frames, &scene.ground, info, n_threads)?;
         let evidence = spots::look_beside(dark, frames, &scene.ground, info, n_threads)?;
         // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
-        let alone = &evidence.bright.chains;
-        let most_move = |per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
-        let are_too_fast = |seen: &Particles| alone.fastest_px_per_s() > Some(seen.most_px_per_s(interval_s));
+        let alone = |polarity| if polarity == Polarity::Dark { &evidence.dark.chains } else { &evidence.bright.chains };
+        let most_move = |alone: &Evidence, per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
+        let are_too_fast = |s: &Particles| alone(s.polarity).fastest_px_per_s() > Some(s.most_px_per_s(interval_s));
+        // Pieces are of one polarity: where others move beside them, both are looked for.
         let pieces = match pieces.filter(|_| evidence.polarity() != Polarity::Both) {
             Some(Pieces::Cells(seen)) => {
                 let places = growing(frames.len());
                 let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                Some(Pieces::Cells(seen)).filter(|_| !(most_move(seen.per_frame) && alone.is_surely_more_than(&own)))
+                let alone = alone(Polarity::Bright);
+                let is_less = most_move(alone, seen.per_frame) && alone.is_surely_more_than(&own);
+                Some(Pieces::Cells(seen)).filter(|_| !is_less)
             }
             Some(Pieces::Spots(seen)) => {
-                Some(Pieces::Spots(seen)).filter(|_| !(most_move(seen.per_frame) && are_too_fast(&seen)))
+                let is_less = most_move(alone(seen.polarity), seen.per_frame) && are_too_fast(&seen);
+                Some(Pieces::Spots(seen)).filter(|_| !is_less)
             }
             // What stands clear is told by its surroundings; the light of a wide spot falls off too slowly for that.
             Some(Pieces::FewSpots(seen)) => {

@@ -10,7 +10,7 @@ use super::quantile::quantile;
 use super::scene::grey_of;
 use crate::vision::spatial::{SpatialConfig, SpatialFilter, WindowConfig};
 use crate::vision::threshold::spot::WIDTH_PER_DEVIATION;
-use crate::vision::threshold::{BackgroundGrid, LocalConfig};
+use crate::vision::threshold::{BackgroundGrid, LocalConfig, Polarity};
 use crate::{Detection, Frame, Image, Result, Scan};
 
 /// Part of a piece's pixels up to the logarithm that counts as its upper end.
@@ -44,13 +44,14 @@ pub(super) fn of(
 ) -> Result<Option<Profile>> {
     let mut filter = SpatialFilter::new(SpatialConfig::Mean(*window))?;
     let (mut smooth, mut grid) = (Image::default(), BackgroundGrid::new(level.cell_px as usize));
+    let sign = if level.polarity == Polarity::Dark { -1.0 } else { 1.0 };
     let [mut means, mut variances, mut heights, mut logs] = [const { Vec::new() }; 4];
     for (frame, scan) in frames.iter().zip(scans) {
         filter.apply(&grey_of(&frame.pixels), &mut smooth);
         grid.refresh(&smooth);
         for d in &scan.detections {
             let (median, deviation) = grid.at(d.position.x, d.position.y);
-            let t = (level.k * deviation).max(level.min_contrast);
+            let t = sign * (level.k * deviation).max(level.min_contrast);
             logs.clear();
             logs.extend(pixels(&smooth, d).map(|v| ((f64::from(v) - median) / t).ln()).filter(|l| *l > 0.0));
             logs.sort_by(f64::total_cmp);
@@ -134,7 +135,7 @@ mod tests {
     use super::super::{cells, choose};
     use super::*;
     use crate::track::Report;
-    use crate::vision::threshold::{Polarity, ThresholdConfig};
+    use crate::vision::threshold::ThresholdConfig;
     use crate::{Config, FrameIndex, Pixels, SourceInfo, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -197,12 +198,14 @@ mod tests {
 
     #[test]
     fn a_few_wide_spots_are_found_though_nothing_stands_clear_and_reported_as_they_move() {
-        let light = |r: f64| 10.0 * (-0.5 * (r / 2.6).powi(2)).exp();
-        let (frames, info) = frames(3, 24, 0.5, 40.0, light);
-        let chosen = choose(&frames, &info, &Config::default()).unwrap().config;
-        let ThresholdConfig::Spot(spot) = &chosen.detector.threshold else { panic!("{:?}", chosen.detector) };
-        assert!(spot.polarity == Polarity::Bright && spot.size_px > 5.5, "{spot:?}");
-        assert_eq!(chosen.tracker.report, Report::Moving);
+        for (polarity, height) in [(Polarity::Bright, 10.0), (Polarity::Dark, -10.0)] {
+            let light = |r: f64| height * (-0.5 * (r / 2.6f64).powi(2)).exp();
+            let (frames, info) = frames(3, 24, 0.5, 40.0, light);
+            let chosen = choose(&frames, &info, &Config::default()).unwrap().config;
+            let ThresholdConfig::Spot(spot) = &chosen.detector.threshold else { panic!("{:?}", chosen.detector) };
+            assert!(spot.polarity == polarity && spot.size_px > 5.5, "{spot:?}");
+            assert_eq!(chosen.tracker.report, Report::Moving);
+        }
     }
 
     #[test]
