@@ -9,6 +9,7 @@ use super::digits::round;
 use super::evidence::Evidence;
 use super::ground::Ground;
 use super::looks;
+use super::noise_shown::shows_noise;
 use super::particles::Particles;
 use super::profile;
 use super::spread::spread;
@@ -190,7 +191,8 @@ fn cut_out(
         areas.sorted.extend(scan.detections.iter().map(|d| f64::from(d.area_px)));
     }
     areas.sorted.sort_by(f64::total_cmp);
-    if !areas.are_of_one_kind() {
+    // What a codec leaves of noise is as round as spots are.
+    if !areas.are_of_one_kind() || !looked.iter().all(|frame| shows_noise(frame)) {
         return Ok((areas, None));
     }
     let seen = profile::of(&looked, &scans, &window(), &level(polarity, info, step))?;

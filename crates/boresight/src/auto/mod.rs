@@ -35,6 +35,7 @@ mod looks;
 mod moving;
 mod near;
 mod noise;
+mod noise_shown;
 mod open;
 mod particles;
 mod pieces;

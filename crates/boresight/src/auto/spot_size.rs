@@ -8,11 +8,11 @@
 
 use super::looks;
 use super::near::Near;
+use super::noise_shown::shows_noise;
 use super::spread::spread;
-use crate::vision::noise_level::noise_level;
+use crate::vision::DetectorConfig;
 use crate::vision::threshold::spot::DIAMETER_PER_WIDTH;
-use crate::vision::{DetectorConfig, Pixel};
-use crate::{Frame, Image, Pixels, Result, Scan, SourceInfo};
+use crate::{Frame, Result, Scan, SourceInfo};
 
 /// Spots that are looked at, and the fewest and most pairs of frames for that: of 2000 a share of one in forty that is not found again is known to a seventh.
 const SPOTS: f64 = 2000.0;
@@ -26,8 +26,6 @@ const MOST_PX: f64 = 99.0;
 const LOST: f64 = 0.02;
 /// Share of the spots that may fall apart into several.
 const FALL_APART: f64 = 0.5;
-/// Noise that is seen, steps of the values.
-const LEAST_NOISE_STEPS: f64 = 0.5;
 /// Deviations by which more may be not found again than with the whole size.
 const BY_CHANCE: f64 = 3.0;
 
@@ -72,19 +70,6 @@ pub(super) fn find(
     let is_enough = |again: &Again| again.n_again > 0 && again.n_again as f64 >= (1.0 - LOST) * most as f64;
     let enough = found.iter().rev().find(|(_, again)| is_enough(again));
     Ok(enough.map_or(whole_px, |(size_px, _)| *size_px))
-}
-
-/// Whether the noise of a grey frame is larger than half a step of its values: below that most neighbours are equal.
-fn shows_noise(frame: &Frame) -> bool {
-    fn exceeds<T: Pixel>(image: &Image<T>) -> bool {
-        noise_level(image, &mut Vec::new()) > LEAST_NOISE_STEPS * f64::from(T::STEP)
-    }
-    match &frame.pixels {
-        Pixels::Gray8(image) => exceeds(image),
-        Pixels::Gray16(image) => exceeds(image),
-        Pixels::GrayF32(image) => exceeds(image),
-        Pixels::Rgb8(_) => false,
-    }
 }
 
 /// How many detections were found again in the next frame, each the other's nearest.
@@ -137,7 +122,7 @@ fn falls_apart(wide: &[Scan], narrow: &[Scan], radius_px: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::vision::threshold::{SpotConfig, ThresholdConfig};
-    use crate::{FrameIndex, Timestamp};
+    use crate::{FrameIndex, Image, Pixels, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
