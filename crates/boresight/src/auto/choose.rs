@@ -167,6 +167,7 @@ pub(super) fn choose_looked(
         let alone = |polarity| if polarity == Polarity::Dark { &evidence.dark.chains } else { &evidence.bright.chains };
         let most_move = |alone: &Evidence, per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
         let are_too_fast = |s: &Particles| alone(s.polarity).fastest_px_per_s() > Some(s.most_px_per_s(interval_s));
+        let gain_of_isolated = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
         // Pieces are of one polarity: where others move beside them, both are looked for.
         let pieces = match pieces.filter(|_| evidence.polarity() != Polarity::Both) {
             Some(Pieces::Cells(seen)) => {
@@ -198,6 +199,7 @@ pub(super) fn choose_looked(
             particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;
             if let Some(Pieces::FewSpots(_)) = pieces {
                 spots::report_what_moves(&mut config.tracker, &mut reasons);
+                gain = gain_of_isolated;
             }
         } else if let Some(Pieces::Cells(seen)) = pieces {
             cells::configure(&seen, info, interval_s, &mut config, &mut reasons);
@@ -205,7 +207,7 @@ pub(super) fn choose_looked(
             let steadied = steadied::look_beside(&evidence, frames, scene, tempo, info, n_threads)?;
             let seen_so_far = steadied.as_ref().map(|_| Choice::alone(config.clone(), reasons.clone()));
             spots::configure(&evidence, tempo, info, &mut config, &mut reasons);
-            gain = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
+            gain = gain_of_isolated;
             if let Some(seen) = faint::look(frames, scene, &evidence, info, n_threads)? {
                 faint::configure(&seen, &mut config, &mut reasons);
                 // There are more than false alarms, whether they move or not.
