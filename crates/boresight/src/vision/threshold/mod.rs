@@ -4,6 +4,7 @@ pub(crate) mod band;
 mod bits;
 mod boxes;
 pub(crate) mod grid;
+mod lanes;
 pub(crate) mod level;
 pub(crate) mod local;
 pub(crate) mod otsu;

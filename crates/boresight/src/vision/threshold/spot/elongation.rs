@@ -8,9 +8,9 @@
 //! Symbols: M second moments, px²; E their elongation, the vector of M_xx - M_yy and 2 M_xy, whose length is the difference of the eigenvalues.
 //! Limits: spots lie independently of each other; in swarms more are two. Where another peak is near, its light makes a spot long: those are not asked.
 
-use super::disc::around;
 use crate::Image;
 use crate::vision::threshold::grid::median_and_deviation;
+use crate::vision::threshold::lanes::around;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, f64x4};
 use nalgebra::{Matrix2, Vector2};
