@@ -1,13 +1,12 @@
 //! The choice: which kind of scene the first frames show, and the configuration that follows, with reasons.
 //!
 //! Source: our own. Tried in this order, the first that fits: a target told by its colour, things that move before a fixed camera, particles,
-//! cells; else isolated targets, in whose place faint ones or movers on steadied frames may be taken, these with the isolated ones as runner-up. Where the camera is not seen to stand, what moves before a fixed one stands against
+//! cells or spots; else isolated targets, in whose place faint ones or movers on steadied frames may be taken, these with the isolated ones as runner-up. Where the camera is not seen to stand, what moves before a fixed one stands against
 //! whatever was chosen.
 
 use super::asked;
 use super::cells::Pieces;
 use super::digits::round;
-use super::evidence::Evidence;
 use super::interval::interval_s;
 use super::particles::Particles;
 use super::request::Request;
@@ -165,34 +164,29 @@ pub(super) fn choose_looked(
         let evidence = spots::look_beside(dark, frames, &scene.ground, info, n_threads)?;
         // Targets that stand alone are told better one by one, where most of the pieces are seen to move as such.
         let alone = |polarity| if polarity == Polarity::Dark { &evidence.dark.chains } else { &evidence.bright.chains };
-        let most_move = |alone: &Evidence, per_frame: f64| 2.0 * alone.moving.len() as f64 > per_frame;
+        let most_move = |per_frame: f64, polarity| 2.0 * alone(polarity).moving.len() as f64 > per_frame;
         let are_too_fast = |s: &Particles| alone(s.polarity).fastest_px_per_s() > Some(s.most_px_per_s(interval_s));
         let gain_of_isolated = if evidence.moves() { evidence.most().1.gain() } else { 0.0 };
         // Pieces are of one polarity: where others move beside them, both are looked for.
-        let pieces = match pieces.filter(|_| evidence.polarity() != Polarity::Both) {
-            Some(Pieces::Cells(seen)) => {
+        let pieces = pieces.filter(|_| evidence.polarity() != Polarity::Both);
+        let isolated_are_better = match &pieces {
+            Some(Pieces::Cells(seen)) if most_move(seen.per_frame, Polarity::Bright) => {
                 let places = growing(frames.len());
-                let own = cells::chains(&seen, frames, &places, &scene.ground, info, n_threads)?;
-                let alone = alone(Polarity::Bright);
-                let is_less = most_move(alone, seen.per_frame) && alone.is_surely_more_than(&own);
-                Some(Pieces::Cells(seen)).filter(|_| !is_less)
+                let own = cells::chains(seen, frames, &places, &scene.ground, info, n_threads)?;
+                alone(Polarity::Bright).is_surely_more_than(&own)
             }
-            Some(Pieces::Spots(seen)) => {
-                let is_less = most_move(alone(seen.polarity), seen.per_frame) && are_too_fast(&seen);
-                Some(Pieces::Spots(seen)).filter(|_| !is_less)
-            }
+            Some(Pieces::Spots(seen)) => most_move(seen.per_frame, seen.polarity) && are_too_fast(seen),
             // What stands clear is told by its surroundings; the light of a wide spot falls off too slowly for that.
-            Some(Pieces::FewSpots(seen)) => {
-                Some(Pieces::FewSpots(seen)).filter(|_| evidence.is_poor() && !are_too_fast(&seen))
-            }
-            None => None,
+            Some(Pieces::FewSpots(seen)) => !evidence.is_poor() || are_too_fast(seen),
+            Some(Pieces::Cells(_)) | None => false,
         };
+        let pieces = pieces.filter(|_| !isolated_are_better);
         // Before a camera that stands they were not counted.
         let count = || counted.map_or_else(|| particles::count(frames, info, n_threads), Ok);
         let spots_in_place = match &pieces {
             Some(Pieces::Spots(seen) | Pieces::FewSpots(seen)) => Some(*seen),
             Some(Pieces::Cells(_)) => None,
-            None if evidence.are_particles() => count()?.in_place_of_isolated(),
+            None if evidence.are_particles() => count()?.particles(),
             None => None,
         };
         if let Some(seen) = spots_in_place {

@@ -75,8 +75,8 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// What is there of blobs that are many, if they are particles.
-    pub fn in_place_of_isolated(self) -> Option<Particles> {
+    /// What was seen, if the frames are full of it.
+    pub fn particles(self) -> Option<Particles> {
         self.fills.then_some(self.seen)
     }
 }
@@ -95,8 +95,7 @@ pub fn look(
     if scene.camera == Camera::Fixed && scene.regions < LEAST {
         return Ok(None);
     }
-    let found = counted.insert(count(frames, info, n_threads)?);
-    Ok(found.fills.then_some(found.seen))
+    Ok(counted.insert(count(frames, info, n_threads)?).particles())
 }
 
 /// The blobs of the polarity of which there are more of one size all over the frame, else of which there are more; what they are.

@@ -4,12 +4,12 @@
 //! ln h, and its mean lies at the part p / (p + 2) of the way, whatever h, s and T are. So p is told by the mean, beside the logarithm that one in twenty exceeds, which noise moves less than the
 //! largest. Of a Gaussian of the deviation s the area is 2 π s² ln(h/T). The mean of 5 x 5 before makes the profile of a narrow spot flatter: by as much as it does of a Gaussian of that width.
 //! Symbols: l logarithm of a pixel in units of T; m mean of l beside its upper end (1/2 for a Gaussian).
-//! Limits: spots that touch are one piece, with a mean of little more (0.54 for 0.51 in crowds); texture counts as flat.
+//! Limits: spots that touch are one piece, with a mean of little more (0.54 for 0.51 in crowds); texture counts as flat. What of another piece lies in a piece's box counts with it.
 
 use super::quantile::quantile;
 use super::scene::grey_of;
+use crate::vision::gaussian::WIDTH_PER_DEVIATION;
 use crate::vision::spatial::{SpatialConfig, SpatialFilter, WindowConfig};
-use crate::vision::threshold::spot::WIDTH_PER_DEVIATION;
 use crate::vision::threshold::{BackgroundGrid, LocalConfig, Polarity};
 use crate::{Detection, Frame, Image, Result, Scan};
 
@@ -208,6 +208,23 @@ mod tests {
             assert!(spot.polarity == polarity && spot.size_px > 5.5, "{spot:?}");
             assert_eq!(chosen.tracker.report, Report::Moving);
         }
+    }
+
+    #[test]
+    fn where_the_step_of_the_values_hides_the_noise_pieces_are_no_spots() {
+        let light = |r: f64| 300.0 * (-0.5 * (r / 2.0f64).powi(2)).exp();
+        let (mut frames, info) = frames(40, 2, 0.0, 20.0, light);
+        let is_spots = |frames: &[Frame]| {
+            let seen = cells::look(frames, &info, 1).unwrap();
+            matches!(seen, Some(cells::Pieces::Spots(_) | cells::Pieces::FewSpots(_)))
+        };
+        assert!(is_spots(&frames));
+        // A tenth of a step, the ground (500) in the middle of one.
+        for frame in &mut frames {
+            let Pixels::Gray16(image) = &mut frame.pixels else { continue };
+            image.as_mut_slice().iter_mut().for_each(|v| *v /= 200);
+        }
+        assert!(!is_spots(&frames));
     }
 
     #[test]

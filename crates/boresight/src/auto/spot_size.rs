@@ -186,22 +186,6 @@ mod tests {
     }
 
     #[test]
-    fn where_the_step_of_the_values_hides_the_noise_the_whole_size_stays() {
-        let frame = |pixels| Frame { index: FrameIndex(0), time: Timestamp::default(), pixels };
-        let noisy = |sd: f32| {
-            let mut rng = ChaCha8Rng::seed_from_u64(4);
-            let values = (0..100 * 100).map(|_| 50.5 + sd * rng.sample::<f32, _>(StandardNormal));
-            Image::from_vec(100, 100, values.collect::<Vec<f32>>()).unwrap()
-        };
-        let whole =
-            |image: Image<f32>| Image::from_vec(100, 100, image.as_slice().iter().map(|v| *v as u8).collect()).unwrap();
-        assert!(shows_noise(&frame(Pixels::Gray8(whole(noisy(1.0))))));
-        assert!(!shows_noise(&frame(Pixels::Gray8(whole(noisy(0.2))))));
-        assert!(shows_noise(&frame(Pixels::GrayF32(noisy(0.2)))));
-        assert!(!shows_noise(&frame(Pixels::GrayF32(noisy(0.0)))));
-    }
-
-    #[test]
     fn what_falls_apart_is_looked_for_as_a_whole() {
         // A ring 6 px in radius, as the optics show what lies out of focus: 14 px wide at half height, its parts no wider than 3: a filter of 14 px finds several.
         let ring = |r: f64| 12.0 * (-(r - 6.0) * (r - 6.0) / 2.0).exp();

@@ -15,6 +15,7 @@ pub(crate) mod config;
 mod cut_off;
 pub(crate) mod detector;
 pub mod fit;
+pub(crate) mod gaussian;
 pub mod integrate;
 pub(crate) mod isolated;
 pub(crate) mod llr;

@@ -12,11 +12,9 @@
 //! Limits: targets whose axes differ, or whose edges turn against the pixels, lose as their overlap does.
 
 use super::config::{BernoulliConfig, TargetShape};
+use crate::vision::gaussian::WIDTH_PER_DEVIATION;
 use crate::vision::matched::{half_surround, kernel, unit_energy};
 use nalgebra::Vector2;
-
-/// Width at half height of a Gaussian in units of its deviation.
-const FWHM: f64 = 2.354_82;
 
 /// A target's profile along an axis.
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +105,7 @@ impl Profile {
     /// Width at half height.
     pub(super) fn width(&self) -> f64 {
         match self.shape {
-            TargetShape::Spot => FWHM * self.size,
+            TargetShape::Spot => WIDTH_PER_DEVIATION * self.size,
             TargetShape::Square => self.size,
         }
     }

@@ -14,14 +14,13 @@ use super::region::{Region, Seed};
 use super::spot_fit::{Guess, Spot, fit};
 use super::tail::{Strengths, nulls, strength};
 use crate::vision::config::DetectorConfig;
+use crate::vision::gaussian::WIDTH_PER_DEVIATION;
 use crate::vision::pixel::Pixel;
 use crate::vision::polarity::Side;
 use crate::vision::target_finder::{TargetFinder, TypedFrame};
 use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
-/// Width at half height of a Gaussian in units of its deviation.
-const FWHM: f64 = 2.354_82;
 /// Part of the frame's shorter side that the largest target has, if nothing else is asked for.
 const LARGEST: f64 = 0.4;
 /// Coarsest level whose targets are fitted as spots.
@@ -149,7 +148,7 @@ impl CfarDetector {
     /// Levels whose targets have the sizes asked for: `from..to`.
     fn levels(&self, largest: f64) -> (usize, usize) {
         let half_octave = std::f64::consts::SQRT_2;
-        let size = |k: usize| FWHM * sigma_px(k);
+        let size = |k: usize| WIDTH_PER_DEVIATION * sigma_px(k);
         let from = (0..16).find(|&k| size(k) * half_octave >= self.config.smallest_px).unwrap_or(16);
         let to = (0..16).find(|&k| size(k) > largest * half_octave).unwrap_or(16);
         (from, to.max(from + 1))

@@ -19,6 +19,7 @@ use super::refine::{Found, Paths};
 use super::sums::{PER_SCORE, Sums};
 use super::velocities::Velocities;
 use crate::vision::config::DetectorConfig;
+use crate::vision::gaussian::WIDTH_PER_DEVIATION;
 use crate::vision::pixel::Pixel;
 use crate::vision::polarity::Side;
 use crate::vision::target_finder::{TargetFinder, TypedFrame};
@@ -33,8 +34,6 @@ const LEAST: f32 = 3.0;
 const OTHER_INTERVAL: f64 = 1.25;
 /// Most velocities: their numbers are kept in 16 bits.
 const MOST_VELOCITIES: usize = 1 << 16;
-/// Width at half height of a Gaussian in units of its deviation.
-const FWHM: f64 = 2.354_82;
 
 /// A top on the grid.
 #[derive(Clone, Copy, Debug)]
@@ -300,7 +299,7 @@ fn detection(f: &Found, expected: f64, side: Side, sigma_px: f64, unit: f32) -> 
     // Filtered counts of a spot of height A are A times the root of its energy, √π σ.
     let sign = if side == Side::Bright { 1.0 } else { -1.0 };
     let height = sign * f.amplitude * f64::from(unit) / (std::f64::consts::PI.sqrt() * sigma_px);
-    let width = FWHM * sigma_px;
+    let width = WIDTH_PER_DEVIATION * sigma_px;
     Detection::at(f.position, of(axis[(0, 0)]))
         .with_extent(Extent::around(f.position, width, width))
         .with_area_px((std::f64::consts::FRAC_PI_4 * width * width).round().max(1.0) as u32)

@@ -26,7 +26,7 @@ mod disc;
 mod elongation;
 mod peaks;
 
-pub use disc::{DIAMETER_PER_WIDTH, WIDTH_PER_DEVIATION};
+pub use disc::DIAMETER_PER_WIDTH;
 use disc::{Disc, Moments, discs, moments, part};
 use elongation::{Elongation, Moments2};
 use peaks::{Summit, find_nearest};

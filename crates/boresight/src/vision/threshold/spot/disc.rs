@@ -4,6 +4,7 @@
 //! the disc moves does so steadily.
 
 use crate::Image;
+use crate::vision::gaussian::WIDTH_PER_DEVIATION;
 use crate::vision::threshold::boxes::Boxes;
 use crate::vision::threshold::lanes::around;
 use fearless_simd::prelude::*;
@@ -57,8 +58,6 @@ fn moments_vectors<S: Simd>(simd: S, response: &Image<f32>, radius: usize, c: Ve
 
 /// Diameter of a spot with its soft edge in units of its width at half height: 2.45 holds 98 % of a Gaussian's light.
 pub const DIAMETER_PER_WIDTH: f64 = 2.45;
-/// Width at half height of a Gaussian in units of its deviation.
-pub const WIDTH_PER_DEVIATION: f64 = 2.354_82;
 
 /// Least radius of a disc, px: in one of a pixel the centroid depends on where in its pixel a spot lies, by 0.02 to 0.2 px for deviations of 0.6 to 3 px, in one of two by 0.03 at most.
 const LEAST_RADIUS: usize = 2;

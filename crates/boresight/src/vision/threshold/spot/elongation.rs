@@ -9,6 +9,7 @@
 //! Limits: spots lie independently of each other; in swarms more are two. Where another peak is near, its light makes a spot long: those are not asked.
 
 use crate::Image;
+use crate::vision::middle::middle;
 use crate::vision::threshold::grid::median_and_deviation;
 use crate::vision::threshold::lanes::around;
 use fearless_simd::prelude::*;
@@ -97,15 +98,10 @@ impl Elongation {
             return;
         }
         let values = &mut self.values;
-        let mut usual = |value: fn(&Moments2, f64) -> f64| {
-            values.clear();
-            values.extend(asked().map(|(_, m, mass)| value(&m, mass) as f32));
-            let (median, deviation) = median_and_deviation(values, 0.0);
-            [median, deviation].map(f64::from)
-        };
-        let [length, deviation] = usual(|m, _| m.length());
-        let [mass, _] = usual(|_, mass| mass);
-        let [mean, _] = usual(|m, _| m.mean);
+        let mass = f64::from(middle(filled(values, asked().map(|(.., mass)| mass))));
+        let mean = f64::from(middle(filled(values, asked().map(|(_, m, _)| m.mean))));
+        let usual = median_and_deviation(filled(values, asked().map(|(_, m, _)| m.length())), 0.0);
+        let (length, deviation) = (f64::from(usual.0), f64::from(usual.1));
         let [shown, variance] = self.of_gaussian(mean);
         let least_more = |own: f64| SURE * deviation * (mass / own).max(1.0);
         let long = || asked().filter(|(_, m, own)| m.length() - length > least_more(*own));
@@ -126,6 +122,13 @@ impl Elongation {
         let part = ((mean - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
         [1, 2].map(|i| a[i] + part * (b[i] - a[i]))
     }
+}
+
+/// These values in the place of those before.
+fn filled(values: &mut Vec<f32>, all: impl Iterator<Item = f64>) -> &mut [f32] {
+    values.clear();
+    values.extend(all.map(|v| v as f32));
+    values
 }
 
 /// Second moments of the positive response about `c` in a disc with a soft edge.
