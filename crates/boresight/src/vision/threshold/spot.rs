@@ -22,17 +22,19 @@ use crate::vision::target_finder::{PixelNoise, TargetFinder, TypedFrame};
 use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
+mod border;
+mod centroid;
 mod disc;
 mod elongation;
 mod peaks;
+mod unseen;
 
+use centroid::{Centroid, MOST_PULL, centroid};
 pub use disc::DIAMETER_PER_WIDTH;
-use disc::{Disc, Moments, discs, moments, part};
+use disc::{Disc, Moments, discs, part};
 use elongation::{Elongation, Moments2};
 use peaks::{Summit, find_nearest};
-
-/// The largest part of a disc's way that its centroid is taken to follow: beyond it what is inside has no middle of its own.
-const MOST_PULL: f64 = 0.7;
+use unseen::Unseen;
 
 /// A spot.
 #[derive(Clone, Debug)]
@@ -41,7 +43,7 @@ struct Spot {
     /// Σ of the positive response in the disc, counts.
     mass: f64,
     /// How far the disc's centroid moves when the disc moves by 1 px: the response cut off at its edge.
-    pull: f64,
+    pull: Vector2<f64>,
     score: f32,
     peak: (usize, usize),
     disc: Disc,
@@ -73,6 +75,7 @@ pub struct SpotDetector {
     peak_offsets: Vec<(i32, i32)>,
     /// From the smallest to the largest.
     discs: Vec<Disc>,
+    unseen: Unseen,
     elongation: Elongation,
     shapes: Vec<(Option<Moments2>, f64)>,
     /// A float frame without missing values.
@@ -120,6 +123,8 @@ impl SpotDetector {
             .collect();
         let cell = (4.0 * config.size_px).max(32.0) as usize;
         let discs = discs(config.size_px, smooth, surround);
+        let largest = discs[discs.len() - 1].radius;
+        let unseen = Unseen::new(config.size_px, (smooth, surround), largest);
         Self {
             config: config.clone(),
             smooth,
@@ -130,6 +135,7 @@ impl SpotDetector {
             elongation: Elongation::new(discs[0].radius + 1, radius as f64 + 2.0),
             shapes: Vec::new(),
             discs,
+            unseen,
             whole: Image::default(),
             response: Image::default(),
             boxes: Boxes::new(smooth, surround),
@@ -228,7 +234,7 @@ impl SpotDetector {
             }
         }
         find_nearest(&mut summits, (2 * self.largest_disc().radius).max(self.elongation.alone_px()));
-        spots.extend(summits.iter().map(|s| self.centre(s)));
+        spots.extend(summits.iter().map(|s| self.spot(s)));
         (self.spots, self.summits) = (spots, summits);
     }
 
@@ -245,33 +251,15 @@ impl SpotDetector {
         self.response.get(x, y)
     }
 
-    /// The centroid of the positive response in the disc, the disc moved until it is centred on it.
-    fn centre(&self, summit: &Summit) -> Spot {
-        let (w, h) = (self.response.width() as f64, self.response.height() as f64);
-        let mut c = Vector2::new(summit.x as f64, summit.y as f64);
+    /// The spot of a peak.
+    fn spot(&self, summit: &Summit) -> Spot {
         let disc = self.disc(summit);
-        let (mut mass, mut pull) = (0.0, 0.0);
-        for _ in 0..30 {
-            let Moments { sum, moment, edge } = moments(&self.response, disc.radius, c);
-            if sum <= 0.0 {
-                break;
-            }
-            (mass, pull) = (sum, edge / sum);
-            // The centroid follows the disc by `pull` of its way (Newton's step): where it stands still is so much further.
-            let step = moment / sum / (1.0 - pull.min(MOST_PULL));
-            let next = c + step;
-            if !(0.0..=w - 1.0).contains(&next.x) || !(0.0..=h - 1.0).contains(&next.y) {
-                break;
-            }
-            c = next;
-            if step.norm() < 1e-3 {
-                break;
-            }
-        }
+        let Centroid { position, mass, pull } =
+            centroid(&self.response, disc.radius, Vector2::new(summit.x as f64, summit.y as f64));
         let score = ((f64::from(summit.v) - summit.median) / summit.deviation).min(1e9) as f32;
         let is_alone = summit.nearest2 > self.elongation.alone_px().pow(2);
-        let shape = is_alone.then(|| self.elongation.measure(&self.response, c));
-        Spot { position: c, mass, pull, score, peak: (summit.x, summit.y), disc, shape, doubt: Matrix2::zeros() }
+        let shape = is_alone.then(|| self.elongation.measure(&self.response, position));
+        Spot { position, mass, pull, score, peak: (summit.x, summit.y), disc, shape, doubt: Matrix2::zeros() }
     }
 
     /// Least deviation that a score counts in, counts: that of which the least contrast is k. Of a ground without noise, or of one that a codec has flattened in most places, half of the
@@ -316,17 +304,18 @@ impl SpotDetector {
         *self.discs.iter().rev().find(fits).unwrap_or(&self.discs[0])
     }
 
-    /// Variance of a spot's position along an axis for noise of this variance of a pixel, px²: the lesser of its disc and of the smallest. What a larger disc has in addition is mostly cut off at 0,
+    /// Variance of a spot's position along the axes for noise of this variance of a pixel, px²: the lesser of its disc and of the smallest. What a larger disc has in addition is mostly cut off at 0,
     /// where noise does nothing.
-    fn variance_px2(&self, spot: &Spot, pixel: f64) -> f64 {
-        let own = pixel * spot.disc.noise_gain / (spot.mass * (1.0 - spot.pull.min(MOST_PULL))).powi(2);
+    fn variance_px2(&self, spot: &Spot, pixel: f64) -> Vector2<f64> {
+        let own =
+            spot.pull.map(|pull| pixel * spot.disc.noise_gain / (spot.mass * (1.0 - pull.min(MOST_PULL))).powi(2));
         let smallest = &self.discs[0];
         if smallest.radius >= spot.disc.radius {
             return own;
         }
-        let Moments { sum, edge, .. } = moments(&self.response, smallest.radius, spot.position);
+        let Moments { sum, edge, .. } = border::moments(&self.response, smallest.radius, spot.position);
         // Of a flat top it has no hold at all.
-        own.min(pixel * smallest.noise_gain / (sum - edge).max(0.0).powi(2))
+        own.zip_map(&edge, |own, edge| own.min(pixel * smallest.noise_gain / (sum - edge).max(0.0).powi(2)))
     }
 
     fn largest_disc(&self) -> Disc {
@@ -357,10 +346,11 @@ impl SpotDetector {
         // Rounding and clipping leave a little even without noise. A missing value counts as 0.
         let level = image.get(spot.peak.0, spot.peak.1).map_or(0.0, Pixel::value).max(0.0);
         let variance = (noise.0 + noise.1 * level).max(0.0);
-        let sd2 = self.variance_px2(spot, variance) + 1e-4;
+        let unseen = self.unseen.variance_px2(spot.position, spot.pull, (image.width(), image.height()));
+        let sd2 = (self.variance_px2(spot, variance) + unseen).add_scalar(1e-4);
         Detection {
             position: spot.position,
-            cov: Matrix2::identity() * sd2 + spot.doubt,
+            cov: Matrix2::from_diagonal(&sd2) + spot.doubt,
             extent: Extent {
                 left_px: low.0 as f64 - 0.5,
                 top_px: low.1 as f64 - 0.5,

@@ -127,7 +127,7 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
             .map(|&(x, y, mass)| Spot {
                 position: Vector2::new(x, y),
                 mass,
-                pull: 0.0,
+                pull: Vector2::zeros(),
                 score: 1.0,
                 peak: (x as usize, y as usize),
                 disc: LARGE,
@@ -258,23 +258,32 @@ fn a_response_below_the_least_contrast_is_none() {
 #[test]
 fn size_peak_and_variance_are_read_from_the_response() {
     let mut d = SpotDetector::new(&SpotConfig::default());
-    d.response = Image::filled(20, 20, 0.0);
-    let mut frame = Image::filled(20, 20, 7.0f32);
+    d.response = Image::filled(60, 60, 0.0);
+    let mut frame = Image::filled(60, 60, 7.0f32);
     for (x, y, r, v) in
-        [(9, 9, 10.0, 20.0), (10, 9, 6.0, 26.0), (11, 9, 5.0, 12.0), (9, 10, 5.0, 3.0), (8, 9, 4.9, 90.0)]
+        [(29, 29, 10.0, 20.0), (30, 29, 6.0, 26.0), (31, 29, 5.0, 12.0), (29, 30, 5.0, 3.0), (28, 29, 4.9, 90.0)]
     {
         d.response.row_mut(y)[x] = r;
         frame.row_mut(y)[x] = v;
     }
     let disc = Disc { radius: 3, noise_gain: 2.0, share: 1.0 };
     d.discs = vec![disc];
-    let (position, doubt) = (Vector2::new(9.4, 9.2), Matrix2::zeros());
-    let spot = |pull| Spot { position, mass: 10.0, pull, score: 4.0, peak: (9, 9), disc, shape: None, doubt };
+    let (position, doubt) = (Vector2::new(29.4, 29.2), Matrix2::zeros());
+    let spot = |pull| Spot {
+        position,
+        mass: 10.0,
+        pull: Vector2::repeat(pull),
+        score: 4.0,
+        peak: (29, 29),
+        disc,
+        shape: None,
+        doubt,
+    };
     let bright = d.detection(&frame, &spot(0.5), (3.0, 0.1), 1.0);
-    // Half the peak or more: (9, 9), (10, 9), (11, 9), (9, 10).
-    assert_eq!(bright.extent, Extent { left_px: 8.5, top_px: 8.5, width_px: 3.0, height_px: 2.0 });
+    // Half the peak or more: (29, 29), (30, 29), (31, 29), (29, 30).
+    assert_eq!(bright.extent, Extent { left_px: 28.5, top_px: 28.5, width_px: 3.0, height_px: 2.0 });
     assert_eq!((bright.area_px, bright.peak, bright.sum, bright.score), (4, 26.0, 10.0, 4.0));
-    assert_eq!(bright.position, Vector2::new(9.4, 9.2));
+    assert_eq!(bright.position, Vector2::new(29.4, 29.2));
     assert_eq!(d.detection(&frame, &spot(0.5), (3.0, 0.1), -1.0).peak, 3.0);
     // (3 + 0.1 x 20) x 2 / (10 x 0.5)² + 1e-4.
     let variance = |spot: &Spot, noise| d.detection(&frame, spot, noise, 1.0).cov[(0, 0)];
@@ -282,7 +291,7 @@ fn size_peak_and_variance_are_read_from_the_response() {
     assert!((variance(&spot(0.0), (3.0, 0.0)) - 0.0601).abs() < 1e-12);
     assert!((variance(&spot(0.95), (9.0, 0.0)) - 2.0001).abs() < 1e-12, "a disc is pulled by 0.7 at most");
     assert_eq!(bright.cov, Matrix2::identity() * bright.cov[(0, 0)]);
-    frame.row_mut(9)[9] = -20.0;
+    frame.row_mut(29)[29] = -20.0;
     assert!(
         (d.detection(&frame, &spot(0.0), (3.0, 0.1), 1.0).cov[(0, 0)] - 0.0601).abs() < 1e-12,
         "no shot noise below 0"
@@ -298,7 +307,7 @@ fn the_pull_of_the_disc_is_how_far_its_centroid_follows_it() {
     d.grid.refresh(&d.response);
     d.discs = vec![LARGE];
     let summit = Summit { x: 20, y: 20, v: 2.0, median: 0.0, deviation: 1.0, nearest2: usize::MAX };
-    let spot = d.centre(&summit);
+    let spot = d.spot(&summit);
     let (mut mass, mut edge) = (0.0, 0.0);
     for y in -5..=5 {
         for x in -5..=5 {
@@ -309,7 +318,7 @@ fn the_pull_of_the_disc_is_how_far_its_centroid_follows_it() {
         }
     }
     assert_eq!(spot.position, Vector2::new(20.0, 20.0));
-    assert!((spot.mass - mass).abs() < 1e-9 && (spot.pull - edge / mass).abs() < 1e-9, "{} {}", spot.mass, spot.pull);
+    assert!((spot.mass - mass).abs() < 1e-9 && spot.pull.iter().all(|p| (p - edge / mass).abs() < 1e-9), "{spot:?}");
 }
 
 #[test]
