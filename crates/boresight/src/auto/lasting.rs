@@ -16,9 +16,8 @@ const COPIED_SHARE: f64 = 0.1;
 const COPIED_PX: f64 = 0.02;
 /// Frames in which a thing stays: of those measured anew three in a million do by chance.
 const STAYS_FRAMES: usize = 5;
-/// Fewest that last, of either kind, and how many of those of the other polarity are among all that do, at least.
+/// Fewest that came and went.
 const FEWEST: usize = 5;
-const LASTING_SHARE: f64 = 0.1;
 /// Shares that score less than what is taken: of the other polarity, and of what appears and vanishes, some of which are targets.
 const NEARLY_ALL: f64 = 0.99;
 const MOST: f64 = 0.75;
@@ -98,8 +97,7 @@ pub fn score(decoys: &Decoys, scans: &[Scan]) -> Option<(f64, String)> {
         return None;
     }
     let passing = passing(scans);
-    let last = lasting.len() >= FEWEST && lasting.len() as f64 >= LASTING_SHARE * *n_first as f64;
-    let of_other = last.then(|| at(lasting, NEARLY_ALL));
+    let of_other = decoys.last().then(|| at(lasting, NEARLY_ALL));
     let of_own = (passing.len() >= FEWEST).then(|| at(&passing, MOST));
     let score = round(BRIGHTEST * of_other.into_iter().chain(of_own).map(f64::from).reduce(f64::max)?);
     if score <= 0.0 {

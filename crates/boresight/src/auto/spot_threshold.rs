@@ -5,7 +5,9 @@
 //! How: of the scores of the first scans a valley is looked for, around which lie next to no detections. Those below it are noise if they score no higher than those of the other polarity do: what a codec
 //! makes of noise is as often dark as bright. Rims of bright spots are dark, and do not count. Where too few are left, as between many spots, those below are noise, or what a codec leaves behind a spot
 //! that moves, if they are the fewer the higher they score: other targets, fainter ones, are a hill of their own.
-//! Where there is no valley the threshold rises to where detections of the other polarity are as many as the false ones it was to let through: of noise that is not white, a normal law foretells too few.
+//! Where false detections last from frame to frame, to be followed tells no target from them, and the score alone has to: then the bottom between the noise and a hill of targets is taken, though it is no valley. As many false ones score
+//! more as targets score less about where both are equally dense, which is at the bottom or a little below.
+//! Elsewhere the threshold rises to where detections of the other polarity are as many as the false ones it was to let through: of noise that is not white, a normal law foretells too few.
 //! Symbols: s a threshold, N(s) how many detections score less; b(s) = N(s r) - N(s / r), r = [`WIDE`].
 //! Limits: faint targets of which most score less than the first threshold, or that are much fewer than the noise, go with it where there are bright ones.
 
@@ -23,6 +25,8 @@ const FEWEST: usize = 50;
 const COMPARED: f64 = 0.9;
 /// Deviations by which a number may exceed the one before by chance.
 const BY_CHANCE: f64 = 2.0;
+/// Deviations by which a number is surely less than another.
+const SURELY: f64 = 3.0;
 /// Thresholds that are tried lie apart by this factor.
 const STEP: f64 = 1.05;
 /// Beyond this a threshold is none of noise: the largest that a configuration takes.
@@ -35,6 +39,17 @@ pub(super) fn raised(decoys: &Decoys, least: f64) -> Option<(f64, String)> {
         let reason = format!(
             "Spots of less than {k} deviations (not {least}) are left out: {:.0} % of all, which score as noise does; hardly one scores as much.",
             100.0 * share,
+        );
+        return Some((k, reason));
+    }
+    if decoys.last()
+        && let Some((k, share)) = bottom(own, other, least)
+    {
+        let reason = format!(
+            "Spots of less than {k} deviations (not {least}) are left out, {:.0} % of all: false ones last ({:.0} % of those of the other polarity are there again in the next frame), so that \
+             following does not tell them from targets, and the fewest of both score as much.",
+            100.0 * share,
+            100.0 * decoys.lasting.len() as f64 / decoys.n_first as f64,
         );
         return Some((k, reason));
     }
@@ -75,6 +90,25 @@ fn valley(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
     Some((round(s), n as f64 / scores.len() as f64))
 }
 
+/// The score between the noise and a hill above it at which detections are fewest beside the lower of both, surely fewer, and the share below.
+fn bottom(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
+    let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
+    let most = f64::from(*scores.last().filter(|_| least > 0.0 && noise.len() >= FEWEST)?);
+    let at = |of: &[f32]| f64::from(of[(COMPARED * of.len() as f64) as usize]);
+    let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most.min(MOST_K));
+    let around: Vec<(f64, f64)> = steps.map(|s| (s, (below(s * WIDE) - below(s / WIDE)) as f64)).collect();
+    let highest = |of: &[(f64, f64)]| of.iter().map(|a| a.1).fold(0.0, f64::max);
+    let bottoms = around.iter().enumerate().filter_map(|(i, &(s, between))| {
+        let n = below(s);
+        let lower = highest(&around[..i]).min(highest(&around[i..]));
+        let is_sure = lower - between > SURELY * (lower + between).sqrt();
+        let is_noise = || at(&scores[..n]) <= WIDE * at(noise);
+        (n.min(scores.len() - n) >= FEWEST && is_sure && is_noise()).then_some((s, n, between / lower))
+    });
+    let (s, n, _) = bottoms.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    Some((round(s), n as f64 / scores.len() as f64))
+}
+
 /// Whether rising scores from `least` on are the fewer the higher they are, in steps of [`WIDE`] squared, but for chance.
 fn falls(scores: &[f32], least: f64) -> bool {
     let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
@@ -90,6 +124,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
     fn rising(mut scores: Vec<f32>) -> Vec<f32> {
         scores.sort_unstable_by(f32::total_cmp);
@@ -129,6 +164,31 @@ mod tests {
         assert_eq!(where_few(&[], &other, 2.5), None);
         let decoys = Decoys { own, other, ..Decoys::default() };
         assert_eq!(raised(&decoys, 2.5).map(|r| r.0), Some(k));
+    }
+
+    #[test]
+    fn where_false_ones_last_it_is_where_the_fewest_are_mistaken() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(12);
+        let noise = tail(rng, 4500, 2.9, 2.3);
+        let other = rising(tail(rng, 2000, 2.9, 2.3));
+        let targets: Vec<f32> = (0..1200).map(|_| 30.0 + 8.0 * rng.sample::<f32, _>(StandardNormal)).collect();
+        let own = rising([&noise[..], &targets].concat());
+        let lasting = other[..1000].to_vec();
+        let coded = Decoys { own: own.clone(), other: other.clone(), n_first: 2000, lasting };
+        let (k, reason) = raised(&coded, 2.9).unwrap();
+        let mistaken = |s: f64| {
+            let false_ones = noise.iter().filter(|v| f64::from(**v) >= s).count();
+            false_ones + targets.iter().filter(|v| f64::from(**v) < s).count()
+        };
+        let fewest = (0..400).map(|i| mistaken(2.9 + 0.1 * f64::from(i))).min().unwrap();
+        assert!(mistaken(k) <= fewest + fewest / 2 && reason.contains("50 %"), "{k} {} {fewest} {reason}", mistaken(k));
+        // A track tells them where they come and go; then faint targets are worth more.
+        let white = Decoys { lasting: Vec::new(), ..coded };
+        assert!(raised(&white, 2.9).is_none_or(|r| mistaken(r.0) > 2 * fewest));
+        // Noise alone has no hill, and one of targets above nothing but targets is none.
+        assert_eq!(bottom(&rising(noise), &other, 2.9), None);
+        let hills = rising([even(rng, 3000, 12.0, 20.0), even(rng, 3000, 30.0, 60.0)].concat());
+        assert_eq!(bottom(&hills, &other, 2.9), None);
     }
 
     #[test]
