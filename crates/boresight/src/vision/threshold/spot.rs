@@ -23,13 +23,13 @@ use crate::{Detection, Extent, Image, Result};
 use nalgebra::{Matrix2, Vector2};
 
 mod border;
-mod centroid;
+mod centring;
 mod disc;
 mod elongation;
 mod peaks;
 mod unseen;
 
-use centroid::{Centroid, MOST_PULL, centroid};
+use centring::{Centroid, MOST_PULL, centroid};
 pub use disc::DIAMETER_PER_WIDTH;
 use disc::{Disc, Moments, discs, part};
 use elongation::{Elongation, Moments2};
@@ -253,7 +253,7 @@ impl SpotDetector {
 
     /// The spot of a peak.
     fn spot(&self, summit: &Summit) -> Spot {
-        let disc = self.disc(summit);
+        let disc = self.disc_for(summit);
         let Centroid { position, mass, pull } =
             centroid(&self.response, disc.radius, Vector2::new(summit.x as f64, summit.y as f64));
         let score = ((f64::from(summit.v) - summit.median) / summit.deviation).min(1e9) as f32;
@@ -299,7 +299,7 @@ impl SpotDetector {
     }
 
     /// The largest disc that reaches no farther than half of the way to the nearest other peak, or the smallest there is.
-    fn disc(&self, summit: &Summit) -> Disc {
+    fn disc_for(&self, summit: &Summit) -> Disc {
         let fits = |d: &&Disc| 4 * d.radius.pow(2) <= summit.nearest2;
         *self.discs.iter().rev().find(fits).unwrap_or(&self.discs[0])
     }

@@ -5,7 +5,7 @@
 //! follows the window more than in the whole disc. Symbols: m distance of the frame's end, px; w weight of a pixel.
 //! Limits: the response near the border is not that of the whole spot (`spot/unseen.rs`). Plain loops, since few spots lie there.
 
-use super::disc::{self, Moments};
+use super::disc::{Moments, moments as whole_moments};
 use crate::Image;
 use nalgebra::Vector2;
 
@@ -19,7 +19,7 @@ pub(super) fn cuts(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> boo
 /// The sums over the disc around `c`, where the border cuts it over the part that is symmetric about `c`.
 pub(super) fn moments(response: &Image<f32>, radius: usize, c: Vector2<f64>) -> Moments {
     if !cuts(response, radius, c) {
-        return disc::moments(response, radius, c);
+        return whole_moments(response, radius, c);
     }
     let reach = radius as f64 + 0.5;
     let columns = Strip::new(c.x, reach, response.width());
@@ -99,7 +99,7 @@ mod tests {
         for at in [[1.4, 20.0], [2.0, 20.3], [4.3, 37.9], [37.6, 2.2], [20.2, 38.1]].map(Vector2::from) {
             let response = Image::from_vec(40, 40, (0..1600).map(light(40, at)).map(|v| v as f32).collect()).unwrap();
             let of = |m: Moments| (m.moment / m.sum).norm();
-            let (ours, whole) = (of(moments(&response, 7, at)), of(disc::moments(&response, 7, at)));
+            let (ours, whole) = (of(moments(&response, 7, at)), of(whole_moments(&response, 7, at)));
             assert!(ours < 0.02 && whole > 0.1, "{at} {ours} {whole}");
         }
     }

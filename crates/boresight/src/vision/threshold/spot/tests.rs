@@ -170,8 +170,9 @@ fn neighbours_hardly_draw_each_other_where_spots_are_looked_for_at_their_width()
 #[test]
 fn the_disc_has_half_of_the_size_and_less_where_another_peak_is_near() {
     let detector = SpotDetector::new(&SpotConfig { size_px: 20.0, surround: 1.0, ..Default::default() });
-    let radius =
-        |nearest2: usize| detector.disc(&Summit { x: 32, y: 24, v: 9.0, median: 0.0, deviation: 1.0, nearest2 }).radius;
+    let radius = |nearest2: usize| {
+        detector.disc_for(&Summit { x: 32, y: 24, v: 9.0, median: 0.0, deviation: 1.0, nearest2 }).radius
+    };
     // None, and others at 20, 19, 16, 15, 12, 11 and 3 px.
     let nearest = [usize::MAX, 400, 361, 256, 225, 144, 121, 9];
     assert_eq!(nearest.map(radius), [10, 10, 8, 8, 6, 6, 6, 6]);

@@ -4,7 +4,7 @@
 //! measured when the detector is built, at every half pixel from the border and for the widths that a size is chosen for; the mean square is added to the variance across the border. The width of a spot is told by how far its centroid follows its disc.
 //! Limits: Gaussians whose middle is in the frame; one that lies outside is stated to be at the border.
 
-use super::centroid::centroid;
+use super::centring::centroid;
 use super::disc::DIAMETER_PER_WIDTH;
 use crate::Image;
 use crate::vision::gaussian::WIDTH_PER_DEVIATION;

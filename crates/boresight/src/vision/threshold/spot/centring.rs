@@ -2,7 +2,7 @@
 //!
 //! Source: Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), by parts of a pixel and by Newton's steps: the centroid follows the disc by the part of its way that the response cut off at its edge tells.
 
-use super::border;
+use super::border::{cuts, moments};
 use super::disc::Moments;
 use crate::Image;
 use nalgebra::Vector2;
@@ -29,13 +29,16 @@ pub(super) struct Centroid {
 pub(super) fn centroid(response: &Image<f32>, radius: usize, pixel: Vector2<f64>) -> Centroid {
     let (w, h) = (response.width() as f64, response.height() as f64);
     let mut of = Centroid { position: pixel, mass: 0.0, pull: Vector2::zeros() };
-    if border::cuts(response, radius, pixel) {
+    if cuts(response, radius, pixel) {
         // At the very edge a window of one pixel has its middle wherever it is.
-        let inside = |v: f64, size: f64| v.clamp(0.5, (size - 1.5).max(0.5));
+        let inside = |v: f64, size: f64| {
+            let margin = (0.5 * (size - 1.0)).min(0.5);
+            v.clamp(margin, size - 1.0 - margin)
+        };
         of.position = Vector2::new(inside(pixel.x, w), inside(pixel.y, h));
     }
     for _ in 0..MOST_STEPS {
-        let Moments { sum, moment, edge } = border::moments(response, radius, of.position);
+        let Moments { sum, moment, edge } = moments(response, radius, of.position);
         if sum <= 0.0 {
             break;
         }
