@@ -23,6 +23,10 @@ const STAYS_PX: f64 = 1.0;
 /// Fewest that stay, and their share of all at least, where false detections last: of white noise 1 % lie so near to one of the next frame by chance, of what codecs leave 16 to 64 % do.
 const FEWEST_LASTING: usize = 5;
 const LASTING_SHARE: f64 = 0.1;
+/// How far apart copies are, px; and the share of those within a tenth of a pixel, at least, where there are copies: errors of 0.014 px an axis in both of what is measured anew would leave as much.
+pub const COPIED_PX: f64 = 0.02;
+const NEAR_PX: f64 = 0.1;
+const COPIED_SHARE: f64 = 0.4;
 
 /// Scores of detections, rising.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,12 +38,20 @@ pub struct Decoys {
     /// How many of these are in the first frame of a pair, and the scores of those that stay to the second.
     pub n_first: usize,
     pub lasting: Vec<f32>,
+    /// How many of these stay within [`NEAR_PX`], and within [`COPIED_PX`].
+    pub n_near: usize,
+    pub n_copied: usize,
 }
 
 impl Decoys {
     /// Whether false detections are there again in the next frame, so that to be followed is no sign of a target.
     pub fn last(&self) -> bool {
         self.lasting.len() >= FEWEST_LASTING && self.lasting.len() as f64 >= LASTING_SHARE * self.n_first as f64
+    }
+
+    /// Whether some that stay are copies, as a codec makes them, and not things that are seen again.
+    pub fn are_copied(&self) -> bool {
+        self.n_copied >= FEWEST_LASTING && self.n_copied as f64 >= COPIED_SHARE * self.n_near as f64
     }
 }
 
@@ -83,18 +95,24 @@ fn of_scans(places: &[usize], own: &[&Scan], other: &[Scan]) -> Decoys {
         scores
     };
     let noise: Vec<Scan> = own.iter().zip(other).map(|(own, other)| without_rims(other, own)).collect();
-    let (mut n_first, mut lasting) = (0, Vec::new());
+    let (mut n_first, mut lasting, mut n_near, mut n_copied) = (0, Vec::new(), 0, 0);
     for (pair, _) in noise.windows(2).zip(places.windows(2)).filter(|(_, k)| k[1] == k[0] + 1) {
         let next = Near::of(&pair[1]);
         n_first += pair[0].detections.len();
-        let stays = pair[0].detections.iter().filter(|d| next.nearest(d, STAYS_PX).is_some());
-        lasting.extend(stays.map(|d| d.score));
+        for d in &pair[0].detections {
+            let Some((_, far_px)) = next.nearest(d, STAYS_PX) else { continue };
+            lasting.push(d.score);
+            n_near += usize::from(far_px <= NEAR_PX);
+            n_copied += usize::from(far_px <= COPIED_PX);
+        }
     }
     Decoys {
         own: rising(own.iter().flat_map(|scan| &scan.detections).map(|d| d.score).collect()),
         other: rising(noise.iter().flat_map(|scan| &scan.detections).map(|d| d.score).collect()),
         n_first,
         lasting: rising(lasting),
+        n_near,
+        n_copied,
     }
 }
 
@@ -114,6 +132,10 @@ fn without_rims(scan: &Scan, other: &Scan) -> Scan {
 mod tests {
     use super::*;
     use crate::{Detection, Extent};
+    use nalgebra::{Matrix2, Vector2};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
     #[test]
     fn a_rim_is_left_out_and_what_lies_farther_away_or_is_as_strong_is_not() {
@@ -134,5 +156,31 @@ mod tests {
         let decoys = of_scans(&[3, 4, 9], &[&bright, &bright, &bright], &[dark, next.clone(), next]);
         assert_eq!((decoys.n_first, &decoys.lasting[..]), (2, &[6.0f32][..]));
         assert_eq!((decoys.own.len(), &decoys.other[..]), (9, &[3.0f32, 6.0, 6.0, 6.0][..]));
+        assert_eq!((decoys.n_near, decoys.n_copied), (0, 0));
+    }
+
+    #[test]
+    fn copies_are_told_from_things_that_are_measured_anew() {
+        // Four hundred things 20 px apart, so many of them where they were, the others off by that error in both axes.
+        let pair = |n_copies: usize, error_px: f64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(6);
+            let mut scan = |error_px: f64| {
+                let at = (0..400).map(|i| {
+                    let e = [(); 2]
+                        .map(|()| if i < n_copies { 0.0 } else { error_px * rng.sample::<f64, _>(StandardNormal) });
+                    Vector2::new(20.0 * (i % 20) as f64 + e[0], 20.0 * (i / 20) as f64 + e[1])
+                });
+                Scan::default().with_detections(at.map(|at| Detection::at(at, Matrix2::identity())).collect())
+            };
+            let noise = [scan(0.0), scan(error_px)];
+            of_scans(&[0, 1], &[&Scan::default(), &Scan::default()], &noise)
+        };
+        let (seen_again, copied) = (pair(0, 0.05), pair(120, 0.2));
+        assert!(
+            seen_again.last() && seen_again.n_copied >= FEWEST_LASTING && !seen_again.are_copied(),
+            "{seen_again:?}"
+        );
+        assert!(copied.last() && copied.are_copied(), "{copied:?}");
+        assert!(!Decoys::default().last() && !Decoys::default().are_copied());
     }
 }

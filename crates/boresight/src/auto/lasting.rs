@@ -6,14 +6,13 @@
 //! noise, and the brightest last longest.
 //! Limits: a target that moves slowly is copied as well for a while; some of the second kind are such. Frames that repeat others are all copies. Asked only where all that stands is reported: elsewhere the motion test holds back what stays.
 
-use super::decoys::Decoys;
+use super::decoys::{COPIED_PX, Decoys};
 use super::digits::round;
 use super::near::Near;
 use crate::{Detection, Scan};
 
 /// Share of the own detections that are there again to [`COPIED_PX`]: of those measured anew, with an error of 0.05 px in each axis, 4 %.
 const COPIED_SHARE: f64 = 0.1;
-const COPIED_PX: f64 = 0.02;
 /// Frames in which a thing stays: of those measured anew three in a million do by chance.
 const STAYS_FRAMES: usize = 5;
 /// Fewest that came and went.

@@ -5,7 +5,7 @@
 //! How: of the scores of the first scans a valley is looked for, around which lie next to no detections. Those below it are noise if they score no higher than those of the other polarity do: what a codec
 //! makes of noise is as often dark as bright. Rims of bright spots are dark, and do not count. Where too few are left, as between many spots, those below are noise, or what a codec leaves behind a spot
 //! that moves, if they are the fewer the higher they score: other targets, fainter ones, are a hill of their own.
-//! Where false detections last from frame to frame, to be followed tells no target from them, and the score alone has to: then the bottom between the noise and a hill of targets is taken, though it is no valley. As many false ones score
+//! Where false detections last from frame to frame, as copies that a codec makes, to be followed tells no target from them, and the score alone has to: then the bottom between the noise and a hill of targets is taken, though it is no valley. As many false ones score
 //! more as targets score less about where both are equally dense, which is at the bottom or a little below.
 //! Elsewhere the threshold rises to where detections of the other polarity are as many as the false ones it was to let through: of noise that is not white, a normal law foretells too few.
 //! Symbols: s a threshold, N(s) how many detections score less; b(s) = N(s r) - N(s / r), r = [`WIDE`].
@@ -43,6 +43,7 @@ pub(super) fn raised(decoys: &Decoys, least: f64) -> Option<(f64, String)> {
         return Some((k, reason));
     }
     if decoys.last()
+        && decoys.are_copied()
         && let Some((k, share)) = bottom(own, other, least)
     {
         let reason = format!(
@@ -174,7 +175,8 @@ mod tests {
         let targets: Vec<f32> = (0..1200).map(|_| 30.0 + 8.0 * rng.sample::<f32, _>(StandardNormal)).collect();
         let own = rising([&noise[..], &targets].concat());
         let lasting = other[..1000].to_vec();
-        let coded = Decoys { own: own.clone(), other: other.clone(), n_first: 2000, lasting };
+        let coded =
+            Decoys { own: own.clone(), other: other.clone(), n_first: 2000, lasting, n_near: 400, n_copied: 300 };
         let (k, reason) = raised(&coded, 2.9).unwrap();
         let mistaken = |s: f64| {
             let false_ones = noise.iter().filter(|v| f64::from(**v) >= s).count();
@@ -183,8 +185,12 @@ mod tests {
         let fewest = (0..400).map(|i| mistaken(2.9 + 0.1 * f64::from(i))).min().unwrap();
         assert!(mistaken(k) <= fewest + fewest / 2 && reason.contains("50 %"), "{k} {} {fewest} {reason}", mistaken(k));
         // A track tells them where they come and go; then faint targets are worth more.
-        let white = Decoys { lasting: Vec::new(), ..coded };
-        assert!(raised(&white, 2.9).is_none_or(|r| mistaken(r.0) > 2 * fewest));
+        let white = Decoys { lasting: Vec::new(), ..coded.clone() };
+        // Nor what is there again, but measured anew: things that are real.
+        let real = Decoys { n_copied: 80, ..coded };
+        for decoys in [white, real] {
+            assert!(raised(&decoys, 2.9).is_none_or(|r| mistaken(r.0) > 2 * fewest));
+        }
         // Noise alone has no hill, and one of targets above nothing but targets is none.
         assert_eq!(bottom(&rising(noise), &other, 2.9), None);
         let hills = rising([even(rng, 3000, 12.0, 20.0), even(rng, 3000, 30.0, 60.0)].concat());
