@@ -20,7 +20,7 @@ const RIM_REACH: f64 = 1.5;
 const RIM_RATIO: f32 = 2.0;
 /// How far a false detection that stays moves from frame to frame, px.
 const STAYS_PX: f64 = 1.0;
-/// Fewest that stay, and their share of all at least, where false detections last: of white noise 1 % lie so near to one of the next frame by chance, of what codecs leave 16 to 64 % do.
+/// Fewest that stay, and their share of all at least, where false detections last: of white noise 1 % lie so near to one of the next frame by chance, of what codecs leave 4 % (crf 22) to 64 % (crf 28) do.
 const FEWEST_LASTING: usize = 5;
 const LASTING_SHARE: f64 = 0.1;
 /// How far apart copies are, px; and the share of those within a tenth of a pixel, at least, where there are copies: errors of 0.014 px an axis in both of what is measured anew would leave as much.
@@ -49,7 +49,7 @@ impl Decoys {
         self.lasting.len() >= FEWEST_LASTING && self.lasting.len() as f64 >= LASTING_SHARE * self.n_first as f64
     }
 
-    /// Whether some that stay are copies, as a codec makes them, and not things that are seen again.
+    /// Whether some that stay are copies, as a codec makes them, and not things that are seen again: few may be ([`super::lasting::is_copied`] asks for a tenth of all), but then many of those that are near.
     pub fn are_copied(&self) -> bool {
         self.n_copied >= FEWEST_LASTING && self.n_copied as f64 >= COPIED_SHARE * self.n_near as f64
     }

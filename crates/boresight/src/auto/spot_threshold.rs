@@ -73,41 +73,56 @@ fn where_few(scores: &[f32], noise: &[f32], least: f64) -> Option<f64> {
     })
 }
 
-/// The deepest valley of the scores from `least` on, above 0, of which those below are noise by that of the other polarity, or by themselves where there is little, and the share of these.
-fn valley(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
+/// A threshold that is tried.
+struct Tried {
+    k: f64,
+    /// How many score less, and how many within [`WIDE`] of it.
+    below: usize,
+    between: usize,
+}
+
+/// The thresholds between `least`, above 0, and the largest score.
+fn tried(scores: &[f32], least: f64) -> impl Iterator<Item = Tried> {
+    let most = scores.last().filter(|_| least > 0.0).map_or(0.0, |s| f64::from(*s).min(MOST_K));
     let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
-    let most = f64::from(*scores.last().filter(|_| least > 0.0)?);
+    let steps = (0..).map(move |i| least * WIDE * STEP.powi(i)).take_while(move |k| *k < most);
+    steps.map(move |k| Tried { k, below: below(k), between: below(k * WIDE) - below(k / WIDE) })
+}
+
+/// Whether these score no higher than noise does.
+fn score_as(noise: &[f32], scores: &[f32]) -> bool {
     let at = |of: &[f32]| f64::from(of[(COMPARED * of.len() as f64) as usize]);
-    let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most.min(MOST_K));
-    let sides = steps.filter_map(|s| {
-        let (n, between) = (below(s), below(s * WIDE) - below(s / WIDE));
-        let fewer = n.min(scores.len() - n);
-        let compares = noise.len() >= FEWEST;
-        let is_noise = || if compares { at(&scores[..n]) <= WIDE * at(noise) } else { falls(&scores[..n], least) };
-        let is_valley = fewer >= FEWEST && between as f64 <= MOST_BETWEEN * fewer as f64;
-        (is_valley && is_noise()).then_some((s, n, between as f64 / fewer as f64))
+    at(scores) <= WIDE * at(noise)
+}
+
+/// The deepest valley of the scores from `least` on of which those below are noise by that of the other polarity, or by themselves where there is little, and the share of these.
+fn valley(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
+    let sides = tried(scores, least).filter_map(|t| {
+        let (left, fewer) = (&scores[..t.below], t.below.min(scores.len() - t.below));
+        let is_noise = || if noise.len() >= FEWEST { score_as(noise, left) } else { falls(left, least) };
+        let is_valley = fewer >= FEWEST && t.between as f64 <= MOST_BETWEEN * fewer as f64;
+        (is_valley && is_noise()).then_some((t, fewer))
     });
-    let (s, n, _) = sides.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    Some((round(s), n as f64 / scores.len() as f64))
+    let depth = |(t, fewer): &(Tried, usize)| t.between as f64 / *fewer as f64;
+    let (deepest, _) = sides.min_by(|a, b| depth(a).total_cmp(&depth(b)))?;
+    Some((round(deepest.k), deepest.below as f64 / scores.len() as f64))
 }
 
 /// The score between the noise and a hill above it at which detections are fewest beside the lower of both, surely fewer, and the share below.
 fn bottom(scores: &[f32], noise: &[f32], least: f64) -> Option<(f64, f64)> {
-    let below = |s: f64| scores.partition_point(|v| f64::from(*v) < s);
-    let most = f64::from(*scores.last().filter(|_| least > 0.0 && noise.len() >= FEWEST)?);
-    let at = |of: &[f32]| f64::from(of[(COMPARED * of.len() as f64) as usize]);
-    let steps = (0..).map(|i| least * WIDE * STEP.powi(i)).take_while(|s| *s < most.min(MOST_K));
-    let around: Vec<(f64, f64)> = steps.map(|s| (s, (below(s * WIDE) - below(s / WIDE)) as f64)).collect();
-    let highest = |of: &[(f64, f64)]| of.iter().map(|a| a.1).fold(0.0, f64::max);
-    let bottoms = around.iter().enumerate().filter_map(|(i, &(s, between))| {
-        let n = below(s);
-        let lower = highest(&around[..i]).min(highest(&around[i..]));
+    if noise.len() < FEWEST {
+        return None;
+    }
+    let all: Vec<Tried> = tried(scores, least).collect();
+    let highest = |of: &[Tried]| of.iter().map(|t| t.between).max().unwrap_or(0) as f64;
+    let bottoms = all.iter().enumerate().filter_map(|(i, t)| {
+        let (between, lower) = (t.between as f64, highest(&all[..i]).min(highest(&all[i..])));
         let is_sure = lower - between > SURELY * (lower + between).sqrt();
-        let is_noise = || at(&scores[..n]) <= WIDE * at(noise);
-        (n.min(scores.len() - n) >= FEWEST && is_sure && is_noise()).then_some((s, n, between / lower))
+        let are_enough = t.below.min(scores.len() - t.below) >= FEWEST;
+        (are_enough && is_sure && score_as(noise, &scores[..t.below])).then_some((t, between / lower))
     });
-    let (s, n, _) = bottoms.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    Some((round(s), n as f64 / scores.len() as f64))
+    let (lowest, _) = bottoms.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((round(lowest.k), lowest.below as f64 / scores.len() as f64))
 }
 
 /// Whether rising scores from `least` on are the fewer the higher they are, in steps of [`WIDE`] squared, but for chance.

@@ -4,7 +4,7 @@
 //! box. A peak is the largest D within size/2; it counts if D stands k robust deviations of D (median and 1.4826 x MAD
 //! on a grid; at least the k-th part of the least contrast) above its surroundings. Position: centroid of the positive part of D in a disc that is moved until
 //! it is centred, after Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), but by parts of a pixel and with a soft
-//! edge, so that positions are not drawn to whole pixels; the disc has half of the size, less where another peak is near: no more than half of the way to it (`spot/peaks.rs`). Of two
+//! edge, so that positions are not drawn to whole pixels; the disc has half of the size, less where another peak is near: no more than half of the way to it (`spot/peaks.rs`), and is symmetric where the frame ends (`spot/border.rs`). Of two
 //! positions closer than size/2 the stronger stays.
 //! Covariance: D is linear in the pixels, so c = Σ D p / Σ D has the covariance σ² Σ_j (K * p)_j² / (Σ D)², K the kernel of D cut
 //! to the disc; the sum over j is computed once, at build. A disc that moves with the centroid by the part q of an error

@@ -1,6 +1,7 @@
 //! The centroid of the positive response in a disc that is moved until it is centred on it.
 //!
 //! Source: Crocker & Grier, J. Colloid Interface Sci. 179, 298 (1996), by parts of a pixel and by Newton's steps: the centroid follows the disc by the part of its way that the response cut off at its edge tells.
+//! Limits: of a peak on the outermost pixels the middle may lie outside; then it is stated to be on them.
 
 use super::border::{cuts, moments};
 use super::disc::Moments;

@@ -102,15 +102,20 @@ fn noise_gain(radius: usize, smooth: usize, surround: usize) -> f64 {
     seen.as_slice().iter().map(|v| f64::from(*v).powi(2)).sum()
 }
 
+/// Light that is the product of its profiles along a row and along a column.
+pub(super) fn fill_light(light: &mut Image<f32>, row: &[f64], column: &[f64]) {
+    for (y, v) in column.iter().enumerate() {
+        light.row_mut(y).iter_mut().zip(row).for_each(|(p, u)| *p = (u * v) as f32);
+    }
+}
+
 /// Part of the positive response to a Gaussian spot that has this size with its soft edge, in the disc of radius `largest`, that lies in that of a radius. Of one whose size is its width at half height it is less.
 fn shares(size_px: f64, largest: usize, smooth: usize, surround: usize) -> impl Fn(usize) -> f64 {
     let reach = largest + 1 + (smooth - 1).max(surround / 2) + 1;
     let scale = -0.5 * (DIAMETER_PER_WIDTH * WIDTH_PER_DEVIATION / size_px).powi(2);
     let profile: Vec<f64> = (0..=2 * reach).map(|i| (scale * (i as f64 - reach as f64).powi(2)).exp()).collect();
     let mut light = Image::filled(profile.len(), profile.len(), 0.0f32);
-    for (y, v) in profile.iter().enumerate() {
-        light.row_mut(y).iter_mut().zip(&profile).for_each(|(p, u)| *p = (u * v) as f32);
-    }
+    fill_light(&mut light, &profile, &profile);
     let mut response = Image::default();
     Boxes::new(smooth, surround).run(&light, &mut response);
     let mass = move |radius| moments(&response, radius, Vector2::new(reach as f64, reach as f64)).sum;
