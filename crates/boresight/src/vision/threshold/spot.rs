@@ -47,8 +47,8 @@ struct Spot {
     score: f32,
     peak: (usize, usize),
     disc: Disc,
-    /// Where no other peak is near.
-    shape: Option<Moments2>,
+    /// Square of the distance to the nearest other peak, px².
+    nearest2: usize,
     /// What is added to the covariance, px², since it may be two.
     doubt: Matrix2<f64>,
 }
@@ -131,8 +131,7 @@ impl SpotDetector {
             surround,
             radius,
             peak_offsets,
-            // Some two deviations of a spot: farther out is the light of others.
-            elongation: Elongation::new(discs[0].radius + 1, radius as f64 + 2.0),
+            elongation: Elongation::new(discs[0].radius, config.size_px, radius as f64 + 2.0),
             shapes: Vec::new(),
             discs,
             unseen,
@@ -257,9 +256,8 @@ impl SpotDetector {
         let Centroid { position, mass, pull } =
             centroid(&self.response, disc.radius, Vector2::new(summit.x as f64, summit.y as f64));
         let score = ((f64::from(summit.v) - summit.median) / summit.deviation).min(1e9) as f32;
-        let is_alone = summit.nearest2 > self.elongation.alone_px().pow(2);
-        let shape = is_alone.then(|| self.elongation.measure(&self.response, position));
-        Spot { position, mass, pull, score, peak: (summit.x, summit.y), disc, shape, doubt: Matrix2::zeros() }
+        let (peak, nearest2) = ((summit.x, summit.y), summit.nearest2);
+        Spot { position, mass, pull, score, peak, disc, nearest2, doubt: Matrix2::zeros() }
     }
 
     /// Least deviation that a score counts in, counts: that of which the least contrast is k. Of a ground without noise, or of one that a codec has flattened in most places, half of the
@@ -292,8 +290,11 @@ impl SpotDetector {
 
     /// Says of those that are longer than usual how uncertain that makes where one of two is.
     fn doubt_long_ones(&mut self) {
+        let (elongation, response) = (&mut self.elongation, &self.response);
+        elongation.suit(response, self.spots.iter().map(|s| (s.position, s.nearest2)));
+        let shape = |s: &Spot| (elongation.measure(response, s.position, s.nearest2), s.mass / s.disc.share);
         self.shapes.clear();
-        self.shapes.extend(self.spots.iter().map(|s| (s.shape, s.mass / s.disc.share)));
+        self.shapes.extend(self.spots.iter().map(shape));
         let (spots, area_px2) = (&mut self.spots, self.response.as_slice().len() as f64);
         self.elongation.judge(&self.shapes, area_px2, |i, doubt| spots[i].doubt = doubt);
     }

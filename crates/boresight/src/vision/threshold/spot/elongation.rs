@@ -1,7 +1,8 @@
 //! Spots that are longer than the others of a frame: two that make one peak, and what that adds to the covariance of the position.
 //!
 //! Source: our own. Of two alike at the distance d the position found lies between, d/2 from either, and their light has the variance d²/4 more along the line between them than that of one: by as
-//! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc; what the disc's edge hides of it is made good as for a Gaussian.
+//! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc of [`REACH`] deviations of the frame's own spots, which the smallest disc tells; what the
+//! disc's edge hides of it is made good as for a Gaussian.
 //! Longer than usual: the difference of the eigenvalues of the moments stands [`SURE`] robust deviations above the median of the frame's spots; that holds what noise and the optics do. A fainter spot's is by as much
 //! less certain as it is fainter. Not all that are long are two: of n spots in an area A some n² π D² / 2A are pairs nearer than D by chance, D twice the deviation of a spot's response (C. M. Sparrow, *Astrophys. J.* 44,
 //! 1916: up to there two Gaussians have one peak), or what the detector makes one peak of; if more are long, each may be two with the probability that remains.
@@ -22,6 +23,16 @@ const LEAST: usize = 16;
 const SURE: f64 = 3.0;
 /// Another peak is near within this many radii of the disc.
 const NEAR: f64 = 1.5;
+/// Radius of the disc in deviations of a spot's response: two thirds of an elongation are seen there. With 1.5, an eighth, noise hides pairs up to 1.4 deviations apart; with 4 it hides more again, and neighbours lie within.
+const REACH: f64 = 2.5;
+/// Largest radius in units of the size: 2.5 deviations of a spot whose size is its width, with what the filter's box adds.
+const LARGEST: f64 = 0.75;
+/// Radii that are chosen among.
+const RADII: usize = 3;
+/// So many spots tell how wide they are: to 2 % where each differs by a sixth.
+const ENOUGH: usize = 64;
+/// Largest radius whose table is computed, px; those of larger ones are its, scaled.
+const COMPUTED: usize = 16;
 /// Steps of the table of Gaussians: variances from a hundredth of the squared radius to twice it.
 const STEPS: usize = 24;
 const VARIANCES: [f64; 2] = [0.01, 2.0];
@@ -43,24 +54,35 @@ impl Moments2 {
     }
 }
 
+/// A disc that moments are taken in.
+#[derive(Clone, Debug)]
+struct Window {
+    /// Radius, px.
+    radius: usize,
+    /// Of Gaussians that grow: the mean eigenvalue of the moments in the disc, px², the part of an elongation that is seen there, and the variance, px².
+    table: [[f64; 3]; STEPS],
+}
+
 /// What is usual, and what the disc's edge hides.
 #[derive(Clone, Debug)]
 pub(super) struct Elongation {
-    /// Radius of the disc, px.
-    radius: usize,
+    /// From the smallest to the largest.
+    windows: [Window; RADII],
+    /// Which of them suits the frame.
+    chosen: usize,
     /// Of peaks within this distance the detector takes the larger one, px.
     one_px: f64,
-    /// Of Gaussians that grow: the mean eigenvalue of the moments in the disc, the part of an elongation that is seen there, and the variance, px².
-    table: [[f64; 3]; STEPS],
     values: Vec<f32>,
 }
 
-impl Elongation {
-    pub(super) fn new(radius: usize, one_px: f64) -> Self {
-        let r2 = (radius * radius) as f64;
+impl Window {
+    fn new(radius: usize) -> Self {
+        let computed = radius.min(COMPUTED);
+        let larger = (radius as f64 / computed as f64).powi(2);
+        let r2 = (computed * computed) as f64;
         let ratio = (VARIANCES[1] / VARIANCES[0]).powf(1.0 / (STEPS - 1) as f64);
-        let side = 2 * radius + 3;
-        let c = Vector2::new(radius as f64 + 1.0, radius as f64 + 1.0);
+        let side = 2 * computed + 3;
+        let c = Vector2::new(computed as f64 + 1.0, computed as f64 + 1.0);
         let table = std::array::from_fn(|i| {
             let across = VARIANCES[0] * ratio.powi(i as i32) * r2;
             let of = |along: f64| {
@@ -69,21 +91,64 @@ impl Elongation {
                     (-0.5 * (x * x / along + y * y / across)).exp() as f32
                 };
                 let image = Image::from_vec(side, side, (0..side * side).map(value).collect());
-                image.map_or(Moments2::default(), |image| second_moments(&image, radius, c))
+                image.map_or(Moments2::default(), |image| second_moments(&image, computed, c))
             };
-            [of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across), across]
+            let part = of(LONGER * across).length() / ((LONGER - 1.0) * across);
+            [of(across).mean * larger, part, across * larger]
         });
-        Self { radius, one_px, table, values: Vec::new() }
+        Self { radius, table }
     }
 
     /// Another peak is near up to this distance, px.
-    pub(super) fn alone_px(&self) -> usize {
+    fn alone_px(&self) -> usize {
         (NEAR * self.radius as f64).ceil() as usize
     }
 
-    /// The moments of a spot at a place.
-    pub(super) fn measure(&self, response: &Image<f32>, c: Vector2<f64>) -> Moments2 {
-        second_moments(response, self.radius, c)
+    /// The moments of a spot at a place, the square of the distance to the next peak being `nearest2` px²; none where that is near.
+    fn measure(&self, response: &Image<f32>, (c, nearest2): (Vector2<f64>, usize)) -> Option<Moments2> {
+        (nearest2 > self.alone_px().pow(2)).then(|| second_moments(response, self.radius, c))
+    }
+
+    /// Part of an elongation that the disc shows of a spot with that mean of the moments, and its variance, px².
+    fn of_gaussian(&self, mean: f64) -> [f64; 2] {
+        let k = self.table.partition_point(|t| t[0] < mean).clamp(1, STEPS - 1);
+        let (a, b) = (self.table[k - 1], self.table[k]);
+        let part = ((mean - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
+        [1, 2].map(|i| a[i] + part * (b[i] - a[i]))
+    }
+}
+
+impl Elongation {
+    /// For a detector of that size, px, whose smallest disc has that radius, px.
+    pub(super) fn new(smallest: usize, size_px: f64, one_px: f64) -> Self {
+        let smallest = smallest + 1;
+        let largest = ((LARGEST * size_px).round() as usize).max(smallest);
+        let radii = [smallest, smallest.midpoint(largest), largest];
+        Self { windows: radii.map(Window::new), chosen: 0, one_px, values: Vec::new() }
+    }
+
+    /// Another peak is near up to this distance at most, px.
+    pub(super) fn alone_px(&self) -> usize {
+        self.windows[RADII - 1].alone_px()
+    }
+
+    /// Chooses the disc for the spots of a frame: each one's place and the square of the distance to its next peak, px².
+    pub(super) fn suit(&mut self, response: &Image<f32>, spots: impl Iterator<Item = (Vector2<f64>, usize)>) {
+        self.chosen = 0;
+        let smallest = &self.windows[0];
+        let means = spots.filter_map(|s| smallest.measure(response, s)).take(ENOUGH).map(|m| m.mean);
+        let means = filled(&mut self.values, means);
+        if means.is_empty() {
+            return;
+        }
+        let [_, variance] = smallest.of_gaussian(f64::from(middle(means)));
+        let reach = REACH * variance.sqrt() + 0.5;
+        self.chosen = self.windows.iter().rposition(|w| w.radius as f64 <= reach).unwrap_or(0);
+    }
+
+    /// The moments of a spot at a place, the square of the distance to the next peak being `nearest2` px²; none where that is near.
+    pub(super) fn measure(&self, response: &Image<f32>, c: Vector2<f64>, nearest2: usize) -> Option<Moments2> {
+        self.windows[self.chosen].measure(response, (c, nearest2))
     }
 
     /// What is to be added to the covariance of each spot's position, px², from the moments of those that are asked and all masses, in a frame of that area, px².
@@ -102,7 +167,7 @@ impl Elongation {
         let mean = f64::from(middle(filled(values, asked().map(|(_, m, _)| m.mean))));
         let usual = median_and_deviation(filled(values, asked().map(|(_, m, _)| m.length())), 0.0);
         let (length, deviation) = (f64::from(usual.0), f64::from(usual.1));
-        let [shown, variance] = self.of_gaussian(mean);
+        let [shown, variance] = self.windows[self.chosen].of_gaussian(mean);
         let least_more = |own: f64| SURE * deviation * (mass / own).max(1.0);
         let long = || asked().filter(|(_, m, own)| m.length() - length > least_more(*own));
         let one2 = (4.0 * variance).max(self.one_px * self.one_px);
@@ -113,14 +178,6 @@ impl Elongation {
             let [c, s] = m.long.map(|e| e / m.length());
             put(i, Matrix2::new(1.0 + c, s, s, 1.0 - c) * (0.5 * two * (m.length() - length) / shown));
         }
-    }
-
-    /// Part of an elongation that the disc shows of a spot with that mean of the moments, and its variance, px².
-    fn of_gaussian(&self, mean: f64) -> [f64; 2] {
-        let k = self.table.partition_point(|t| t[0] < mean).clamp(1, STEPS - 1);
-        let (a, b) = (self.table[k - 1], self.table[k]);
-        let part = ((mean - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
-        [1, 2].map(|i| a[i] + part * (b[i] - a[i]))
     }
 }
 
@@ -179,12 +236,13 @@ mod tests {
 
     #[test]
     fn a_pair_is_as_uncertain_along_its_line_as_half_of_its_distance() {
-        let mut elongation = Elongation::new(4, 3.0);
-        let one = elongation.measure(&response(&[[0.0, 0.0]]), C);
+        let mut elongation = Elongation::new(3, 5.0, 3.0);
+        let one = elongation.measure(&response(&[[0.0, 0.0]]), C, usize::MAX).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for d in [2.0, 2.5, 3.0] {
             let along = Vector2::new(0.6, 0.8) * (0.5 * d);
-            let pair = elongation.measure(&response(&[[along.x, along.y], [-along.x, -along.y]]), C);
+            let pair = response(&[[along.x, along.y], [-along.x, -along.y]]);
+            let pair = elongation.measure(&pair, C, usize::MAX).unwrap();
             // The others differ by what noise does.
             let mut spots: Vec<(Option<Moments2>, f64)> = (0..40)
                 .map(|_| {
@@ -213,6 +271,27 @@ mod tests {
             assert!(added.iter().all(|(i, _)| *i != 0));
             // Of so few none is unusual.
             elongation.judge(&spots[..LEAST - 1], 1e4, |_, _| unreachable!());
+        }
+    }
+
+    #[test]
+    fn the_disc_holds_two_and_a_half_deviations_of_the_spots_whatever_size_is_looked_for() {
+        let response = response(&[[0.0, 0.0]]);
+        for (size_px, smallest) in [(3.5, 2), (4.5, 2), (6.0, 2), (8.6, 3)] {
+            let mut elongation = Elongation::new(smallest, size_px, 3.0);
+            elongation.suit(&response, [(C, usize::MAX)].into_iter());
+            let radius = elongation.windows[elongation.chosen].radius;
+            assert!((3..=4).contains(&radius), "{size_px}: {radius}");
+            elongation.suit(&response, [(C, 9)].into_iter());
+            assert_eq!(elongation.chosen, 0, "another is near");
+        }
+    }
+
+    #[test]
+    fn the_table_of_a_large_disc_is_a_small_ones_scaled() {
+        let (small, large) = (Window::new(COMPUTED), Window::new(2 * COMPUTED));
+        for (a, b) in small.table.iter().zip(large.table) {
+            assert!(b == [4.0 * a[0], a[1], 4.0 * a[2]], "{a:?} {b:?}");
         }
     }
 

@@ -131,7 +131,7 @@ fn neighbours_nearer_than_half_the_size_are_one_and_the_stronger_stays() {
                 score: 1.0,
                 peak: (x as usize, y as usize),
                 disc: LARGE,
-                shape: None,
+                nearest2: usize::MAX,
                 doubt: Matrix2::zeros(),
             })
             .collect();
@@ -277,7 +277,7 @@ fn size_peak_and_variance_are_read_from_the_response() {
         score: 4.0,
         peak: (29, 29),
         disc,
-        shape: None,
+        nearest2: usize::MAX,
         doubt,
     };
     let bright = d.detection(&frame, &spot(0.5), (3.0, 0.1), 1.0);
