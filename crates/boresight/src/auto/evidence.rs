@@ -7,6 +7,7 @@
 use super::chains::{Chain, Field};
 use super::first_scans::first;
 use super::ground::Ground;
+use super::quantile::quantile;
 use super::sightings::{Sighting, Sightings};
 use crate::camera::SteadyGround;
 use crate::{Scan, SourceInfo};
@@ -30,6 +31,9 @@ const STDS: f64 = 3.0;
 const LEAST_OF_GROUND: usize = 6;
 /// Share of the steps that may be faster than the speed called fastest.
 const FASTER_SHARE: f64 = 0.01;
+
+/// Steps of which the middle one is a chain's speed: two that a wrong detection made are fewer than half.
+const LEAST_STEPS: usize = 5;
 
 /// The chains of scans beside those of the same scans in other orders.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -190,6 +194,15 @@ impl Evidence {
         let all = ordered.len() as f64 - chance.len() as f64 / SURROGATES as f64;
         let fast = |n: &usize| excess(*n).is_some_and(|more| more >= FASTER_SHARE * all);
         (0..ordered.len()).find(fast).filter(|_| self.is_sure()).map(|n| ordered[n])
+    }
+
+    /// The speed that half of the steps of one chain exceed which chance does not explain, px/s, the largest of all such chains: one fast target among a hundred others is no hundredth of the steps.
+    pub fn fastest_chain_px_per_s(&self) -> Option<f64> {
+        let middle = |c: &Chain| {
+            let mut speeds = c.speeds_px_per_s.clone();
+            (speeds.len() >= LEAST_STEPS).then(|| quantile(&mut speeds, 0.5))
+        };
+        self.sure().filter_map(middle).max_by(f64::total_cmp)
     }
 
     /// In words, for the reasons of a choice.

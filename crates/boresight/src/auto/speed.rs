@@ -14,8 +14,9 @@ const RESERVE: f64 = 1.5;
 
 /// Raises the largest speed to what the chains of detections show; `unit` is what their positions are in.
 pub fn learn(evidence: &Evidence, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
+    let fastest = [evidence.fastest_px_per_s(), evidence.fastest_chain_px_per_s()];
     // Scans of one time (two sensors') would make any step infinitely fast.
-    let fastest = evidence.fastest_px_per_s().filter(|f| f.is_finite());
+    let fastest = fastest.into_iter().flatten().filter(|f| f.is_finite()).max_by(f64::total_cmp);
     let Some(fastest) = fastest else { return };
     let (speed, px) = (round(RESERVE * fastest), unit.sign());
     if speed > config.tracker.max_speed_px_per_s {
@@ -59,5 +60,26 @@ mod tests {
         // 350 px/s and half as much in reserve; its velocity is not known to less than 10 px/s from places of 0.3 px.
         assert!((525.0..560.0).contains(&fast) && said == 1, "{fast}");
         assert_eq!(learnt(2.0), (160.0, 0));
+    }
+
+    #[test]
+    fn one_fast_target_before_many_slow_ones_raises_it_too() {
+        // One in 141 of the steps is the fast one's.
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut place = || Vector2::new(640.0 * rng.random::<f64>(), 400.0 * rng.random::<f64>());
+        let slow: Vec<Vector2<f64>> = (0..140).map(|_| place()).collect();
+        let scans: Vec<Scan> = (0..60u64)
+            .map(|k| {
+                let mut all: Vec<_> = slow.iter().map(|p| p + Vector2::new(1.5 * k as f64, 0.0)).collect();
+                all.push(Vector2::new(40.0 + 8.0 * k as f64, 37.0));
+                let all = all.into_iter().map(|at| Detection::at(at, Matrix2::identity() * 0.01)).collect();
+                Scan::at(FrameIndex(k), Timestamp::from_secs_f64(0.04 * k as f64)).with_detections(all)
+            })
+            .collect();
+        let (mut config, mut reasons) = (Config::default(), Vec::new());
+        config.tracker.max_speed_px_per_s = 60.0;
+        learn(&Evidence::of_scans(&scans, 740.0 * 420.0), LengthUnit::Pixel, &mut config, &mut reasons);
+        let fast = config.tracker.max_speed_px_per_s;
+        assert!((290.0..=310.0).contains(&fast), "200 px/s and half as much in reserve: {fast}");
     }
 }

@@ -2,11 +2,11 @@
 //!
 //! Source: our own; the motions are told apart by [`super::persistence`], from tracks. Each motion has the tracks that it can follow: those whose velocity is forgotten leave one of constant velocity at
 //! their longer steps, and among many that diffuse or rest those that go somewhere leave the other one. So the scans are followed again, and in the end both are asked how much likelier the
-//! detections are as those of their tracks than as clutter.
+//! detections are as those of their tracks than as clutter; with constant velocity each target may rest or go, which is not known.
 //! Limits: one motion for all targets, the one that explains more.
 
 use super::super::first_scans::PROBE_FRAMES;
-use super::fit::{MOST_STEPS, Motion, Noise, Step, log_likelihood, n_judged};
+use super::fit::{LEAST, MOST_STEPS, Motion, Noise, Step, log_likelihood, n_judged};
 use super::follow::follow;
 use super::forgotten::Persistence;
 use super::given::put;
@@ -53,15 +53,26 @@ pub(super) fn forgetful(
     // What it costs to take a detection for clutter, as many of which lie about as there are detections of any kind.
     let n_detections: usize = scans.iter().map(|s| s.detections.len()).sum();
     let density = n_detections as f64 / (scans.len().max(1) as f64 * area_px2);
-    let mut gain = |noise: &Noise, model: ModelConfig, motion: Motion| -> Result<f64> {
+    let mut gain = |noise: &Noise, model: ModelConfig, motions: &[Motion]| -> Result<f64> {
         put(noise, least_density, &mut config);
         config.filter.model = model;
         let series = series_of(scans, &config)?;
-        Ok(log_likelihood(&series, noise, motion, area_px2) - n_judged(&series) as f64 * density.ln())
+        let likelihood = |t: &Vec<Step>| {
+            either(motions.iter().map(|m| log_likelihood(std::slice::from_ref(t), noise, *m, area_px2)))
+        };
+        Ok(series.iter().map(likelihood).sum::<f64>() - n_judged(&series) as f64 * density.ln())
     };
-    let forgets = gain(&found.0, found.1.model(), Motion::Persistent(found.1))?;
-    let stays = gain(driven, ModelConfig::default(), Motion::Accelerated(speed_std))?;
+    let forgets = gain(&found.0, found.1.model(), &[Motion::Persistent(found.1)])?;
+    // Of many that rest each is likelier without a velocity by some nats, and those that go somewhere would be lost for that.
+    let stays = gain(driven, ModelConfig::default(), &[Motion::Accelerated(speed_std), Motion::Accelerated(LEAST)])?;
     Ok((forgets > stays).then_some(found))
+}
+
+/// Logarithm of a likelihood of which only is known that it is one of these, each as likely as the others.
+fn either(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    let (n, sum) = logs.fold((0.0, 0.0), |(n, sum), l| (n + 1.0, sum + (l - most).exp()));
+    most + f64::ln(sum / n)
 }
 
 /// The positions of the tracks that a configuration confirms.

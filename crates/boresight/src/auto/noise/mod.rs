@@ -218,12 +218,12 @@ mod tests {
         assert_eq!(learnt(0.0), (0.0, false));
     }
 
-    /// What is learnt of twelve far from each other with steps of `step_px` an axis, and of so many that go 6 px in each of 150 scans.
-    fn learnt_of(step_px: f64, n_going: usize, motions: Motions) -> TrackerConfig {
+    /// What is learnt of so many far from each other with steps of `step_px` an axis, and of others that go 6 px in each of 150 scans.
+    fn learnt_of(n: usize, step_px: f64, n_going: usize, motions: Motions) -> TrackerConfig {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
         let mut normal = || rng.sample::<f64, _>(StandardNormal);
         let mut at: Vec<[f64; 2]> =
-            (0..12).map(|i| [100.0 + 200.0 * f64::from(i % 4), 100.0 + 200.0 * f64::from(i / 4)]).collect();
+            (0..n).map(|i| [100.0 + 200.0 * (i % 4) as f64, 100.0 + 200.0 * (i / 4) as f64]).collect();
         let scans: Vec<Scan> = (0..150_u64)
             .map(|k| {
                 at.iter_mut().flatten().for_each(|v| *v += step_px * normal());
@@ -245,19 +245,21 @@ mod tests {
     #[test]
     fn particles_that_diffuse_are_followed_again_until_what_is_learnt_stays() {
         // What is assumed at first loses one step in three.
-        let tracker = learnt_of(1.2, 0, Motions::DrivenOrForgetful);
+        let tracker = learnt_of(12, 1.2, 0, Motions::DrivenOrForgetful);
         let ModelConfig::OrnsteinUhlenbeck(c) = &tracker.filter.model else { panic!("{:?}", tracker.filter) };
         let grows = 2.0 * c.speed_std_px_per_s.powi(2) * c.memory_s;
         assert!((grows / 36.0).ln().abs() < 0.1, "1.2² px² in 0.04 s: {grows} px²/s");
         let std = (0.01 * tracker.detection_covariance_scale + tracker.extra_noise_px.powi(2)).sqrt();
         assert!(std < 0.25, "0.1 px is the truth: {std}");
-        assert!(learnt_of(1.2, 0, Motions::Driven).filter.is_constant_velocity());
+        assert!(learnt_of(12, 1.2, 0, Motions::Driven).filter.is_constant_velocity());
     }
 
     #[test]
     fn before_many_at_rest_those_that_go_are_followed() {
-        let forgets = |n_going| !learnt_of(0.0, n_going, Motions::DrivenOrForgetful).filter.is_constant_velocity();
-        assert!(forgets(0), "what rests has no velocity");
-        assert!(!forgets(3), "of what goes 6 px a scan nothing would be followed");
+        let forgets =
+            |n, n_going| !learnt_of(n, 0.0, n_going, Motions::DrivenOrForgetful).filter.is_constant_velocity();
+        assert!(forgets(12, 0), "what rests has no velocity");
+        assert!(!forgets(12, 3), "of what goes 6 px a scan nothing would be followed");
+        assert!(!forgets(200, 1), "nor of one, however many rest");
     }
 }
