@@ -23,8 +23,8 @@ pub struct Clip {
 /// Quantiser of the simulated videos: 50 spots at 1080p are some 5 Mbit/s.
 const QUANTISER: u8 = 26;
 
-/// The clips, the simulated ones of `frames` frames.
-pub fn clips(folder: &Path, frames: u64) -> Result<Vec<Clip>> {
+/// The clips whose names are wanted, the simulated ones of `frames` frames.
+pub fn clips(folder: &Path, frames: u64, wanted: impl Fn(&str) -> bool) -> Result<Vec<Clip>> {
     std::fs::create_dir_all(folder)?;
     let mut clips = vec![Clip {
         name: "sample, 320 x 256",
@@ -38,6 +38,7 @@ pub fn clips(folder: &Path, frames: u64) -> Result<Vec<Clip>> {
     if pets.exists() {
         clips.push(Clip { name: "PETS09, 768 x 576, by ffmpeg", input: pets, frames: 795, is_video: true, given: &[] });
     }
+    clips.retain(|c| wanted(c.name));
     const BAND: &[&str] = &["detector.threshold.band={low=90,high=255}"];
     for (name, scene, video, given) in [
         ("50 spots, 1080p", spots((1920, 1080), 50, "mean = 30.0\nstd = 4.0", 8), true, BAND),
@@ -47,6 +48,9 @@ pub fn clips(folder: &Path, frames: u64) -> Result<Vec<Clip>> {
         ("5000 particles, 1080p, raw", spots((1920, 1080), 5000, "mean = 30.0\nstd = 4.0", 8), false, BAND),
         ("16 bit, 640 x 512, raw", spots((640, 512), 10, "mean = 8000.0\nstd = 60.0", 16), false, &[]),
     ] {
+        if !wanted(name) {
+            continue;
+        }
         let slug: String = name.chars().filter(char::is_ascii_alphanumeric).collect();
         let input = folder.join(format!("{slug}-{frames}{}", if video { ".mp4" } else { "" }));
         if !input.exists() {

@@ -68,10 +68,15 @@ pub fn run(args: &Args) -> Result<()> {
         println!("{}", serde_json::to_string(&measure_here(command)?)?);
         return Ok(());
     }
+    ensure!(
+        args.program.exists(),
+        "there is no program {}: `cargo build --release -p boresight-cli` makes it, or name one with --program",
+        args.program.display()
+    );
     println!("| clip | work | CPU, ms a frame | wall, ms a frame | beside decoding alone: CPU, wall | peak, MB |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    let wanted = |c: &Clip| args.only.as_ref().is_none_or(|o| c.name.contains(o.as_str()));
-    for clip in clips(&args.folder, args.frames)?.iter().filter(|c| wanted(c)) {
+    let wanted = |name: &str| args.only.as_ref().is_none_or(|o| name.contains(o.as_str()));
+    for clip in &clips(&args.folder, args.frames, wanted)? {
         let decoding = rows(args, clip)?;
         println!("| | | | | {} frames, decoding {:.0} frames/s | |", clip.frames, clip.frames as f64 / decoding.wall_s);
     }
@@ -126,7 +131,7 @@ fn rows(args: &Args, clip: &Clip) -> Result<Cost> {
             }
         }
     }
-    let alone = costs[0].context("the clip cannot be decoded")?;
+    let alone = costs[0].with_context(|| format!("{} cannot be decoded", clip.input.display()))?;
     for ((name, _), cost) in jobs.iter().zip(&costs) {
         let Some(c) = cost else { continue };
         let a_frame = 1e3 / clip.frames as f64;
