@@ -68,15 +68,20 @@ pub fn run(args: &Args) -> Result<()> {
         println!("{}", serde_json::to_string(&measure_here(command)?)?);
         return Ok(());
     }
-    ensure!(
-        args.program.exists(),
-        "there is no program {}: `cargo build --release -p boresight-cli` makes it, or name one with --program",
-        args.program.display()
-    );
+    for program in [Some(&args.program), args.before.as_ref(), args.python.as_ref()].into_iter().flatten() {
+        // A bare name is looked for along the path.
+        ensure!(
+            program.exists() || program.components().count() == 1,
+            "there is no program {}: `cargo build --release -p boresight-cli` makes target/release/boresight",
+            program.display()
+        );
+    }
     println!("| clip | work | CPU, ms a frame | wall, ms a frame | beside decoding alone: CPU, wall | peak, MB |");
     println!("| --- | --- | --- | --- | --- | --- |");
     let wanted = |name: &str| args.only.as_ref().is_none_or(|o| name.contains(o.as_str()));
-    for clip in &clips(&args.folder, args.frames, wanted)? {
+    let clips = clips(&args.folder, args.frames, wanted)?;
+    ensure!(!clips.is_empty(), "no clip has a name with {:?} in it", args.only.as_deref().unwrap_or_default());
+    for clip in &clips {
         let decoding = rows(args, clip)?;
         println!("| | | | | {} frames, decoding {:.0} frames/s | |", clip.frames, clip.frames as f64 / decoding.wall_s);
     }

@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(Tempo::of_times(minutes(6)), Tempo::of(4.0), "gaps that grow");
     }
 
-    #[cfg(any(feature = "draw", feature = "encode"))]
+    #[cfg(feature = "encode")]
     #[test]
     fn the_first_frames_tell_the_pace() {
         let mut pace = Pace::default();

@@ -31,7 +31,6 @@ const STDS: f64 = 3.0;
 const LEAST_OF_GROUND: usize = 6;
 /// Share of the steps that may be faster than the speed called fastest.
 const FASTER_SHARE: f64 = 0.01;
-
 /// Steps of which the middle one is a chain's speed: two that a wrong detection made are fewer than half.
 const LEAST_STEPS: usize = 5;
 
@@ -202,7 +201,8 @@ impl Evidence {
             let mut speeds = c.speeds_px_per_s.clone();
             (speeds.len() >= LEAST_STEPS).then(|| quantile(&mut speeds, 0.5))
         };
-        self.sure().filter_map(middle).max_by(f64::total_cmp)
+        // Scans of one time (two sensors') make a step infinitely fast.
+        self.sure().filter_map(middle).filter(|s| s.is_finite()).max_by(f64::total_cmp)
     }
 
     /// In words, for the reasons of a choice.

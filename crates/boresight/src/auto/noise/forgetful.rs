@@ -2,7 +2,7 @@
 //!
 //! Source: our own; the motions are told apart by [`super::persistence`], from tracks. Each motion has the tracks that it can follow: those whose velocity is forgotten leave one of constant velocity at
 //! their longer steps, and among many that diffuse or rest those that go somewhere leave the other one. So the scans are followed again, and in the end both are asked how much likelier the
-//! detections are as those of their tracks than as clutter; with constant velocity each target may rest or go, which is not known.
+//! detections are as those of their tracks than as clutter; with constant velocity each target may rest or go, as many as the scans tell.
 //! Limits: one motion for all targets, the one that explains more.
 
 use super::super::first_scans::PROBE_FRAMES;
@@ -16,6 +16,8 @@ use crate::{Result, Scan};
 
 /// How often targets whose velocity is forgotten are followed again: each time the steps that were lost are nearer to none.
 const MOST_ROUNDS: usize = 6;
+/// Rounds in which the shares of motions are found: each target tells by some nats which it has, so they stay after a few.
+const ROUNDS_OF_SHARES: usize = 10;
 
 /// Noise and motion of targets whose velocity is forgotten, if the series are of such ones. What was assumed before has lost them at their longer steps, and those that are left look like noise
 /// around a course: they are followed again with the simplest motion found, until that stays, and only then another may explain more.
@@ -57,10 +59,11 @@ pub(super) fn forgetful(
         put(noise, least_density, &mut config);
         config.filter.model = model;
         let series = series_of(scans, &config)?;
-        let likelihood = |t: &Vec<Step>| {
-            either(motions.iter().map(|m| log_likelihood(std::slice::from_ref(t), noise, *m, area_px2)))
+        let of = |motion: &Motion| -> Vec<f64> {
+            series.iter().map(|t| log_likelihood(std::slice::from_ref(t), noise, *motion, area_px2)).collect()
         };
-        Ok(series.iter().map(likelihood).sum::<f64>() - n_judged(&series) as f64 * density.ln())
+        let likelihoods: Vec<Vec<f64>> = motions.iter().map(of).collect();
+        Ok(mixed(&likelihoods) - n_judged(&series) as f64 * density.ln())
     };
     let forgets = gain(&found.0, found.1.model(), &[Motion::Persistent(found.1)])?;
     // Of many that rest each is likelier without a velocity by some nats, and those that go somewhere would be lost for that.
@@ -68,11 +71,27 @@ pub(super) fn forgetful(
     Ok((forgets > stays).then_some(found))
 }
 
-/// Logarithm of a likelihood of which only is known that it is one of these, each as likely as the others.
-fn either(logs: impl Iterator<Item = f64> + Clone) -> f64 {
-    let most = logs.clone().fold(f64::NEG_INFINITY, f64::max);
-    let (n, sum) = logs.fold((0.0, 0.0), |(n, sum), l| (n + 1.0, sum + (l - most).exp()));
-    most + f64::ln(sum / n)
+/// Logarithm of the likelihood of targets each of which has one of some motions, from the logarithm for each motion and target; the shares of the motions are those that make it largest
+/// (expectation maximisation: Dempster, Laird, Rubin, *J. R. Stat. Soc. B* 39, 1977).
+fn mixed(logs: &[Vec<f64>]) -> f64 {
+    let n = logs.first().map_or(0, Vec::len);
+    let mut shares = vec![1.0 / logs.len() as f64; logs.len()];
+    let mut sum = 0.0;
+    for _ in 0..ROUNDS_OF_SHARES {
+        let mut counts = vec![0.0; logs.len()];
+        sum = 0.0;
+        for i in 0..n {
+            let most = logs.iter().map(|l| l[i]).fold(f64::NEG_INFINITY, f64::max);
+            let each = |(l, share): (&Vec<f64>, &f64)| share * (l[i] - most).exp();
+            let all: f64 = logs.iter().zip(&shares).map(each).sum();
+            sum += most + all.ln();
+            counts.iter_mut().zip(logs.iter().zip(&shares)).for_each(|(c, both)| *c += each(both) / all);
+        }
+        // None is left out for good: half a target has each.
+        let whole = n as f64 + 0.5 * logs.len() as f64;
+        shares.iter_mut().zip(counts).for_each(|(s, c)| *s = (c + 0.5) / whole);
+    }
+    sum
 }
 
 /// The positions of the tracks that a configuration confirms.

@@ -238,7 +238,8 @@ mod tests {
         let mut config = Config::default();
         config.tracker.acceleration_density_px2_per_s3 = 100.0;
         config.tracker.max_speed_px_per_s = 150.0;
-        learn(&scans, 6e5, LengthUnit::Pixel, motions, &mut config, &mut Vec::new()).unwrap();
+        let area_px2 = 1000.0 * 200.0 * (n / 4) as f64;
+        learn(&scans, area_px2, LengthUnit::Pixel, motions, &mut config, &mut Vec::new()).unwrap();
         config.tracker
     }
 
@@ -260,6 +261,6 @@ mod tests {
             |n, n_going| !learnt_of(n, 0.0, n_going, Motions::DrivenOrForgetful).filter.is_constant_velocity();
         assert!(forgets(12, 0), "what rests has no velocity");
         assert!(!forgets(12, 3), "of what goes 6 px a scan nothing would be followed");
-        assert!(!forgets(200, 1), "nor of one, however many rest");
+        assert!(!forgets(600, 1), "nor of one before hundreds at rest");
     }
 }

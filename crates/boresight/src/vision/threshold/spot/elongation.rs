@@ -1,7 +1,7 @@
 //! Spots that are longer than the others of a frame: two that make one peak, and what that adds to the covariance of the position.
 //!
 //! Source: our own. Of two alike at the distance d the position found lies between, d/2 from either, and their light has the variance d²/4 more along the line between them than that of one: by as
-//! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc of [`REACH`] deviations of the frame's own spots, which the smallest disc tells; what the
+//! much as a spot's light is spread more than usual its place is uncertain. Spread: second moments of the positive response in a disc of some [`REACH`] deviations of the frame's own spots, which the smallest disc tells; what the
 //! disc's edge hides of it is made good as for a Gaussian.
 //! Longer than usual: the difference of the eigenvalues of the moments stands [`SURE`] robust deviations above the median of the frame's spots; that holds what noise and the optics do. A fainter spot's is by as much
 //! less certain as it is fainter. Not all that are long are two: of n spots in an area A some n² π D² / 2A are pairs nearer than D by chance, D twice the deviation of a spot's response (C. M. Sparrow, *Astrophys. J.* 44,
@@ -23,13 +23,13 @@ const LEAST: usize = 16;
 const SURE: f64 = 3.0;
 /// Another peak is near within this many radii of the disc.
 const NEAR: f64 = 1.5;
-/// Radius of the disc in deviations of a spot's response: two thirds of an elongation are seen there. With 1.5, an eighth, noise hides pairs up to 1.4 deviations apart; with 4 it hides more again, and neighbours lie within.
+/// Radius of the disc in deviations of a spot's response: half of an elongation is seen there. With 1.5, an eighth, noise hides pairs up to 1.4 deviations apart; with 4 it hides more again, and neighbours lie within.
 const REACH: f64 = 2.5;
-/// Largest radius in units of the size: 2.5 deviations of a spot whose size is its width, with what the filter's box adds.
-const LARGEST: f64 = 0.75;
-/// Radii that are chosen among.
-const RADII: usize = 3;
-/// So many spots tell how wide they are: to 2 % where each differs by a sixth.
+/// Largest radius in units of the size: 2.5 deviations of a spot whose size is its width at half height, whose response the surround makes narrower than itself.
+const LARGEST: f64 = 0.9;
+/// Radii that are chosen among, evenly from the smallest to the largest.
+const RADII: usize = 5;
+/// So many spots tell their variance: to 3 % where each differs by a sixth.
 const ENOUGH: usize = 64;
 /// Largest radius whose table is computed, px; those of larger ones are its, scaled.
 const COMPUTED: usize = 16;
@@ -56,7 +56,7 @@ impl Moments2 {
 
 /// A disc that moments are taken in.
 #[derive(Clone, Debug)]
-struct Window {
+struct MomentsDisc {
     /// Radius, px.
     radius: usize,
     /// Of Gaussians that grow: the mean eigenvalue of the moments in the disc, px², the part of an elongation that is seen there, and the variance, px².
@@ -67,7 +67,7 @@ struct Window {
 #[derive(Clone, Debug)]
 pub(super) struct Elongation {
     /// From the smallest to the largest.
-    windows: [Window; RADII],
+    discs: [MomentsDisc; RADII],
     /// Which of them suits the frame.
     chosen: usize,
     /// Of peaks within this distance the detector takes the larger one, px.
@@ -75,28 +75,31 @@ pub(super) struct Elongation {
     values: Vec<f32>,
 }
 
-impl Window {
+/// See [`MomentsDisc::table`], for a disc of that radius, px.
+fn table(radius: usize) -> [[f64; 3]; STEPS] {
+    let r2 = (radius * radius) as f64;
+    let ratio = (VARIANCES[1] / VARIANCES[0]).powf(1.0 / (STEPS - 1) as f64);
+    let side = 2 * radius + 3;
+    let c = Vector2::new(radius as f64 + 1.0, radius as f64 + 1.0);
+    std::array::from_fn(|i| {
+        let across = VARIANCES[0] * ratio.powi(i as i32) * r2;
+        let of = |along: f64| {
+            let value = |p: usize| {
+                let (x, y) = ((p % side) as f64 - c.x, (p / side) as f64 - c.y);
+                (-0.5 * (x * x / along + y * y / across)).exp() as f32
+            };
+            let image = Image::from_vec(side, side, (0..side * side).map(value).collect());
+            image.map_or(Moments2::default(), |image| second_moments(&image, radius, c))
+        };
+        [of(across).mean, of(LONGER * across).length() / ((LONGER - 1.0) * across), across]
+    })
+}
+
+impl MomentsDisc {
     fn new(radius: usize) -> Self {
         let computed = radius.min(COMPUTED);
         let larger = (radius as f64 / computed as f64).powi(2);
-        let r2 = (computed * computed) as f64;
-        let ratio = (VARIANCES[1] / VARIANCES[0]).powf(1.0 / (STEPS - 1) as f64);
-        let side = 2 * computed + 3;
-        let c = Vector2::new(computed as f64 + 1.0, computed as f64 + 1.0);
-        let table = std::array::from_fn(|i| {
-            let across = VARIANCES[0] * ratio.powi(i as i32) * r2;
-            let of = |along: f64| {
-                let value = |p: usize| {
-                    let (x, y) = ((p % side) as f64 - c.x, (p / side) as f64 - c.y);
-                    (-0.5 * (x * x / along + y * y / across)).exp() as f32
-                };
-                let image = Image::from_vec(side, side, (0..side * side).map(value).collect());
-                image.map_or(Moments2::default(), |image| second_moments(&image, computed, c))
-            };
-            let part = of(LONGER * across).length() / ((LONGER - 1.0) * across);
-            [of(across).mean * larger, part, across * larger]
-        });
-        Self { radius, table }
+        Self { radius, table: table(computed).map(|[mean, part, across]| [mean * larger, part, across * larger]) }
     }
 
     /// Another peak is near up to this distance, px.
@@ -104,9 +107,14 @@ impl Window {
         (NEAR * self.radius as f64).ceil() as usize
     }
 
-    /// The moments of a spot at a place, the square of the distance to the next peak being `nearest2` px²; none where that is near.
+    /// Whether no other peak is near, the square of the distance to the next being that, px².
+    fn is_alone(&self, nearest2: usize) -> bool {
+        nearest2 > self.alone_px().pow(2)
+    }
+
+    /// The moments of a spot at a place, with the square of the distance to its next peak, px²; none where that is near.
     fn measure(&self, response: &Image<f32>, (c, nearest2): (Vector2<f64>, usize)) -> Option<Moments2> {
-        (nearest2 > self.alone_px().pow(2)).then(|| second_moments(response, self.radius, c))
+        self.is_alone(nearest2).then(|| second_moments(response, self.radius, c))
     }
 
     /// Part of an elongation that the disc shows of a spot with that mean of the moments, and its variance, px².
@@ -123,32 +131,40 @@ impl Elongation {
     pub(super) fn new(smallest: usize, size_px: f64, one_px: f64) -> Self {
         let smallest = smallest + 1;
         let largest = ((LARGEST * size_px).round() as usize).max(smallest);
-        let radii = [smallest, smallest.midpoint(largest), largest];
-        Self { windows: radii.map(Window::new), chosen: 0, one_px, values: Vec::new() }
+        let radius = |i: usize| smallest + (i * (largest - smallest) + (RADII - 1) / 2) / (RADII - 1);
+        let discs = std::array::from_fn(|i| MomentsDisc::new(radius(i)));
+        Self { discs, chosen: 0, one_px, values: Vec::new() }
     }
 
     /// Another peak is near up to this distance at most, px.
     pub(super) fn alone_px(&self) -> usize {
-        self.windows[RADII - 1].alone_px()
+        self.discs[RADII - 1].alone_px()
     }
 
-    /// Chooses the disc for the spots of a frame: each one's place and the square of the distance to its next peak, px².
-    pub(super) fn suit(&mut self, response: &Image<f32>, spots: impl Iterator<Item = (Vector2<f64>, usize)>) {
+    /// Chooses the disc for the spots of a frame: each one's place and the square of the distance to its next peak, px². It is a smaller one where too few stand alone.
+    pub(super) fn suit(
+        &mut self,
+        response: &Image<f32>,
+        spots: impl ExactSizeIterator<Item = (Vector2<f64>, usize)> + Clone,
+    ) {
+        let smallest = &self.discs[0];
+        let some = spots.clone().step_by(spots.len().div_ceil(ENOUGH).max(1));
+        let means = filled(&mut self.values, some.filter_map(|s| smallest.measure(response, s)).map(|m| m.mean));
         self.chosen = 0;
-        let smallest = &self.windows[0];
-        let means = spots.filter_map(|s| smallest.measure(response, s)).take(ENOUGH).map(|m| m.mean);
-        let means = filled(&mut self.values, means);
         if means.is_empty() {
             return;
         }
         let [_, variance] = smallest.of_gaussian(f64::from(middle(means)));
         let reach = REACH * variance.sqrt() + 0.5;
-        self.chosen = self.windows.iter().rposition(|w| w.radius as f64 <= reach).unwrap_or(0);
+        let suits = |d: &MomentsDisc| {
+            d.radius as f64 <= reach && spots.clone().filter(|s| d.is_alone(s.1)).nth(LEAST - 1).is_some()
+        };
+        self.chosen = self.discs.iter().rposition(suits).unwrap_or(0);
     }
 
-    /// The moments of a spot at a place, the square of the distance to the next peak being `nearest2` px²; none where that is near.
+    /// The moments of a spot in the disc that was chosen.
     pub(super) fn measure(&self, response: &Image<f32>, c: Vector2<f64>, nearest2: usize) -> Option<Moments2> {
-        self.windows[self.chosen].measure(response, (c, nearest2))
+        self.discs[self.chosen].measure(response, (c, nearest2))
     }
 
     /// What is to be added to the covariance of each spot's position, px², from the moments of those that are asked and all masses, in a frame of that area, px².
@@ -159,7 +175,8 @@ impl Elongation {
         mut put: impl FnMut(usize, Matrix2<f64>),
     ) {
         let asked = || spots.iter().enumerate().filter_map(|(i, (m, mass))| m.map(|m| (i, m, *mass)));
-        if asked().count() < LEAST {
+        let n_asked = asked().count();
+        if n_asked < LEAST {
             return;
         }
         let values = &mut self.values;
@@ -167,11 +184,12 @@ impl Elongation {
         let mean = f64::from(middle(filled(values, asked().map(|(_, m, _)| m.mean))));
         let usual = median_and_deviation(filled(values, asked().map(|(_, m, _)| m.length())), 0.0);
         let (length, deviation) = (f64::from(usual.0), f64::from(usual.1));
-        let [shown, variance] = self.windows[self.chosen].of_gaussian(mean);
+        let [shown, variance] = self.discs[self.chosen].of_gaussian(mean);
         let least_more = |own: f64| SURE * deviation * (mass / own).max(1.0);
         let long = || asked().filter(|(_, m, own)| m.length() - length > least_more(*own));
         let one2 = (4.0 * variance).max(self.one_px * self.one_px);
-        let n_pairs = 0.5 * (spots.len() as f64).powi(2) * std::f64::consts::PI * one2 / area_px2;
+        // Of all pairs so many stand alone and are asked.
+        let n_pairs = 0.5 * (spots.len() * n_asked) as f64 * std::f64::consts::PI * one2 / area_px2;
         let two = (n_pairs / long().count().max(1) as f64).min(1.0);
         for (i, m, _) in long() {
             // Half of one and one along the axis, of the length 1.
@@ -274,24 +292,32 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_disc_holds_two_and_a_half_deviations_of_the_spots_whatever_size_is_looked_for() {
+    /// The number and the radius of the disc that is chosen for so many spots of 1.5 px with the next peak at that distance (px).
+    fn chosen(size_px: f64, n: usize, nearest_px: usize) -> (usize, usize) {
         let response = response(&[[0.0, 0.0]]);
-        for (size_px, smallest) in [(3.5, 2), (4.5, 2), (6.0, 2), (8.6, 3)] {
-            let mut elongation = Elongation::new(smallest, size_px, 3.0);
-            elongation.suit(&response, [(C, usize::MAX)].into_iter());
-            let radius = elongation.windows[elongation.chosen].radius;
-            assert!((3..=4).contains(&radius), "{size_px}: {radius}");
-            elongation.suit(&response, [(C, 9)].into_iter());
-            assert_eq!(elongation.chosen, 0, "another is near");
+        let mut elongation = Elongation::new(2, size_px, 3.0);
+        elongation.suit(&response, (0..n).map(|_| (C, nearest_px.pow(2))));
+        (elongation.chosen, elongation.discs[elongation.chosen].radius)
+    }
+
+    #[test]
+    fn the_disc_holds_two_and_a_half_deviations_of_the_spots_where_enough_stand_alone() {
+        // 2.5 of 1.5 px.
+        for size_px in [4.5, 6.0, 8.6] {
+            assert!(chosen(size_px, LEAST, 50).0 > 0, "{size_px}: {:?}", chosen(size_px, LEAST, 50));
+            assert_eq!(chosen(size_px, LEAST, 50).1, 4, "{size_px}");
         }
+        assert_eq!(chosen(6.0, LEAST - 1, 50), (0, 3), "too few");
+        assert_eq!(chosen(6.0, 50, 6), (0, 3), "others are near: 1.5 of 4 px");
+        assert_eq!(chosen(6.0, 0, 50), (0, 3));
     }
 
     #[test]
     fn the_table_of_a_large_disc_is_a_small_ones_scaled() {
-        let (small, large) = (Window::new(COMPUTED), Window::new(2 * COMPUTED));
-        for (a, b) in small.table.iter().zip(large.table) {
-            assert!(b == [4.0 * a[0], a[1], 4.0 * a[2]], "{a:?} {b:?}");
+        let large = MomentsDisc::new(2 * COMPUTED);
+        for (a, b) in table(2 * COMPUTED).iter().zip(large.table) {
+            assert!((b[0] / a[0] - 1.0).abs() < 0.01 && (b[1] - a[1]).abs() < 0.01, "{a:?} {b:?}");
+            assert!((b[2] / a[2] - 1.0).abs() < 1e-9, "{a:?} {b:?}");
         }
     }
 
