@@ -201,7 +201,7 @@ impl Evidence {
             let mut speeds = c.speeds_px_per_s.clone();
             (speeds.len() >= LEAST_STEPS).then(|| quantile(&mut speeds, 0.5))
         };
-        // Scans of one time (two sensors') make a step infinitely fast.
+        // Of one whose scans have one time the speed is infinite and says nothing.
         self.sure().filter_map(middle).filter(|s| s.is_finite()).max_by(f64::total_cmp)
     }
 

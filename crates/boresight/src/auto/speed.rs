@@ -14,9 +14,9 @@ const RESERVE: f64 = 1.5;
 
 /// Raises the largest speed to what the chains of detections show; `unit` is what their positions are in.
 pub fn learn(evidence: &Evidence, unit: LengthUnit, config: &mut Config, reasons: &mut Vec<String>) {
-    let fastest = [evidence.fastest_px_per_s(), evidence.fastest_chain_px_per_s()];
     // Scans of one time (two sensors') would make any step infinitely fast.
-    let fastest = fastest.into_iter().flatten().filter(|f| f.is_finite()).max_by(f64::total_cmp);
+    let of_all = evidence.fastest_px_per_s().filter(|f| f.is_finite());
+    let fastest = of_all.into_iter().chain(evidence.fastest_chain_px_per_s()).max_by(f64::total_cmp);
     let Some(fastest) = fastest else { return };
     let (speed, px) = (round(RESERVE * fastest), unit.sign());
     if speed > config.tracker.max_speed_px_per_s {

@@ -98,3 +98,28 @@ fn mixed(logs: &[Vec<f64>]) -> f64 {
 fn series_of(scans: &[Scan], config: &TrackerConfig) -> Result<Vec<Vec<Step>>> {
     Ok(follow(scans, config)?.into_values().map(|t| t.steps).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_those_that_make_the_likelihood_largest() {
+        // Of so many that rest by ten nats some go by 400.
+        for (n_rest, n_go) in [(2000, 1), (30, 30), (1, 200), (5, 0)] {
+            let likelihoods = |rest: f64, go: f64| [vec![rest; n_rest], vec![go; n_go]].concat();
+            let logs = [likelihoods(0.0, -400.0), likelihoods(-10.0, 0.0)];
+            let of = |share: f64| -> f64 {
+                let all = logs[0].iter().zip(&logs[1]);
+                all.map(|(rest, go)| (share * rest.exp() + (1.0 - share) * go.exp()).ln()).sum()
+            };
+            let most = (1..100_000).map(|i| of(f64::from(i) * 1e-5)).fold(f64::NEG_INFINITY, f64::max);
+            let found = mixed(&logs);
+            // What half a target of each costs, no more.
+            assert!(found <= most + 0.01 && found > most - 1.0, "{n_rest} {n_go}: {found}, {most}");
+            assert!(found > of(0.5) - 0.01, "{n_rest} {n_go}: {found}, {} of halves", of(0.5));
+        }
+        let one = [vec![-3.0, -4.5]];
+        assert!((mixed(&one) + 7.5).abs() < 1e-12, "of one motion it is the sum");
+    }
+}
