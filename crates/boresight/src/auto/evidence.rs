@@ -31,6 +31,8 @@ const STDS: f64 = 3.0;
 const LEAST_OF_GROUND: usize = 6;
 /// Share of the steps that may be faster than the speed called fastest.
 const FASTER_SHARE: f64 = 0.01;
+/// Chance's chains that are slower than this share of a chain's speed are of another kind.
+const SLOWER: f64 = 0.5;
 /// Steps of which the middle one is a chain's speed: two that a wrong detection made are fewer than half.
 const LEAST_STEPS: usize = 5;
 
@@ -43,8 +45,8 @@ pub struct Evidence {
     pub times_s: Vec<f64>,
     /// Mean number and gain (nats) of a surrogate's moving chains.
     pub by_chance: [f64; 2],
-    /// The largest gain of any of them, nats.
-    pub most_by_chance: f64,
+    /// Middle speed (px/s) and gain (nats) of each of them.
+    chains_by_chance: Vec<[f64; 2]>,
     /// Speeds of the steps of all surrogates' moving chains, px/s.
     speeds_by_chance: Vec<f64>,
 }
@@ -86,7 +88,7 @@ impl Evidence {
             order.sort_unstable();
             order.shuffle(&mut rng);
             for chain in field.chains(&order).into_iter().filter(|c| c.moves) {
-                out.most_by_chance = out.most_by_chance.max(chain.gain);
+                out.chains_by_chance.push([middle_px_per_s(&chain), chain.gain]);
                 out.by_chance[0] += 1.0 / SURROGATES as f64;
                 out.by_chance[1] += chain.gain / SURROGATES as f64;
                 out.speeds_by_chance.extend(chain.speeds_px_per_s);
@@ -98,10 +100,15 @@ impl Evidence {
     /// The chains of which each gains surely more than one by chance.
     ///
     /// By chance one gains more than g with e^(-g/κ): κ is 1 where false detections lie as the density says, and more where they come in swarms. The largest of n surrogates is about
-    /// κ ln n.
+    /// κ ln n. Chance is asked for those that are not much slower: what hardly moves is a chain in any order of the scans, and says nothing of what is fast.
     pub fn sure(&self) -> impl Iterator<Item = &Chain> {
-        let scale = (self.most_by_chance / (SURROGATES as f64).ln()).max(1.0);
-        self.moving.iter().filter(move |c| c.gain > self.most_by_chance + scale * SURE_GAIN)
+        self.moving.iter().filter(|c| {
+            let slowest = SLOWER * middle_px_per_s(c);
+            let as_fast = self.chains_by_chance.iter().filter(|b| b[0] >= slowest);
+            let most = as_fast.fold(0.0, |most: f64, b| most.max(b[1]));
+            let scale = (most / (SURROGATES as f64).ln()).max(1.0);
+            c.gain > most + scale * SURE_GAIN
+        })
     }
 
     /// Detections in chains that move.
@@ -197,12 +204,9 @@ impl Evidence {
 
     /// The speed that half of the steps of one chain exceed which chance does not explain, px/s, the largest of all such chains: one fast target among a hundred others is no hundredth of the steps.
     pub fn fastest_chain_px_per_s(&self) -> Option<f64> {
-        let middle = |c: &Chain| {
-            let mut speeds = c.speeds_px_per_s.clone();
-            (speeds.len() >= LEAST_STEPS).then(|| quantile(&mut speeds, 0.5))
-        };
+        let long = self.sure().filter(|c| c.speeds_px_per_s.len() >= LEAST_STEPS);
         // Of one whose scans have one time the speed is infinite and says nothing.
-        self.sure().filter_map(middle).filter(|s| s.is_finite()).max_by(f64::total_cmp)
+        long.map(middle_px_per_s).filter(|s| s.is_finite()).max_by(f64::total_cmp)
     }
 
     /// In words, for the reasons of a choice.
@@ -217,6 +221,11 @@ impl Evidence {
             self.by_chance[1]
         )
     }
+}
+
+/// The speed that half of a chain's steps exceed, px/s.
+fn middle_px_per_s(chain: &Chain) -> f64 {
+    quantile(&mut chain.speeds_px_per_s.clone(), 0.5)
 }
 
 #[cfg(test)]
@@ -297,6 +306,28 @@ mod tests {
             assert!(!e.is_sure() && e.fastest_px_per_s().is_none(), "{seed}: {}", e.words());
             assert_eq!(e.sure().count(), 0, "{seed}");
         }
+    }
+
+    #[test]
+    fn what_hardly_moves_is_a_chain_in_any_order_and_hides_nothing_that_is_fast() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let stars: Vec<Vector2<f64>> =
+            (0..120).map(|_| Vector2::from_fn(|_, _| 300.0 * (2.0 * rng.random::<f64>() - 1.0))).collect();
+        let scans: Vec<Sightings> = (0..90)
+            .map(|k| {
+                // They turn by 0.03 degrees a scan, at most 0.2 px; the one that goes does so at 5 px a scan.
+                let turn = nalgebra::Rotation2::new(5.2e-4 * f64::from(k));
+                let mut all: Vec<Vector2<f64>> = stars.iter().map(|s| turn * s).collect();
+                all.push(Vector2::new(-250.0 + 5.0 * f64::from(k), 40.0));
+                let sighting = |at| Sighting { at, variance: 0.05, side_px: 3.0, thickness_px: 3.0, score: 0.0 };
+                Sightings { time_s: 0.04 * f64::from(k), all: all.into_iter().map(sighting).collect() }
+            })
+            .collect();
+        let e = Evidence::of(&scans, 600.0 * 600.0);
+        let largest = e.chains_by_chance.iter().map(|c| c[1]).fold(0.0, f64::max);
+        assert!(largest > 100.0, "slow ones are chains in another order: {largest}");
+        let fastest = e.fastest_chain_px_per_s().unwrap();
+        assert!((fastest - 125.0).abs() < 1.0, "{fastest}");
     }
 
     #[test]
