@@ -70,17 +70,16 @@ pub fn run(args: &Args) -> Result<()> {
     }
     for program in [Some(&args.program), args.before.as_ref(), args.python.as_ref()].into_iter().flatten() {
         // A bare name is looked for along the path.
-        ensure!(
-            program.exists() || program.components().count() == 1,
-            "there is no program {}: `cargo build --release -p boresight-cli` makes target/release/boresight",
-            program.display()
-        );
+        Command::new(program).arg("--version").output().with_context(|| {
+            let made = "`cargo build --release -p boresight-cli` makes target/release/boresight";
+            format!("the program {} cannot be started: {made}", program.display())
+        })?;
     }
-    println!("| clip | work | CPU, ms a frame | wall, ms a frame | beside decoding alone: CPU, wall | peak, MB |");
-    println!("| --- | --- | --- | --- | --- | --- |");
     let wanted = |name: &str| args.only.as_ref().is_none_or(|o| name.contains(o.as_str()));
     let clips = clips(&args.folder, args.frames, wanted)?;
     ensure!(!clips.is_empty(), "no clip has a name with {:?} in it", args.only.as_deref().unwrap_or_default());
+    println!("| clip | work | CPU, ms a frame | wall, ms a frame | beside decoding alone: CPU, wall | peak, MB |");
+    println!("| --- | --- | --- | --- | --- | --- |");
     for clip in &clips {
         let decoding = rows(args, clip)?;
         println!("| | | | | {} frames, decoding {:.0} frames/s | |", clip.frames, clip.frames as f64 / decoding.wall_s);
