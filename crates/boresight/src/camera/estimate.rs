@@ -281,9 +281,12 @@ impl CameraMotionEstimator {
         if key.even && !key.proven && !moved {
             return None;
         }
-        // Nothing but the frames themselves speaks for a first motion.
-        found.covers =
-            found.covers && (self.known || self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE);
+        // Nothing but the frames themselves speaks for a first motion; what most of the area moves by is the ground's, however few pieces it has.
+        if !self.known || found.by_chance {
+            let is_most = self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE;
+            found.covers &= self.known || is_most;
+            found.by_chance &= !is_most;
+        }
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
             std::mem::swap(&mut self.key, &mut self.last);
