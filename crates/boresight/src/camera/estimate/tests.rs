@@ -417,6 +417,23 @@ fn a_ground_of_two_pieces_that_covers_most_of_the_view_is_no_chance() {
     }
 }
 
+#[test]
+fn a_first_motion_between_two_is_unknown() {
+    // Two quarters of the view, one opposite the other, go another way than the two others; the mean of both explains all tiles to half a pixel.
+    let first = |apart_px: f64| {
+        let way = |p: Vector2<f64>| {
+            let own = if (p.x < 160.0) == (p.y < 120.0) { apart_px } else { 0.0 };
+            Similarity::shift(Vector2::new(3.2 + own, 1.4))
+        };
+        let views = two_views(way, |_| true);
+        let mut camera = CameraMotionEstimator::default();
+        assert_eq!(camera.step(&views[0]), None);
+        camera.step(&views[1])
+    };
+    assert!(first(0.0).is_some());
+    assert_eq!(first(0.7), None);
+}
+
 #[cfg(feature = "video")]
 #[test]
 fn of_a_view_that_moved_few_patches_lie_where_they_lay() {
