@@ -38,6 +38,9 @@ pub struct Args {
     /// Pairs of views for the camera's motion.
     #[arg(long, default_value_t = 2_000)]
     pairs: usize,
+    /// Seed of these pairs: those of the page are 0, others were not looked at.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
     /// Print the pairs of views whose motion is answered wrongly and not flagged as uncertain: those of the half that may be looked at.
     #[arg(long)]
     wrong: bool,
@@ -90,7 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
         positions::table(args.fits, &data, args.python.as_deref(), p)
     })?;
     part("camera", include_str!("camera.txt").trim(), &mut |p| {
-        camera::table(args.pairs, &data, args.python.as_deref(), args.wrong, p)
+        camera::table((args.pairs, args.seed), &data, args.python.as_deref(), args.wrong, p)
     })?;
     if args.only.is_empty() {
         page.push_str(concat!("\n", include_str!("pictures.txt")));

@@ -2,12 +2,14 @@
 //!
 //! Source: our own; block matching by sums of absolute differences ([`super::find_patch`]) over all of the image, and sums added up over neighbours where one says nothing, as in adaptive
 //! windows for stereo (T. Kanade, M. Okutomi, *IEEE PAMI* 16, 1994).
-//! How: the key frame is cut into tiles of 12 x 12 px. Each is laid where the motion has it, and up to [`REACH`] px beside that; it is explained where the best place is the motion's. A tile
-//! whose best place does not stand clear of the others says nothing alone: its sums are added up with those of such tiles around it, so that a ground whose texture lies below the noise of a
-//! tile is heard, and is not drowned by the few tiles of much texture.
-//! What remains uncertain counts against the motion, for its best place lies anywhere: a ground that nobody can see might go another way. What has neither texture nor noise is left out.
+//! How: the key frame is cut into tiles of 12 x 12 px, up to its border. Each is laid where the motion has it, and up to [`REACH`] px beside that; it is explained where the best place is the
+//! motion's. A tile whose best place does not stand clear of the others says nothing alone: its sums are added up with those of such tiles around it, so that a ground whose texture lies below the
+//! noise of a tile is heard, and is not drowned by the few tiles of much texture.
+//! What remains uncertain counts against the motion, for its best place lies anywhere: a ground that nobody can see might go another way. What has neither texture nor noise is left out. What stands
+//! near the border is asked as all else is, among the places within the image: a thing in the middle of a view covers more of its inner part than of the view.
 //! Symbols: rest, the part of a pixel between the whole place that the search is laid around and the motion's. Units: reduced px.
-//! Limits: tiles whose search leaves the image are not asked; a motion less than half a pixel off is not told from the true one; a ground without any texture is not seen to stand still.
+//! Limits: tiles that leave the image with the motion are not asked, and near its border down to half as many places compete; a motion less than half a pixel off is not told from the true one; a
+//! ground without any texture is not seen to stand still.
 
 use super::find_patch::{Block, row_of_differences, template};
 use super::key_frame::{PATCH, Patch};
@@ -19,6 +21,13 @@ const REACH: usize = 5;
 const SIDE: usize = 2 * REACH + 1;
 /// Columns of the search, filled up to whole vectors.
 const LANES: usize = SIDE.next_multiple_of(8);
+/// Rows and columns of the pixels in which a tile is looked for.
+const DOWN: usize = SIDE + PATCH - 1;
+const ACROSS: usize = LANES + PATCH - 1;
+/// Pixels of the image that must lie around a tile where the motion has it: the nearest whole place, half a pixel off at most, and one beyond it for the parabola.
+const ROOM: f64 = 1.5;
+/// Pixels of the key frame that must lie around a tile at least: by so much, 6 px (0.07 + 0.07) at most, its turn and zoom of a frame move its corners ([`super::fit`]).
+const EDGE: usize = 1;
 /// A tile is explained where its best place is nearer than this to the motion's, px: farther off another whole place is nearer.
 const NEAR: f64 = 0.5;
 /// A best place stands clear where every other is this many times as bad. By chance in fewer than one tile of 1 000: a sum over 144 pixels of noise deviates by 6.3 %, and the least of 121 such
@@ -31,6 +40,7 @@ const PEAK: usize = 2;
 pub(super) const LEAST_SHARE: f64 = 0.52;
 
 type Sums = [[f32; LANES]; SIDE];
+type Window = [[f32; ACROSS]; DOWN];
 
 /// A tile laid around the motion's place.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,7 +63,7 @@ pub(super) struct Cover {
 impl Cover {
     /// Share of the area that the motion from `key` to `now` explains; 0 where nothing is asked.
     pub fn share(&mut self, key: &Image<f32>, now: &Image<f32>, motion: &Homography) -> f64 {
-        let (n_across, n_down) = (key.width() / PATCH, key.height() / PATCH);
+        let ([n_across, left], [n_down, top]) = (tiles(key.width()), tiles(key.height()));
         self.rows.iter_mut().for_each(|row| {
             row.clear();
             row.resize(n_across, Tile::default());
@@ -61,7 +71,7 @@ impl Cover {
         let (mut n, mut n_explained) = (0u32, 0u32);
         for last in 0..=n_down {
             for (x, tile) in self.rows[last % 3].iter_mut().enumerate() {
-                let patch = Patch { x: x * PATCH, y: last * PATCH, weight: 1.0 };
+                let patch = Patch { x: left + x * PATCH, y: top + last * PATCH, weight: 1.0 };
                 // Below the last row there is none.
                 let laid = if last < n_down { lay(key, now, patch, motion) } else { None };
                 *tile = laid.unwrap_or_default();
@@ -94,20 +104,25 @@ impl Cover {
     }
 }
 
+/// How many tiles lie along a side of the image, and where the first begins, px.
+fn tiles(side: usize) -> [usize; 2] {
+    let n = side.saturating_sub(2 * EDGE) / PATCH;
+    [n, (side - n * PATCH) / 2]
+}
+
 /// The sums of a tile around where the motion has it; `None` where that leaves the image, and where all places are alike.
 fn lay(key: &Image<f32>, now: &Image<f32>, patch: Patch, motion: &Homography) -> Option<Tile> {
     let template = template(key, patch, &motion.similarity_at(patch.middle()))?;
     let half = 0.5 * (PATCH - 1) as f64;
     let corner = motion.apply(patch.middle()) - Vector2::repeat(half);
     let first = corner.map(|c| c.round() - REACH as f64);
-    // A vector of columns is read from each pixel of a tile on.
     let (w, h) = (now.width() as f64, now.height() as f64);
-    let end = first + Vector2::new((LANES + PATCH) as f64, (SIDE + PATCH) as f64);
-    if !(first.x >= 0.0 && first.y >= 0.0 && end.x <= w && end.y <= h) {
+    let (low, high) = (corner - Vector2::repeat(ROOM), corner + Vector2::repeat(PATCH as f64 + ROOM));
+    if !(low.x >= 0.0 && low.y >= 0.0 && high.x <= w && high.y <= h) {
         return None;
     }
     let mut tile = Tile { rest: corner - first, ..Tile::default() };
-    differences(&template, now, (first.x as usize, first.y as usize), &mut tile.sums);
+    differences(&template, &window(now, (first.x as i64, first.y as i64)), &mut tile.sums);
     let (off_px, best, second) = peak(&tile.sums, tile.rest);
     // Sums of what is no number have no best one.
     tile.is_asked = second > best;
@@ -115,11 +130,25 @@ fn lay(key: &Image<f32>, now: &Image<f32>, patch: Patch, motion: &Homography) ->
     tile.is_asked.then_some(tile)
 }
 
+/// The pixels in which a tile is looked for, from a first column and row on; infinite outside the image, so that no place there is the best.
+fn window(now: &Image<f32>, (left, top): (i64, i64)) -> Window {
+    let mut out = [[f32::INFINITY; ACROSS]; DOWN];
+    let width = now.width() as i64;
+    let (from, until) = (left.clamp(0, width), (left + ACROSS as i64).clamp(0, width));
+    for (line, y) in out.iter_mut().zip(top..) {
+        if (0..now.height() as i64).contains(&y) {
+            let (first, last) = ((from - left) as usize, (until - left) as usize);
+            line[first..last].copy_from_slice(&now.row(y as usize)[from as usize..until as usize]);
+        }
+    }
+    out
+}
+
 widest! {
     /// Sums of absolute differences with the template's first pixel in each row and column of the search.
-    fn differences(template: &Block, now: &Image<f32>, first: (usize, usize), out: &mut Sums) {
+    fn differences(template: &Block, window: &Window, out: &mut Sums) {
         for (i, sums) in out.iter_mut().enumerate() {
-            *sums = row_of_differences(template, (first.1 + i..).map(|y| &now.row(y)[first.0..]));
+            *sums = row_of_differences(template, window[i..].iter().map(|line| &line[..]));
         }
     }
 }
@@ -194,6 +223,28 @@ mod tests {
             }
             image
         })
+    }
+
+    /// The same of a thing that covers from 20 to 80 % of the width and from 15 to 85 % of the height, 42 % of the view.
+    fn frames_with_thing_in_the_middle(thing: Vector2<f64>) -> [Image<f32>; 2] {
+        let (mut textured, still) = (frames(60.0, 1.0, thing, 8), frames(0.0, 0.0, thing, 9));
+        for (time, (image, ground)) in textured.iter_mut().zip(&still).enumerate() {
+            for y in 0..200 {
+                for (x, v) in image.row_mut(y).iter_mut().enumerate() {
+                    let p = Vector2::new(x as f64, y as f64) - time as f64 * thing;
+                    let is_thing = (60.0..240.0).contains(&p.x) && (30.0..170.0).contains(&p.y);
+                    *v = if is_thing { *v } else { ground.row(y)[x] };
+                }
+            }
+        }
+        textured
+    }
+
+    #[test]
+    fn a_thing_in_the_middle_covers_more_of_the_inner_part_than_of_the_view() {
+        let thing = Vector2::new(-2.0, 2.0);
+        // It has half of the tiles that are not laid beyond the border, with those that its rim cuts.
+        assert!(!is_most(&frames_with_thing_in_the_middle(thing), thing));
     }
 
     fn is_most([key, now]: &[Image<f32>; 2], motion: Vector2<f64>) -> bool {

@@ -16,7 +16,7 @@ use super::apart::{Pieces, WIDE};
 use super::course::Course;
 use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, find, find_near};
-use super::fine::{FinePatches, fine_factor};
+use super::fine::{FOUND, FinePatches, LOST_PX, MIXED_PX, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
@@ -64,10 +64,6 @@ const UNSURE_FRAMES: u32 = 3;
 /// most, and 71 % within a pixel.
 const AT_REST: f64 = 0.4;
 const NEAR_REST: f64 = 0.85;
-/// Share of the fine patches that must be found near where the coarse ones lead them, and of their weight that must agree with their plane.
-const FINE_FOUND: f64 = 0.5;
-/// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
-const FINE_LOST_PX: f64 = 0.5;
 
 /// Follows the background from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -281,9 +277,12 @@ impl CameraMotionEstimator {
         if key.even && !key.proven && !moved {
             return None;
         }
-        // Nothing but the frames themselves speaks for a first motion.
-        found.covers =
-            found.covers && (self.known || self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE);
+        // Nothing but the frames themselves speaks for a first motion; what most of the area moves by is the ground's, however few pieces it has.
+        if !self.known || found.by_chance {
+            let is_most = self.cover.share(&key.image, &self.now, &found.now_from_key) >= LEAST_SHARE;
+            found.covers &= self.known || is_most;
+            found.by_chance &= !is_most;
+        }
         if at_last {
             // Another view, or the key frame is too far away: the last frame takes its place.
             std::mem::swap(&mut self.key, &mut self.last);
@@ -300,14 +299,15 @@ impl CameraMotionEstimator {
         let middle = scales.middle;
         let predicted = scaled(coarse, scales.factor, scales.fine);
         let n = self.fine.find(pixels, &predicted, &mut self.matches);
-        if (self.matches.len() as f64) < FINE_FOUND * n as f64 {
+        if (self.matches.len() as f64) < FOUND * n as f64 {
             return None;
         }
         let scale = scales.factor as f64 / scales.fine as f64;
         let fine_middle = scale * middle + Vector2::repeat(0.5 * (scale - 1.0));
         let limits = Limits { least_px: if self.turning { 0.0 } else { STILL }, ..Limits::NONE };
         let plane = plane::fit(&self.matches, &predicted, fine_middle, limits)?;
-        if plane.spread_px > FINE_LOST_PX || plane.share < FINE_FOUND {
+        let most_px = if self.known { LOST_PX } else { MIXED_PX };
+        if plane.spread_px > most_px || plane.share < FOUND {
             return None;
         }
         Some(Found {

@@ -59,13 +59,13 @@ fn working(image: &Image<u8>) -> Image<f32> {
     out
 }
 
-pub fn table(n: usize, data: &Path, python: Option<&Path>, wrong: bool, page: &mut String) -> Result<()> {
+pub fn table((n, set): (usize, u32), data: &Path, python: Option<&Path>, wrong: bool, page: &mut String) -> Result<()> {
     let sources = pairs::sources(data)?;
     if sources.len() < 2 {
         writeln!(page, "No data.")?;
         return Ok(());
     }
-    let pairs: Vec<Pair> = (0..n).into_par_iter().map(|k| pairs::pair(&sources, k)).collect::<Result<_>>()?;
+    let pairs: Vec<Pair> = (0..n).into_par_iter().map(|k| pairs::pair(&sources, set, k)).collect::<Result<_>>()?;
     writeln!(page, "{} pairs of {} images.\n", pairs.len(), sources.len())?;
     writeln!(page, "{}", Judged::HEAD)?;
     let mut ours = Vec::new();

@@ -142,9 +142,9 @@ pub fn is_looked_at(sources: &[Source], k: usize) -> bool {
     (k / (2 * KINDS.len() * sources.len())).is_multiple_of(2)
 }
 
-/// Pair `k`: its own seed, so that it is the same however many are made.
-pub fn pair(sources: &[Source], k: usize) -> Result<Pair> {
-    let mut rng = random(7_000_000 + k as u64);
+/// Pair `k` of a set: its own seed, so that it is the same however many are made. Set 0 is that of the page.
+pub fn pair(sources: &[Source], set: u32, k: usize) -> Result<Pair> {
+    let mut rng = random((u64::from(set) << 32) + 7_000_000 + k as u64);
     let (source, kind) = (k % sources.len(), k / sources.len() % KINDS.len());
     let Source { image: of, scale, .. } = &sources[source];
     let size = [of.width(), of.height()].map(|n| (n as f64 / scale - 2.0 * MARGIN).floor());
