@@ -16,7 +16,7 @@ use super::apart::{Pieces, WIDE};
 use super::course::Course;
 use super::cover::{Cover, LEAST_SHARE};
 use super::find_patch::{SEARCH, find, find_near};
-use super::fine::{FOUND, FinePatches, LOST_PX, MIXED_PX, fine_factor};
+use super::fine::{FOUND, FinePatches, LOST_PX, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
@@ -306,8 +306,7 @@ impl CameraMotionEstimator {
         let fine_middle = scale * middle + Vector2::repeat(0.5 * (scale - 1.0));
         let limits = Limits { least_px: if self.turning { 0.0 } else { STILL }, ..Limits::NONE };
         let plane = plane::fit(&self.matches, &predicted, fine_middle, limits)?;
-        let most_px = if self.known { LOST_PX } else { MIXED_PX };
-        if plane.spread_px > most_px || plane.share < FOUND {
+        if plane.spread_px > LOST_PX || plane.share < FOUND {
             return None;
         }
         Some(Found {

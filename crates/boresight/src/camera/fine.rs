@@ -25,10 +25,6 @@ const REACH: i64 = 2;
 pub(super) const FOUND: f64 = 0.5;
 /// Deviation of the fine patches from which on they say nothing, px: places within two pixels at random deviate by more than 1.
 pub(super) const LOST_PX: f64 = 0.5;
-/// The same of a first motion, px: three times the 0.05 px by which a patch deviates that just stands out. With a noise of σ neighbouring pixels differ by 1.13 σ in the mean, such a patch's by twice
-/// that or more, so that Σ g² over 144 px is 860 σ² or more without the noise's part, and its place among the noise of two frames deviates by √2 σ / √860 σ. What deviates by more lies between motions: of
-/// 29 first motions of 4 000 pairs of views that did 19 were off by more than 0.5 px, of 2 477 that did not 82.
-pub(super) const MIXED_PX: f64 = 0.15;
 /// A window around a place: the patch at its farthest place, a step of a pixel and the next pixel beyond.
 const WINDOW: usize = PATCH + 2 * REACH as usize + 4;
 
