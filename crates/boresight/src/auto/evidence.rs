@@ -31,7 +31,7 @@ const STDS: f64 = 3.0;
 const LEAST_OF_GROUND: usize = 6;
 /// Share of the steps that may be faster than the speed called fastest.
 const FASTER_SHARE: f64 = 0.01;
-/// Chance's chains that are slower than this share of a chain's speed are of another kind.
+/// Share of a chain's speed below which chance's chains are of another kind; chosen, and less than 1 so that the fastest of all chains is not without any to be judged by.
 const SLOWER: f64 = 0.5;
 /// Steps of which the middle one is a chain's speed: two that a wrong detection made are fewer than half.
 const LEAST_STEPS: usize = 5;
@@ -103,9 +103,10 @@ impl Evidence {
     /// κ ln n. Chance is asked for those that are not much slower: what hardly moves is a chain in any order of the scans, and says nothing of what is fast.
     pub fn sure(&self) -> impl Iterator<Item = &Chain> {
         self.moving.iter().filter(|c| {
-            let slowest = SLOWER * middle_px_per_s(c);
+            // Scans of one time make any step infinitely fast: all of chance's chains are asked then.
+            let slowest = Some(SLOWER * middle_px_per_s(c)).filter(|s| s.is_finite()).unwrap_or(0.0);
             let as_fast = self.chains_by_chance.iter().filter(|b| b[0] >= slowest);
-            let most = as_fast.fold(0.0, |most: f64, b| most.max(b[1]));
+            let most = as_fast.map(|b| b[1]).fold(0.0, f64::max);
             let scale = (most / (SURROGATES as f64).ln()).max(1.0);
             c.gain > most + scale * SURE_GAIN
         })

@@ -7,6 +7,7 @@
 //! only without its part of the view it is seen what it did.
 //! Symbols: those of [`super::plane`]; r residual, w weight, b basis; P = Σ w b bᵀ, L = w bᵀ P⁻¹ b the leverage of a match, (I - L)⁻¹ r what it leaves where the others are fitted; A the mean
 //! slope of the weighted residuals, B = Σ w² b (I - L)⁻¹ r rᵀ (I - L)⁻¹ bᵀ; covariance A⁻¹ B A⁻¹.
+//! Departure: matches that deviate from a first motion by more than their noise explains are taken to err together.
 //! Limits: residuals that all matches have in common, as of a lens, are only known as far as they differ. Of a course that is known residuals stay in the fit, with the factor n / (n - k) for the
 //! numbers fitted: its patches are found near where they are expected, and parallax points one way as a thing does.
 
