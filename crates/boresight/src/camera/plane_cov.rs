@@ -252,6 +252,20 @@ mod tests {
     }
 
     #[test]
+    fn a_first_motion_between_two_is_stated_as_far_off_as_they_are_apart() {
+        // Every second match goes another way by so much; halfway between them both are half of it off.
+        let stated = |apart_px: f64, is_first: bool| {
+            let truth = Homography::shift(Vector2::new(3.2, 1.4));
+            let mut matches = matches(&truth, 7);
+            matches.iter_mut().step_by(2).for_each(|m| m.to.x += apart_px);
+            let found = fit(&matches, &truth, MIDDLE, Limits::NONE).unwrap();
+            plane_cov(&found, &matches, MIDDLE, is_first).unwrap()[(0, 0)].sqrt()
+        };
+        assert!(stated(0.0, true) < 0.03 && stated(0.5, false) < 0.1);
+        assert!((0.15..0.35).contains(&stated(0.5, true)), "{}", stated(0.5, true));
+    }
+
+    #[test]
     fn few_matches_far_away_are_not_taken_for_proof_of_their_own_places() {
         // 13 matches in a corner and three in the opposite one, which an affine fit follows nearly whole: squares of the errors there beside the variances stated.
         let (mut errors, mut stated, n) = (0.0, 0.0, 400);

@@ -380,8 +380,8 @@ fn a_few_bright_things_before_an_even_ground_are_no_motion_of_the_camera() {
     assert!(invented.len() <= 1, "{invented:?}");
 }
 
-/// Two views of 320 x 240 px with a little noise: what lies at p in the first lies at `way(p)` in the second, of the ground's texture where `is_textured` says so.
-fn two_views(way: impl Fn(Vector2<f64>) -> Similarity, is_textured: impl Fn(Vector2<f64>) -> bool) -> [Pixels; 2] {
+/// Two views of 320 x 240 px with a little noise: what lies at p in the first lies at `way` of it in the second, of the ground's texture where `is_textured` says so.
+fn two_views(way: &Similarity, is_textured: impl Fn(Vector2<f64>) -> bool) -> [Pixels; 2] {
     let (texture, mut rng) = (ground(), ChaCha8Rng::seed_from_u64(6));
     let at = |p: Vector2<f64>| {
         let (x, y) = (p.x as usize, p.y as usize);
@@ -394,7 +394,7 @@ fn two_views(way: impl Fn(Vector2<f64>) -> Similarity, is_textured: impl Fn(Vect
         for y in 0..240 {
             for (x, v) in view.row_mut(y).iter_mut().enumerate() {
                 let q = Vector2::new(x as f64, y as f64);
-                let p = if moved { way(q).inverse().apply(q) } else { q };
+                let p = if moved { way.inverse().apply(q) } else { q };
                 let value = if is_textured(p) { at(p + Vector2::repeat(40.0)) } else { 100.0 };
                 *v = (value + 2.0 * rng.random::<f64>()) as u8;
             }
@@ -407,7 +407,7 @@ fn two_views(way: impl Fn(Vector2<f64>) -> Similarity, is_textured: impl Fn(Vect
 fn a_ground_of_two_pieces_that_covers_most_of_the_view_is_no_chance() {
     // A turn and a zoom explain any two things; here they explain two thirds of the area.
     let truth = Similarity::about(Vector2::new(159.5, 119.5), Vector2::new(6.0, -4.0), 0.03, 1.01);
-    let views = two_views(|_| truth, |p| (10.0..120.0).contains(&p.x) || (200.0..310.0).contains(&p.x));
+    let views = two_views(&truth, |p| (10.0..120.0).contains(&p.x) || (200.0..310.0).contains(&p.x));
     let mut camera = CameraMotionEstimator::default();
     assert_eq!(camera.step(&views[0]), None);
     let motion = camera.step(&views[1]).expect("most of the view");
@@ -415,25 +415,6 @@ fn a_ground_of_two_pieces_that_covers_most_of_the_view_is_no_chance() {
         let error = motion.now_from_before.apply(corner) - truth.apply(corner);
         assert!(error.norm() < 0.2, "{error}");
     }
-}
-
-#[test]
-fn a_first_motion_between_two_is_stated_as_far_off_as_they_are_apart() {
-    // Two quarters of the view, one opposite the other, go another way than the two others; the mean of both explains all tiles to half a pixel.
-    let first = |apart_px: f64| {
-        let way = |p: Vector2<f64>| {
-            let own = if (p.x < 160.0) == (p.y < 120.0) { apart_px } else { 0.0 };
-            Similarity::shift(Vector2::new(3.2 + own, 1.4))
-        };
-        let views = two_views(way, |_| true);
-        let mut camera = CameraMotionEstimator::default();
-        assert_eq!(camera.step(&views[0]), None);
-        camera.step(&views[1])
-    };
-    let std_px = |motion: Option<CameraMotion>| motion.expect("most of the view").cov[(0, 0)].sqrt();
-    let (one, between) = (std_px(first(0.0)), std_px(first(0.7)));
-    // Halfway between them both are 0.35 px off.
-    assert!(one < 0.02 && (0.2..0.5).contains(&between), "{one} {between}");
 }
 
 #[cfg(feature = "video")]
