@@ -9,6 +9,7 @@
 mod aims;
 pub mod clips;
 mod composed;
+mod disturbed;
 mod scenes;
 pub mod score;
 mod tables;

@@ -3,6 +3,7 @@
 //! Each variant is written as YUV4MPEG2 (8 bit, grey) with its truth as a table and goes the way of every clip. Colour is turned into luminance (Rec. 601).
 
 use super::clips::{self, Clip, Columns};
+use super::disturbed;
 use anyhow::{Context, Result, bail};
 use boresight::io::OpenOptions;
 use boresight::{Image, Pixels, TrackRow};
@@ -33,6 +34,26 @@ pub enum Variant {
     Noisy,
     /// The light falls to half and comes back, once in six seconds, as an exposure follows what comes by.
     Dimming,
+    /// Rows are columns.
+    Transposed,
+    /// Each pixel is 2 x 2, interpolated.
+    DoubleSize,
+    /// Every fifth frame twice, as a recorder brings 25 to 30 frames/s.
+    Repeated,
+    /// One frame in ten is lost and nothing says so.
+    Lost,
+    /// The picture stands for half a second in every four, as a link stalls, and goes on where it would be.
+    Stalling,
+    /// The light changes by a twentieth from frame to frame, as lamps do beside a shutter.
+    Flickering,
+    /// A clock that counts frames, a cross in the middle and the marks of a frame are drawn on the picture.
+    Overlaid,
+    /// Black bars above and below.
+    Barred,
+    /// The camera shakes by a pixel and a half, whole pixels, and shows a part of the picture.
+    Jittering,
+    /// Half a second of black in the middle.
+    Black,
 }
 
 /// Deviation of the noise added, counts.
@@ -97,6 +118,7 @@ pub fn clip(of: &Clip, variant: Variant, folder: &Path) -> Result<Option<Clip>> 
         }
         Variant::Noisy => add_noise(&mut frames)?,
         Variant::Dimming => dim(&mut frames, rate_hz),
+        other => rate_hz = disturbed::apply(other, &mut frames, &mut rows, rate_hz)?,
     }
     rows.sort_by_key(|r| (r.frame, r.id));
     let stem = of.name.replace(['/', '.', ' ', ','], "_");

@@ -58,19 +58,24 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
         let sensor = &mut config.input.sensor;
         sensor.bad_pixels = sensor.bad_pixels.or((found.n_bad > 0).then_some(true));
         sensor.column_noise = sensor.column_noise.or((found.column_rms > 0.0).then_some(true));
+        sensor.overlay = sensor.overlay.or((!found.drawn.is_empty()).then_some(true));
         // Those of the second look are read while the first ones are looked at, the rest of them when it is detected: where a colour is chosen they are read anew.
         Ok((Replay::new(source, n.min(PROBE_FRAMES)).up_to(n).reading_on(SECOND_LOOK_FRAMES), found))
     };
     let (mut frames, found) = read(&mut base, beside.clone())?;
     let base = &base;
     let anew = || Read::All(second_look::frames(input, base, PROBE_FRAMES));
-    let second = |frames: &mut Replay, wanted: Wanted| match (wanted, &beside) {
-        (Wanted::None, beside) => {
-            beside.iter().for_each(ColoursBeside::end);
-            None
-        }
-        (Wanted::First, Some(beside)) => Some(second_look::from_beside(beside, frames).unwrap_or_else(anew)),
-        (Wanted::First | Wanted::Anew, _) => on_disk.then(anew),
+    let mut overlay = found.overlay(frames.info().width, frames.info().height);
+    let second = |frames: &mut Replay, wanted: Wanted| {
+        let read = match (wanted, &beside) {
+            (Wanted::None, beside) => {
+                beside.iter().for_each(ColoursBeside::end);
+                None
+            }
+            (Wanted::First, Some(beside)) => Some(second_look::from_beside(beside, frames).unwrap_or_else(anew)),
+            (Wanted::First | Wanted::Anew, _) => on_disk.then(anew),
+        };
+        read.map(|read| read.without(overlay.as_mut()))
     };
     let mut choice = choose_from(&mut frames, second, base, request)?;
     if on_disk {
@@ -95,6 +100,12 @@ fn words(found: &Found) -> Vec<String> {
         out.push(format!(
             "{} {pixels} always unlike all around, as no optics makes them: bad ones of the sensor, or drawn on the picture; they are filled from their neighbours (--set input.sensor.bad-pixels=false).",
             found.n_bad
+        ));
+    }
+    if !found.drawn.is_empty() {
+        out.push(format!(
+            "Something is drawn on the picture (a cross, a clock, text): {} pixels stand still to a tenth of a pixel while the scene moves, or change as digits do; they are filled from around (--set input.sensor.overlay=false).",
+            found.drawn.len()
         ));
     }
     if found.column_rms > 0.0 {

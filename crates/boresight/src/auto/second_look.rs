@@ -7,6 +7,7 @@
 use super::first_scans::PROBE_FRAMES;
 use super::spread::spread;
 use crate::io::{Colour, ColoursBeside, KeepColours, MOST_BYTES, OpenOptions, Replay};
+use crate::sensor::Correction;
 use crate::vision::colour::GRID_PX;
 use crate::{Config, Frame, FrameSource, PixelKind};
 use std::ffi::OsStr;
@@ -51,6 +52,14 @@ pub(super) enum Read {
 }
 
 impl Read {
+    /// The same, with what is drawn on the picture filled; small frames, which tell colours, stay as they are.
+    pub(super) fn without(mut self, overlay: Option<&mut Correction>) -> Self {
+        if let (Self::All(frames), Some(overlay)) = (&mut self, overlay) {
+            frames.iter_mut().for_each(|f| overlay.apply(&mut f.pixels));
+        }
+        self
+    }
+
     /// The frames of the look, of those held if need be.
     pub(super) fn with<'a>(&'a self, held: &'a [Frame]) -> Second<'a> {
         match self {

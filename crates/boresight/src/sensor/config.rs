@@ -21,12 +21,16 @@ pub struct SensorConfig {
     /// frame's height that never moves is taken for one. Left out: as bad pixels, where the scene moves over the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column_noise: Option<bool>,
+    /// Whether what a camera or a recorder draws on the picture (a cross, a clock, text) is looked for in the first 400 frames, of a stream 48, or as many as 128 MB hold, and filled from around:
+    /// what stands still to a tenth of a pixel while the scene moves, and digits that change. Left out: where a configuration is chosen, in grey frames of 8 bits; where one is given, not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overlay: Option<bool>,
 }
 
 impl SensorConfig {
     /// Whether anything is mended.
     pub fn is_active(&self) -> bool {
-        self.dark.is_some() || self.flat.is_some() || self.fills() || self.levels_columns()
+        self.dark.is_some() || self.flat.is_some() || self.fills() || self.levels_columns() || self.fills_overlay()
     }
 
     /// Whether offsets of columns are taken off.
@@ -37,5 +41,10 @@ impl SensorConfig {
     /// Whether bad pixels are filled.
     pub fn fills(&self) -> bool {
         self.bad_pixels == Some(true)
+    }
+
+    /// Whether what is drawn on the picture is filled.
+    pub fn fills_overlay(&self) -> bool {
+        self.overlay == Some(true)
     }
 }

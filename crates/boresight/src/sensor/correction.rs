@@ -2,7 +2,7 @@
 //!
 //! value' = (value - dark - column) / response + level, level the mean of the dark frame, so that nothing falls below 0 and the noise model's offset stays. Response: the
 //! flat frame less the dark one over its mean; below a twentieth of it a pixel is bad. Bad pixels take the mean of the good ones among their eight
-//! neighbours, of the 24 around if there are none. Whole numbers are rounded and kept in their range; full pixels stay full.
+//! neighbours, of the 24 around if there are none; else, as where something is drawn, of the nearest good ones along the row and the column, weighted by one over their distance. Whole numbers are rounded and kept in their range; full pixels stay full.
 
 use super::config::SensorConfig;
 use super::defects::Defects;
@@ -29,8 +29,8 @@ pub struct Correction {
     off: Vec<f32>,
     /// Multiplied to each pixel.
     times: Vec<f32>,
-    /// Bad pixels and the good ones that fill them: offsets into the frame.
-    bad: Vec<(usize, Vec<usize>)>,
+    /// Bad pixels and the good ones that fill them: offsets into the frame, and what each weighs.
+    bad: Vec<(usize, Vec<(usize, f32)>)>,
     level: f32,
     /// Whether nothing but bad pixels is mended, each of which has good ones around it.
     only_bad: bool,
@@ -84,7 +84,14 @@ impl Correction {
                 }
             }
         }
-        let bad: Vec<(usize, Vec<usize>)> =
+        if config.fills_overlay() {
+            for [x, y] in &defects.overlay {
+                if (*x as usize) < w && (*y as usize) < h {
+                    is_bad[*y as usize * w + *x as usize] = true;
+                }
+            }
+        }
+        let bad: Vec<(usize, Vec<(usize, f32)>)> =
             (0..w * h).filter(|&i| is_bad[i]).map(|i| (i, fillers(&is_bad, w, h, i))).collect();
         let only_bad = level == 0.0
             && off.iter().all(|o| *o == 0.0)
@@ -101,7 +108,7 @@ impl Correction {
         self.bad.len()
     }
 
-    /// Mends a frame; colour frames and frames of another size (those without pixels) stay as they are.
+    /// Mends a frame; of colour frames only what is filled. Those of another size (those without pixels) stay as they are.
     pub fn apply(&mut self, pixels: &mut Pixels) {
         if (pixels.width(), pixels.height()) != (self.width, self.height) {
             return;
@@ -116,6 +123,12 @@ impl Correction {
                 self.mend(image, f32::from, |v| v.round().clamp(0.0, full) as u16, full);
             }
             Pixels::GrayF32(image) => self.mend(image, |v| v, |v| v, f32::INFINITY),
+            Pixels::Rgb8(image) if self.only_bad => {
+                for (i, from) in &self.bad {
+                    let channel = |c: usize| weighted(from, |j| f32::from(image.as_slice()[j][c])).round() as u8;
+                    image.as_mut_slice()[*i] = [channel(0), channel(1), channel(2)];
+                }
+            }
             Pixels::Rgb8(_) => {}
         }
     }
@@ -125,8 +138,7 @@ impl Correction {
             // Those that fill are good ones and stay, so nothing else is touched.
             let pixels = image.as_mut_slice();
             for (i, from) in &self.bad {
-                let sum: f32 = from.iter().map(|j| get(pixels[*j])).sum();
-                pixels[*i] = put(sum / from.len() as f32);
+                pixels[*i] = put(weighted(from, |j| get(pixels[j])));
             }
             return;
         }
@@ -137,8 +149,7 @@ impl Correction {
         });
         self.scratch.extend(mended);
         for (i, from) in &self.bad {
-            let sum: f32 = from.iter().map(|j| self.scratch[*j]).sum();
-            self.scratch[*i] = if from.is_empty() { self.level } else { sum / from.len() as f32 };
+            self.scratch[*i] = if from.is_empty() { self.level } else { weighted(from, |j| self.scratch[j]) };
         }
         for (p, v) in image.as_mut_slice().iter_mut().zip(&self.scratch) {
             *p = put(*v);
@@ -146,18 +157,35 @@ impl Correction {
     }
 }
 
-/// The good pixels that fill a bad one.
-fn fillers(is_bad: &[bool], w: usize, h: usize, i: usize) -> Vec<usize> {
+/// The mean of values by weights.
+fn weighted(from: &[(usize, f32)], value: impl Fn(usize) -> f32) -> f32 {
+    let [sum, weights] = from.iter().fold([0.0; 2], |[sum, all], (j, weight)| [sum + weight * value(*j), all + weight]);
+    sum / weights
+}
+
+/// The good pixels that fill a bad one, and their weights.
+fn fillers(is_bad: &[bool], w: usize, h: usize, i: usize) -> Vec<(usize, f32)> {
     let (x, y) = (i % w, i / w);
-    (1..=2usize)
+    let near = (1..=2usize)
         .map(|r| {
             (y.saturating_sub(r)..=(y + r).min(h - 1))
                 .flat_map(|yy| (x.saturating_sub(r)..=(x + r).min(w - 1)).map(move |xx| yy * w + xx))
                 .filter(|&j| !is_bad[j])
-                .collect::<Vec<usize>>()
+                .map(|j| (j, 1.0))
+                .collect::<Vec<(usize, f32)>>()
         })
-        .find(|f| !f.is_empty())
-        .unwrap_or_default()
+        .find(|f| !f.is_empty());
+    near.unwrap_or_else(|| {
+        let good = |mut along: Box<dyn Iterator<Item = usize>>| along.find(|j| !is_bad[*j]);
+        let nearest = [
+            good(Box::new((y * w..i).rev())),
+            good(Box::new(i + 1..(y + 1) * w)),
+            good(Box::new((0..y).rev().map(|y| y * w + x))),
+            good(Box::new((y + 1..h).map(|y| y * w + x))),
+        ];
+        let distance = |j: usize| (j % w).abs_diff(x) + (j / w).abs_diff(y);
+        nearest.into_iter().flatten().map(|j| (j, 1.0 / distance(j) as f32)).collect()
+    })
 }
 
 #[cfg(test)]
@@ -192,7 +220,8 @@ mod tests {
 
     #[test]
     fn bad_pixels_are_filled_and_full_ones_stay_full() {
-        let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [99, 9]], columns: vec![1.0; 8] };
+        let defects =
+            Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [99, 9]], columns: vec![1.0; 8], overlay: Vec::new() };
         let config = SensorConfig { bad_pixels: Some(true), column_noise: Some(true), ..Default::default() };
         let mut c = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
         let mut image = Image::filled(8, 6, 41u8);
@@ -223,7 +252,7 @@ mod tests {
 
     #[test]
     fn bad_pixels_alone_are_filled_as_they_are_beside_all_else() {
-        let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [7, 5]], columns: Vec::new() };
+        let defects = Defects { pixels: vec![[3, 2], [4, 2], [0, 0], [7, 5]], ..Defects::default() };
         let config = SensorConfig { bad_pixels: Some(true), ..Default::default() };
         let mut alone = Correction::new((8, 6), &config, &Calibration::default(), &defects).unwrap();
         assert!(alone.only_bad);

@@ -35,6 +35,8 @@ pub struct Defects {
     pub pixels: Vec<[u32; 2]>,
     /// Offset of each column, counts; empty if they are no more than noise makes.
     pub columns: Vec<f32>,
+    /// Pixels of what is drawn on the picture, as `pixels`; dark frames tell nothing of it.
+    pub overlay: Vec<[u32; 2]>,
 }
 
 impl Defects {
@@ -82,7 +84,7 @@ pub fn find_defects(frames: &MeanMap) -> Defects {
             }
         }
     }
-    Defects { pixels, columns }
+    Defects { pixels, columns, overlay: Vec::new() }
 }
 
 /// The neighbours of a pixel: the second smallest, the middle and the second largest; at the border the smallest and the largest.

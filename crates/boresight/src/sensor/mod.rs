@@ -1,6 +1,6 @@
 //! The sensor behind the frames: its gain and noise from the frames themselves, and what is mended before anything is detected.
 //!
-//! `transfer` measures variance against mean (photon transfer), `defects` finds pixels and columns that are not like their neighbours, `correction` mends frames,
+//! `transfer` measures variance against mean (photon transfer), `defects` finds pixels and columns that are not like their neighbours, `overlay` what is drawn on the picture, `correction` mends frames,
 //! `source` does it between the reader and the detector. Equations: `docs/theory/sensor.md`.
 
 mod config;
@@ -9,6 +9,7 @@ mod defects;
 mod grey;
 mod line;
 mod mean_map;
+mod overlay;
 mod source;
 mod transfer;
 

@@ -1,17 +1,22 @@
 //! A source whose frames are mended on their way.
 //!
-//! Nobody need ask for bad pixels, and columns, of frames that no codec has smeared ([`if_defective`]): they are mended if there are any.
-//! Where defects are to be found and there are no dark frames, the first [`LEARN`] frames are read ahead and looked at; they are handed out mended as all others.
+//! Nobody need ask for bad pixels, and columns, of frames that no codec has smeared, nor for what is drawn on the picture ([`if_defective`]): they are mended if there are any.
+//! Where defects are to be found and there are no dark frames, the first [`LEARN`] frames are read ahead and looked at, for what is drawn [`OVERLAY_FRAMES`]; they are handed out mended as all others.
 
 use super::config::SensorConfig;
 use super::correction::{Calibration, Correction};
 use super::defects::{Defects, find_defects};
 use super::mean_map::MeanMap;
-use crate::{Error, ErrorKind, Frame, FrameSource, PixelKind, Result, SourceInfo, Wanted};
+use super::overlay::find_overlay;
+use crate::{Error, ErrorKind, Frame, FrameSource, Image, PixelKind, Pixels, Result, SourceInfo, Wanted};
 use std::collections::VecDeque;
 
 /// Frames in which defects are looked for.
 pub(super) const LEARN: usize = 32;
+
+/// Frames in which it is looked for what is drawn, of a file and of a stream, and the memory they take at most, bytes: some seconds, in which a clock goes on and a camera pans.
+const OVERLAY_FRAMES: [usize; 2] = [400, 48];
+const OVERLAY_BYTES: usize = 128 << 20;
 
 /// A larger share of the pixels is no sensor's: it is how such frames are made.
 const MOST_BAD: f64 = 0.01;
@@ -22,10 +27,23 @@ pub(crate) struct Found {
     pub n_bad: usize,
     /// Root mean square of the columns' offsets, counts; 0 where they are left.
     pub column_rms: f64,
+    /// Pixels of what is drawn on the picture.
+    pub drawn: Vec<[u32; 2]>,
 }
 
-/// The source with its bad pixels and its columns mended, and what was found, if it is of grey frames as a sensor gives them, `ahead` of them may be read ahead, and there is anything of which the
-/// configuration does not say whether it is mended; else itself, and nothing. Columns only where the scene moves over them: else they may be the scene's, and at rest they do no harm.
+impl Found {
+    /// What fills in other frames of this size what is drawn on the picture; none where nothing is.
+    pub(crate) fn overlay(&self, width: usize, height: usize) -> Option<Correction> {
+        let config = SensorConfig { overlay: Some(true), ..SensorConfig::default() };
+        let defects = Defects { overlay: self.drawn.clone(), ..Defects::default() };
+        let known = Calibration::default();
+        (!self.drawn.is_empty()).then(|| Correction::new((width, height), &config, &known, &defects).ok()).flatten()
+    }
+}
+
+/// The source with its bad pixels and its columns mended and what is drawn on it filled, and what was found, if it is of grey frames (as a sensor gives them, for what is a sensor's), `ahead` of them may
+/// be read ahead, and there is anything of which the configuration does not say whether it is mended; else itself, and nothing. Columns only where the scene moves over them: else they may be the
+/// scene's, and at rest they do no harm.
 /// # Errors
 /// A first frame that cannot be read.
 pub(crate) fn if_defective(
@@ -35,25 +53,40 @@ pub(crate) fn if_defective(
 ) -> Result<(Box<dyn FrameSource>, Found)> {
     let info = source.info().clone();
     let is_short = ahead < LEARN || info.n_frames.is_some_and(|n| n < LEARN as u64);
-    let all_said = asked.bad_pixels.is_some() && asked.column_noise.is_some();
-    if all_said || source.is_coded() || is_short || info.kind == PixelKind::Rgb8 || asked.is_active() {
+    if is_short || asked.is_active() {
         return Ok((source, Found::default()));
     }
-    let looked_at = LookedAt::of(source);
-    let defects = find_defects(&looked_at.map);
+    let all_said = asked.bad_pixels.is_some() && asked.column_noise.is_some();
+    let of_a_sensor = !all_said && !source.is_coded() && info.kind != PixelKind::Rgb8;
+    let may_be_drawn = asked.overlay.is_none() && info.kind == PixelKind::Gray8;
+    if !of_a_sensor && !may_be_drawn {
+        return Ok((source, Found::default()));
+    }
+    let looked_at = LookedAt::of(source, of_a_sensor, may_be_drawn);
+    let defects = looked_at.defects(may_be_drawn);
     let n_bad = defects.pixels.len();
-    let is_sensors = looked_at.ahead.len() >= LEARN && n_bad as f64 <= MOST_BAD * (info.width * info.height) as f64;
+    let of_all = (info.width * info.height) as f64;
+    let is_sensors = of_a_sensor && looked_at.ahead.len() >= LEARN && n_bad as f64 <= MOST_BAD * of_all;
     let fills = is_sensors && n_bad > 0 && asked.bad_pixels.is_none();
     let moves = || looked_at.map.is_of_a_moving_scene();
     let levels = is_sensors && asked.column_noise.is_none() && !defects.columns.is_empty() && moves();
-    let config = SensorConfig { bad_pixels: Some(fills), column_noise: Some(levels), ..SensorConfig::default() };
-    let found =
-        Found { n_bad: if fills { n_bad } else { 0 }, column_rms: if levels { defects.column_rms() } else { 0.0 } };
+    let overlay = !defects.overlay.is_empty();
+    let config = SensorConfig {
+        bad_pixels: Some(fills),
+        column_noise: Some(levels),
+        overlay: Some(overlay),
+        ..SensorConfig::default()
+    };
+    let found = Found {
+        n_bad: if fills { n_bad } else { 0 },
+        column_rms: if levels { defects.column_rms() } else { 0.0 },
+        drawn: defects.overlay.clone(),
+    };
     let mended = MendedSource::put_together(looked_at, &config, &Calibration::default(), &defects)?;
     Ok((Box::new(mended), found))
 }
 
-/// A source of which frames were read ahead, and their map.
+/// A source of which frames were read ahead, and the map of the first of them.
 struct LookedAt {
     inner: Box<dyn FrameSource>,
     ahead: VecDeque<Frame>,
@@ -62,13 +95,21 @@ struct LookedAt {
 }
 
 impl LookedAt {
-    fn of(mut inner: Box<dyn FrameSource>) -> Self {
+    /// Reads what a sensor's defects are looked for in, and what is drawn.
+    fn of(mut inner: Box<dyn FrameSource>, of_a_sensor: bool, drawn: bool) -> Self {
+        let info = inner.info();
+        let [of_file, of_stream] = OVERLAY_FRAMES;
+        let most = if info.n_frames.is_some() { of_file } else { of_stream };
+        let n_drawn = if drawn { most.min(OVERLAY_BYTES / (info.width * info.height).max(1)) } else { 0 };
+        let n_mapped = if of_a_sensor { LEARN } else { 0 };
         let (mut ahead, mut broken, mut map) = (VecDeque::new(), None, MeanMap::default());
-        while ahead.len() < LEARN && broken.is_none() {
+        while ahead.len() < n_mapped.max(n_drawn) && broken.is_none() {
             match inner.next_frame() {
                 Ok(Some(frame)) => {
-                    // A frame of another size is the detector's to refuse.
-                    let _ = map.push(&frame.pixels);
+                    if ahead.len() < n_mapped {
+                        // A frame of another size is the detector's to refuse.
+                        let _ = map.push(&frame.pixels);
+                    }
                     ahead.push_back(frame);
                 }
                 Ok(None) => break,
@@ -76,6 +117,21 @@ impl LookedAt {
             }
         }
         Self { inner, ahead, broken, map }
+    }
+
+    /// What was found in what was read; what is drawn only if that was.
+    fn defects(&self, drawn: bool) -> Defects {
+        let mut defects = find_defects(&self.map);
+        if drawn {
+            fn grey(frame: &Frame) -> Option<&Image<u8>> {
+                match &frame.pixels {
+                    Pixels::Gray8(image) => Some(image),
+                    _ => None,
+                }
+            }
+            defects.overlay = find_overlay(&self.ahead.iter().filter_map(grey).collect::<Vec<_>>());
+        }
+        defects
     }
 }
 
@@ -108,11 +164,18 @@ impl MendedSource {
         }
         let nothing = |inner| LookedAt { inner, ahead: VecDeque::new(), broken: None, map: MeanMap::default() };
         let (looked_at, defects) = match dark {
-            _ if !(config.fills() || config.levels_columns()) => (nothing(inner), Defects::default()),
-            Some(dark) => (nothing(inner), find_defects(dark)),
-            None => {
-                let looked_at = LookedAt::of(inner);
-                let defects = find_defects(&looked_at.map);
+            _ if !(config.fills() || config.levels_columns() || config.fills_overlay()) => {
+                (nothing(inner), Defects::default())
+            }
+            Some(dark) if !config.fills_overlay() => (nothing(inner), find_defects(dark)),
+            _ => {
+                let of_frames = dark.is_none() && (config.fills() || config.levels_columns());
+                let looked_at = LookedAt::of(inner, of_frames, config.fills_overlay());
+                let drawn = looked_at.defects(config.fills_overlay());
+                let defects = match dark {
+                    Some(dark) => Defects { overlay: drawn.overlay, ..find_defects(dark) },
+                    None => drawn,
+                };
                 (looked_at, defects)
             }
         };
@@ -131,7 +194,10 @@ impl MendedSource {
         let mut done = Vec::new();
         done.extend(known.dark.is_some().then(|| "dark frame".to_string()));
         done.extend(known.flat.is_some().then(|| "flat frame".to_string()));
-        done.extend((config.fills() || correction.n_bad() > 0).then(|| format!("{} bad pixels", correction.n_bad())));
+        let n_drawn = if config.fills_overlay() { defects.overlay.len() } else { 0 };
+        let n_bad = correction.n_bad().saturating_sub(n_drawn);
+        done.extend((config.fills() || n_bad > 0).then(|| format!("{n_bad} bad pixels")));
+        done.extend((n_drawn > 0).then(|| format!("{n_drawn} pixels of what is drawn")));
         let columns = known.dark.is_none() && config.levels_columns();
         done.extend(columns.then(|| format!("columns of {:.2} counts rms", defects.column_rms())));
         if !done.is_empty() {
@@ -192,7 +258,7 @@ impl FrameSource for MendedSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrameIndex, Image, Pixels, Timestamp};
+    use crate::{FrameIndex, Timestamp};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

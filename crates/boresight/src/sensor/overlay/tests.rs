@@ -1,0 +1,151 @@
+//! What is drawn on simulated frames is found, scenery, targets that a camera follows and lines along its pan are not.
+
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const W: usize = 160;
+const H: usize = 120;
+const N: usize = 48;
+
+/// Hard-edged squares on an even ground, displaced by `at(k)` pixels in frame `k`, in noise of two counts; `draw` changes a frame.
+fn frames(at: impl Fn(usize) -> [usize; 2], draw: impl Fn(usize, &mut Image<u8>)) -> Vec<Image<u8>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let squares: Vec<[usize; 3]> = (0..120)
+        .map(|_| [rng.random_range(0..W + 60), rng.random_range(0..H + 60), rng.random_range(40..200)])
+        .collect();
+    (0..N)
+        .map(|k| {
+            let mut image = Image::filled(W, H, 60u8);
+            let [dx, dy] = at(k);
+            for [x, y, v] in &squares {
+                for yy in (y.wrapping_sub(dy)..y.wrapping_sub(dy).wrapping_add(9)).filter(|y| *y < H) {
+                    for xx in (x.wrapping_sub(dx)..x.wrapping_sub(dx).wrapping_add(7)).filter(|x| *x < W) {
+                        image.row_mut(yy)[xx] = *v as u8;
+                    }
+                }
+            }
+            let noisy = |v: &mut u8| *v = (f64::from(*v) + 2.0 * rng.sample::<f64, _>(StandardNormal)).round() as u8;
+            image.as_mut_slice().iter_mut().for_each(noisy);
+            draw(k, &mut image);
+            image
+        })
+        .collect()
+}
+
+fn found(frames: &[Image<u8>]) -> Vec<[u32; 2]> {
+    find_overlay(&frames.iter().collect::<Vec<_>>())
+}
+
+fn still(_: usize) -> [usize; 2] {
+    [0, 0]
+}
+
+fn panning(k: usize) -> [usize; 2] {
+    [k, k / 3]
+}
+
+fn along_rows(k: usize) -> [usize; 2] {
+    [k, 0]
+}
+
+/// A cross in the middle and a square frame.
+fn marks() -> Vec<[usize; 2]> {
+    let cross = (4..12).flat_map(|k| [[80 + k, 60], [80 - k, 60], [80, 60 + k], [80, 60 - k]]);
+    let frame = (0..20).flat_map(|k| [[20 + k, 20], [20 + k, 39], [20, 20 + k], [39, 20 + k]]);
+    cross.chain(frame).collect()
+}
+
+/// Letters that stay beside digits.
+fn letters() -> Vec<[usize; 2]> {
+    let letter =
+        |x: usize| (0..8).flat_map(move |k| [[x, 100 + k], [x + k / 2, 100], [x + k / 2, 104], [x + k / 2, 107]]);
+    [88, 94].into_iter().flat_map(letter).collect()
+}
+
+/// Bars of two digits' width of which some are lit, others in every frame.
+fn digits(k: usize) -> Vec<[usize; 2]> {
+    let mut rng = ChaCha8Rng::seed_from_u64(k as u64);
+    let lit: Vec<bool> = (0..8).map(|_| rng.random()).collect();
+    let bar = |b: usize| (0..8).flat_map(move |y| [[100 + 4 * b, 100 + y], [101 + 4 * b, 100 + y]]);
+    (0..8).filter(|b| lit[*b]).flat_map(bar).collect()
+}
+
+fn put(places: &[[usize; 2]], image: &mut Image<u8>) {
+    places.iter().for_each(|[x, y]| image.row_mut(*y)[*x] = 255);
+}
+
+/// How many of some places were found, and how many of what was found lie farther than three pixels from them.
+fn compared(found: &[[u32; 2]], of: &[[usize; 2]]) -> (usize, usize) {
+    let is_near =
+        |[x, y]: &[u32; 2]| of.iter().any(|p| p[0].abs_diff(*x as usize).max(p[1].abs_diff(*y as usize)) <= 3);
+    let hits = of.iter().filter(|[x, y]| found.contains(&[*x as u32, *y as u32])).count();
+    (hits, found.iter().filter(|p| !is_near(p)).count())
+}
+
+#[test]
+fn marks_are_found_where_the_scene_moves_and_none_in_the_scene() {
+    let of = marks();
+    for at in [panning, along_rows] {
+        assert!(found(&frames(at, |_, _| {})).is_empty(), "the scene alone");
+        let (hits, others) = compared(&found(&frames(at, |_, image| put(&of, image))), &of);
+        assert_eq!(hits, of.len());
+        assert!(others < 20, "{others} px of scenery");
+    }
+    assert!(found(&frames(still, |_, image| put(&of, image))).is_empty(), "they stand as the scene does");
+}
+
+#[test]
+fn digits_are_found_whether_the_scene_moves_or_not() {
+    let all: Vec<[usize; 2]> = (0..N).flat_map(digits).collect();
+    let draw = |k: usize, image: &mut Image<u8>| put(&[digits(k), letters()].concat(), image);
+    for (name, at) in [("still", still as fn(usize) -> [usize; 2]), ("panning", panning)] {
+        let (hits, others) = compared(&found(&frames(at, draw)), &all);
+        assert!(hits as f64 > 0.85 * all.len() as f64, "{name}: {hits} of {}", all.len());
+        assert!(others < 60, "{name}: {others} px of scenery");
+    }
+}
+
+#[test]
+fn a_target_that_the_camera_follows_is_none() {
+    // A spot of deviation 1 px stands in the same place to the last digit; another of 4 px side wanders by a pixel at times.
+    let spot = |image: &mut Image<u8>| {
+        for y in 50..71usize {
+            for x in 70..91usize {
+                let r2 = (x as f64 - 80.3).powi(2) + (y as f64 - 60.2).powi(2);
+                let v = &mut image.row_mut(y)[x];
+                *v = (f64::from(*v) + 190.0 * (-0.5 * r2).exp()).min(255.0) as u8;
+            }
+        }
+    };
+    assert!(found(&frames(panning, |_, image| spot(image))).is_empty());
+    let wandering = |k: usize, image: &mut Image<u8>| {
+        let x = 40 + usize::from(k % 5 == 2);
+        put(&(0..16).map(|i| [x + i % 4, 80 + i / 4]).collect::<Vec<_>>(), image);
+    };
+    assert!(found(&frames(panning, wandering)).is_empty());
+}
+
+#[test]
+fn lines_along_a_pan_and_what_comes_by_are_none() {
+    // A horizon that the pan runs along, and a square that crosses a scene that stands.
+    let horizon = |_: usize, image: &mut Image<u8>| (0..3).for_each(|y| image.row_mut(70 + y).fill(250));
+    assert!(found(&frames(along_rows, horizon)).is_empty());
+    let passing =
+        |k: usize, image: &mut Image<u8>| put(&(0..81).map(|i| [3 * k + i % 9, 50 + i / 9]).collect::<Vec<_>>(), image);
+    assert!(found(&frames(still, passing)).is_empty());
+}
+
+#[test]
+fn frames_too_few_too_small_or_of_several_sizes_have_none() {
+    assert!(find_overlay(&[]).is_empty());
+    let mut some = frames(panning, |_, image| put(&marks(), image));
+    some.truncate(20);
+    assert!(found(&some).is_empty(), "fewer than are compared");
+    let small: Vec<Image<u8>> = (0..N).map(|_| Image::filled(20, 20, 0)).collect();
+    assert!(found(&small).is_empty());
+    let mut some = frames(panning, |_, image| put(&marks(), image));
+    some[7] = Image::filled(W, H - 1, 0);
+    assert!(found(&some).is_empty());
+}
