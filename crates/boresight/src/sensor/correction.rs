@@ -241,6 +241,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_drawn_is_filled_along_its_row_and_column_by_distance() {
+        let block = || (2..7).flat_map(|y| (2..9).map(move |x| [x, y]));
+        let defects = Defects { overlay: block().collect(), ..Defects::default() };
+        let config = SensorConfig { overlay: Some(true), ..Default::default() };
+        let mut c = Correction::new((12, 9), &config, &Calibration::default(), &defects).unwrap();
+        let mut frame = Pixels::GrayF32(column(12, 9, |x, y| 3.0 * x as f32 + 5.0 * y as f32));
+        if let Pixels::GrayF32(image) = &mut frame {
+            block().for_each(|[x, y]| image.row_mut(y as usize)[x as usize] = 999.0);
+        }
+        c.apply(&mut frame);
+        let Pixels::GrayF32(image) = frame else { panic!() };
+        // In the middle of the block, four to the left and the right and three up and down, the plane itself; beside its rim the mean of the three good ones around.
+        assert!((image.row(4)[5] - 35.0).abs() < 1e-4, "{}", image.row(4)[5]);
+        let left = [3, 4, 5].map(|y| 3.0 + 5.0 * y as f32).iter().sum::<f32>() / 3.0;
+        assert!((image.row(4)[2] - left).abs() < 1e-4);
+    }
+
+    #[test]
     fn dark_frames_of_another_size_and_flat_ones_without_light_are_refused() {
         let e = |known: Calibration| {
             Correction::new((8, 6), &SensorConfig::default(), &known, &Defects::default()).unwrap_err().to_string()

@@ -14,6 +14,7 @@
 //! drawn by a simulation at the same place in every frame pass for marks.
 
 mod counts;
+mod ink;
 mod whole;
 
 use crate::Image;
@@ -55,6 +56,8 @@ const OFF_LEVEL: f32 = 0.3;
 const FAINT: f32 = 20.0;
 /// Share of the rectangle around drawn pixels that hang together from which they are a line of text, which is filled as a whole.
 const DENSE: f64 = 0.4;
+/// Largest side of a single letter with what is filled around it, strokes.
+const LETTER: usize = 16;
 /// Half of the side of windows in which edges are counted, and of those in which contrast is measured, strokes.
 const WINDOW: usize = 5;
 const NEAR: usize = 2;
@@ -87,22 +90,6 @@ struct Marks {
     sure: Vec<usize>,
     /// All that are drawn with them.
     all: Vec<usize>,
-}
-
-/// What is drawn with: bright or dark, and how much so.
-#[derive(Clone, Copy)]
-struct Ink {
-    is_bright: bool,
-    level: f32,
-    /// The level of its thinnest strokes.
-    from: f32,
-}
-
-impl Ink {
-    /// Whether a value is the ink's, or beyond it.
-    fn is(self, v: f32) -> bool {
-        if self.is_bright { v >= self.from } else { v <= self.from }
-    }
 }
 
 /// Frames compared: the mean of each pixel, its deviation and its extremes.
@@ -144,6 +131,13 @@ impl Look {
         let columns = x.saturating_sub(reach)..=(x + reach).min(w - 1);
         (y.saturating_sub(reach)..=(y + reach).min(self.h - 1))
             .flat_map(move |y| columns.clone().map(move |x| y * w + x))
+    }
+
+    /// Largest step between two neighbours near a place, counts.
+    fn steepest(&self, image: &[u8], i: usize) -> f32 {
+        let near = self.around(i, NEAR * self.s);
+        let steps = near.flat_map(|j| [1, self.w].map(|d| image.get(j + d).map_or(0, |v| v.abs_diff(image[j]))));
+        steps.max().map_or(0.0, f32::from)
     }
 
     /// Smallest and largest value near a place.
@@ -211,43 +205,6 @@ impl Look {
         };
         all.extend(self.inner(1).filter(is_faint));
         Marks { sure, all }
-    }
-
-    /// Sharp edges that stand, on the side of the level that digits are drawn with: who draws digits draws all else with it.
-    fn of_their_level(&self, switching: &[usize]) -> Vec<usize> {
-        let level = self.ink(&[], switching).level;
-        let is_drawn = |i: &usize| {
-            let near = (self.mean[*i] - level).abs() <= 0.5 * ONE_LEVEL as f32;
-            let stands = || self.deviation[*i] <= STILL * CONTRAST;
-            let is_sharp = || {
-                let [x, y] = self.edge(&self.mean, *i);
-                let [low, high] = self.extremes(&self.mean, *i);
-                x.max(y) >= CONTRAST && x.max(y) >= SHARP * (high - low)
-            };
-            near && stands() && is_sharp()
-        };
-        self.inner(1).filter(is_drawn).collect()
-    }
-
-    /// What is drawn with, of places that are sure and of such that switch.
-    fn ink(&self, sure: &[usize], switching: &[usize]) -> Ink {
-        let mut sides = [Vec::new(), Vec::new()];
-        for i in sure {
-            let [low, high] = self.extremes(&self.mean, *i);
-            sides[usize::from(self.mean[*i] >= 0.5 * (low + high))].push(self.mean[*i]);
-        }
-        sides[1].extend(switching.iter().map(|i| f32::from(self.high[*i])));
-        let middle = |of: &mut Vec<f32>| {
-            let middle = of.len() / 2;
-            (of.len() >= LEAST_SWITCHING as usize).then(|| *of.select_nth_unstable_by(middle, f32::total_cmp).1)
-        };
-        let typical = middle(&mut self.mean.clone()).unwrap_or_default();
-        // Of a letter and its outline that which is farther from the scene.
-        let levels = sides.each_mut().map(|side| middle(side));
-        let off = |side: usize| levels[side].map_or(-1.0, |level| (level - typical).abs());
-        let is_bright = off(1) >= off(0);
-        let level = levels[usize::from(is_bright)].unwrap_or(f32::MAX);
-        Ink { is_bright, level, from: level + OFF_LEVEL * (typical - level) }
     }
 
     /// The places, and all that stand and hang together with them.
@@ -360,7 +317,9 @@ impl Look {
             samples.iter().all(|sample| {
                 let [low, high] = self.extremes(sample, i);
                 left -= 1;
-                drawn += usize::from(high - low >= FAINT && ink.is(if ink.is_bright { high } else { low }));
+                let is_ink = high - low >= FAINT && ink.is(if ink.is_bright { high } else { low });
+                // What a lens draws as bright, a wood in the sun, has no such edges.
+                drawn += usize::from(is_ink && self.steepest(sample, i) >= SHARP * (high - low));
                 drawn + left >= least
             })
         };
@@ -375,8 +334,10 @@ impl Look {
                 }
             }
         }
+        // Letters that nothing but their level tells are found without their soft rims.
+        let rim = if marks.sure.is_empty() { 3 } else { 1 };
         for i in marks.all.iter().chain(switching) {
-            self.around(*i, self.s).for_each(|j| drawn[j] = true);
+            self.around(*i, rim * self.s).for_each(|j| drawn[j] = true);
         }
         self.fill_text(&mut drawn);
         if !marks.sure.is_empty() {

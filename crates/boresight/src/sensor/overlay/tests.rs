@@ -1,6 +1,9 @@
 //! What is drawn on simulated frames is found, scenery, targets that a camera follows and lines along its pan are not.
 
+use super::super::{MendedSource, SensorConfig, if_defective};
 use super::*;
+use crate::sensor::Calibration;
+use crate::{Frame, FrameIndex, FrameSource, PixelKind, Pixels, Result, SourceInfo, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -13,7 +16,7 @@ const N: usize = 48;
 fn frames(at: impl Fn(usize) -> [usize; 2], draw: impl Fn(usize, &mut Image<u8>)) -> Vec<Image<u8>> {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let squares: Vec<[usize; 3]> = (0..120)
-        .map(|_| [rng.random_range(0..W + 60), rng.random_range(0..H + 60), rng.random_range(40..200)])
+        .map(|_| [rng.random_range(0..W + 60), rng.random_range(0..H + 60), rng.random_range(40..170)])
         .collect();
     (0..N)
         .map(|k| {
@@ -98,7 +101,7 @@ fn marks_are_found_where_the_scene_moves_and_none_in_the_scene() {
 
 #[test]
 fn digits_are_found_whether_the_scene_moves_or_not() {
-    let all: Vec<[usize; 2]> = (0..N).flat_map(digits).collect();
+    let all: Vec<[usize; 2]> = (0..N).flat_map(digits).chain(letters()).collect();
     let draw = |k: usize, image: &mut Image<u8>| put(&[digits(k), letters()].concat(), image);
     for (name, at) in [("still", still as fn(usize) -> [usize; 2]), ("panning", panning)] {
         let (hits, others) = compared(&found(&frames(at, draw)), &all);
@@ -148,4 +151,82 @@ fn frames_too_few_too_small_or_of_several_sizes_have_none() {
     let mut some = frames(panning, |_, image| put(&marks(), image));
     some[7] = Image::filled(W, H - 1, 0);
     assert!(found(&some).is_empty());
+}
+
+/// Frames of coded video.
+struct Shown(SourceInfo, std::vec::IntoIter<Image<u8>>, u64);
+
+impl Shown {
+    fn of(frames: &[Image<u8>]) -> Box<dyn FrameSource> {
+        let info = SourceInfo {
+            label: String::new(),
+            reader: String::new(),
+            width: W,
+            height: H,
+            kind: PixelKind::Gray8,
+            n_frames: Some(frames.len() as u64),
+            rate_hz: Some(25.0),
+            true_times: true,
+        };
+        Box::new(Self(info, frames.to_vec().into_iter(), 0))
+    }
+}
+
+impl FrameSource for Shown {
+    fn info(&self) -> &SourceInfo {
+        &self.0
+    }
+
+    fn is_coded(&self) -> bool {
+        true
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        self.2 += 1;
+        let (index, time) = (FrameIndex(self.2 - 1), Timestamp::from_secs_f64(self.2 as f64 / 25.0));
+        Ok(self.1.next().map(|image| Frame { index, time, pixels: Pixels::Gray8(image) }))
+    }
+}
+
+fn all(mut source: Box<dyn FrameSource>) -> Vec<Pixels> {
+    std::iter::from_fn(|| source.next_frame().unwrap().map(|f| f.pixels)).collect()
+}
+
+#[test]
+fn marks_are_filled_unasked_and_as_the_written_configuration_says() {
+    let with = frames(panning, |_, image| put(&marks(), image));
+    let (source, found) = if_defective(Shown::of(&with), N, &SensorConfig::default()).unwrap();
+    assert!(found.drawn.len() >= marks().len());
+    let mended = all(source);
+    assert_eq!(mended.len(), N);
+    for pixels in &mended {
+        let Pixels::Gray8(image) = pixels else { panic!() };
+        assert!(marks().iter().all(|[x, y]| image.row(*y)[*x] < 190), "the scene is no brighter than 170 and noise");
+    }
+    let config = SensorConfig { overlay: Some(true), ..SensorConfig::default() };
+    let again = MendedSource::new(Shown::of(&with), &config, &Calibration::default(), None).unwrap();
+    assert!(again.info().reader.contains("pixels of what is drawn"), "{}", again.info().reader);
+    assert_eq!(all(Box::new(again)), mended);
+    // Frames in colour are filled by what was found in grey ones.
+    let mut colour = Pixels::Rgb8(Image::filled(W, H, [10, 20, 30]));
+    if let Pixels::Rgb8(image) = &mut colour {
+        marks().iter().for_each(|[x, y]| image.row_mut(*y)[*x] = [255; 3]);
+    }
+    found.overlay(W, H).unwrap().apply(&mut colour);
+    assert_eq!(colour, Pixels::Rgb8(Image::filled(W, H, [10, 20, 30])));
+    let left = SensorConfig { overlay: Some(false), ..SensorConfig::default() };
+    let (source, found) = if_defective(Shown::of(&with), N, &left).unwrap();
+    assert!(found.drawn.is_empty() && found.overlay(W, H).is_none());
+    assert!(all(source).iter().zip(&with).all(|(a, b)| *a == Pixels::Gray8(b.clone())));
+}
+
+#[test]
+fn marks_of_the_digits_level_are_found_where_the_scene_stands() {
+    let draw = |k: usize, image: &mut Image<u8>| put(&[digits(k), marks()].concat(), image);
+    let all: Vec<[usize; 2]> = (0..N).flat_map(digits).chain(marks()).collect();
+    let found = found(&frames(still, draw));
+    let (hits, _) = compared(&found, &marks());
+    assert_eq!(hits, marks().len());
+    let (_, others) = compared(&found, &all);
+    assert!(others < 60, "{others} px of scenery");
 }
