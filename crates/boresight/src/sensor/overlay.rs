@@ -51,6 +51,8 @@ const LEAST_SWITCHING: u32 = 8;
 const PERSISTS: f32 = 0.7;
 const BESIDE: usize = 12;
 const GAP: usize = 4;
+/// Share of the picture within reach of text, at most: what goes on farther is scenery.
+const MOST_TEXT: f64 = 0.25;
 /// How far thin strokes are from the level that is drawn with, as a share of its height above the scene; and the least edge they make where the ground is nearly as bright, counts.
 const OFF_LEVEL: f32 = 0.3;
 const FAINT: f32 = 20.0;
@@ -323,16 +325,21 @@ impl Look {
                 drawn + left >= least
             })
         };
-        // A line of text goes on as long as it has no gap.
+        // A line of text goes on as long as it has no gap, and fills no picture.
         let marked = if marks.sure.is_empty() { &[][..] } else { &marks.all };
         let mut next: Vec<(usize, usize)> = marked.iter().chain(switching).map(|i| (*i, BESIDE)).collect();
+        let mut left = (MOST_TEXT * drawn.len() as f64) as usize;
         while let Some((i, reach)) = next.pop() {
             for j in self.around(i, reach * self.s).filter(|j| !std::mem::replace(&mut asked[*j], true)) {
-                drawn[j] = persists(j);
+                drawn[j] = left > 0 && persists(j);
+                left = left.saturating_sub(1);
                 if drawn[j] {
                     next.push((j, GAP));
                 }
             }
+        }
+        if left == 0 {
+            drawn.fill(false);
         }
         // Letters that nothing but their level tells are found without their soft rims.
         let rim = if marks.sure.is_empty() { 3 } else { 1 };

@@ -92,6 +92,8 @@ struct LookedAt {
     ahead: VecDeque<Frame>,
     broken: Option<Error>,
     map: MeanMap,
+    /// Frames in which it is looked for what is drawn: of all that are read ahead as many as a run with the configuration written reads.
+    n_drawn: usize,
 }
 
 impl LookedAt {
@@ -116,7 +118,7 @@ impl LookedAt {
                 Err(e) => broken = Some(e),
             }
         }
-        Self { inner, ahead, broken, map }
+        Self { inner, ahead, broken, map, n_drawn }
     }
 
     /// What was found in what was read; what is drawn only if that was.
@@ -129,7 +131,7 @@ impl LookedAt {
                     _ => None,
                 }
             }
-            defects.overlay = find_overlay(&self.ahead.iter().filter_map(grey).collect::<Vec<_>>());
+            defects.overlay = find_overlay(&self.ahead.iter().take(self.n_drawn).filter_map(grey).collect::<Vec<_>>());
         }
         defects
     }
@@ -162,7 +164,8 @@ impl MendedSource {
                 .at("input.sensor")
                 .hint("--set input.colour=gray"));
         }
-        let nothing = |inner| LookedAt { inner, ahead: VecDeque::new(), broken: None, map: MeanMap::default() };
+        let nothing =
+            |inner| LookedAt { inner, ahead: VecDeque::new(), broken: None, map: MeanMap::default(), n_drawn: 0 };
         let (looked_at, defects) = match dark {
             _ if !(config.fills() || config.levels_columns() || config.fills_overlay()) => {
                 (nothing(inner), Defects::default())
