@@ -7,7 +7,7 @@
 //! 3. for 24 windows of hue, 45 degrees wide, the largest 8-connected piece of a window counts if it does not touch
 //!    the border, fills 45 % of its box, has 6 pixels of the grid and holds half of its window's pixels;
 //! 4. the window with the most of it (root of the area times saturation, less what the background has of the hue) wins,
-//!    if it was seen in at least 3 frames; the reference is the median of red, green and blue over its pieces.
+//!    if it was seen in at least 3 frames and half of its pieces' pixels are of places of their own; the reference is the median of red, green and blue over its pieces.
 
 use super::super::ranks::{LANES, Ranked, block};
 use super::hsi::{Hsi, hsi};
@@ -34,6 +34,9 @@ const MIN_SATURATION: f64 = 0.1;
 const MIN_PIXELS: usize = 6;
 /// Difference of a channel from the background that counts as moving, counts.
 const MOVED: u8 = 25;
+/// Share of the pieces' pixels that are of places of their own, at least: what moves by half of its size from frame to frame has more.
+const LEAST_NEW: f64 = 0.5;
+
 /// Widest grid that is looked at, px: of wider frames every so many-th pixel.
 pub const GRID_PX: usize = 320;
 
@@ -48,8 +51,7 @@ pub fn choose_reference(frames: &[&Image<[u8; 3]>]) -> Option<Reference> {
         frames.iter().filter(|f| (f.width(), f.height()) == (w, h)).map(|f| grid(f, step)).collect();
     let background = median_of(&grids)?;
     let static_hues = count_hues(&background);
-    // For every window: score, areas, colours.
-    let mut found: Vec<(f64, Vec<usize>, Vec<[u8; 3]>)> = vec![(0.0, Vec::new(), Vec::new()); WINDOWS];
+    let mut found = vec![Found::default(); WINDOWS];
     let mut hues = vec![u8::MAX; gw * gh];
     for pixels in &grids {
         let mut n_of_sector = [0usize; WINDOWS];
@@ -71,23 +73,44 @@ pub fn choose_reference(frames: &[&Image<[u8; 3]>]) -> Option<Reference> {
             let Some(piece) = compact_piece(&hues, gw, gh, in_window) else { continue };
             let colours = piece.iter().map(|&i| pixels[i]);
             let saturation = colours.clone().map(|p| hsi(p).saturation).sum::<f64>() / piece.len() as f64;
-            found.0 += (piece.len() as f64).sqrt() * saturation;
-            found.1.push(piece.len());
-            found.2.extend(colours);
+            found.score += (piece.len() as f64).sqrt() * saturation;
+            found.areas.push(piece.len());
+            found.colours.extend(colours);
+            found.places.extend(&piece);
         }
     }
     let distinct = |k: usize| {
         let same: usize = static_hues.iter().enumerate().filter(|(s, _)| near(*s, k)).map(|(_, n)| n).sum();
         1.0 / (1.0 + 20.0 * same as f64 / background.len() as f64)
     };
-    let enough = (0..WINDOWS).filter(|&k| found[k].1.len() >= 3);
-    let best = enough.max_by(|&a, &b| (found[a].0 * distinct(a)).total_cmp(&(found[b].0 * distinct(b))))?;
-    let (_, areas, colours) = found.swap_remove(best);
+    let enough: Vec<usize> = (0..WINDOWS).filter(|&k| found[k].areas.len() >= 3 && found[k].goes_on()).collect();
+    let score = |k: usize| found[k].score * distinct(k);
+    let best = enough.into_iter().max_by(|&a, &b| score(a).total_cmp(&score(b)))?;
+    let Found { areas, colours, .. } = found.swap_remove(best);
     let rgb = median_of(&colours.iter().map(|&c| vec![c]).collect::<Vec<_>>())?.first().copied()?;
     let mut areas = areas;
     areas.sort_unstable();
     let area_px = areas.get(areas.len() / 2).copied()? as f64 * (step * step) as f64;
     Some(Reference { rgb, hsi: hsi(rgb), n_frames: areas.len(), area_px })
+}
+
+/// The pieces of a window of hues.
+#[derive(Clone, Default)]
+struct Found {
+    score: f64,
+    areas: Vec<usize>,
+    colours: Vec<[u8; 3]>,
+    places: Vec<usize>,
+}
+
+impl Found {
+    /// Whether the pieces lie on other ground from frame to frame: the digits of a clock, a lamp that blinks come back to theirs.
+    fn goes_on(&self) -> bool {
+        let mut places = self.places.clone();
+        places.sort_unstable();
+        places.dedup();
+        places.len() as f64 >= LEAST_NEW * self.places.len() as f64
+    }
 }
 
 /// The window's own 15 degrees of a hue.
@@ -204,6 +227,20 @@ mod tests {
         let chosen = choose_reference(&frames.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(chosen.rgb, [90, 150, 80]);
         assert!(chosen.n_frames >= 10 && (chosen.area_px - 200.0).abs() < 30.0, "{chosen:?}");
+    }
+
+    #[test]
+    fn coloured_digits_that_come_and_go_in_their_places_are_no_target() {
+        let frame = |k: usize| {
+            let mut f = Image::filled(160, 120, [60u8; 3]);
+            let x = [20, 32, 100][k % 3];
+            (90..100).for_each(|y| f.row_mut(y)[x..x + 7].fill([220, 220, 30]));
+            f
+        };
+        let frames: Vec<_> = (0..24).map(frame).collect();
+        assert_eq!(choose_reference(&frames.iter().collect::<Vec<_>>()), None);
+        // Three times in three places it is somewhere else each time.
+        assert!(choose_reference(&frames[..3].iter().collect::<Vec<_>>()).is_some());
     }
 
     #[test]
