@@ -34,7 +34,7 @@ impl Look {
         };
         let typical = middle(&mut self.mean.clone()).unwrap_or_default();
         // Of a letter and its outline that which is farther from the scene.
-        let levels = sides.each_mut().map(|side| middle(side));
+        let levels = sides.each_mut().map(middle);
         let off = |side: usize| levels[side].map_or(-1.0, |level| (level - typical).abs());
         let is_bright = off(1) >= off(0);
         let level = levels[usize::from(is_bright)].unwrap_or(f32::MAX);
