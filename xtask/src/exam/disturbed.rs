@@ -36,8 +36,9 @@ pub fn apply(how: Variant, frames: &mut Vec<Image<u8>>, rows: &mut Vec<TrackRow>
             });
         }
         Variant::Repeated => {
-            let shown: Vec<usize> =
-                (0..n).flat_map(|k| std::iter::repeat_n(k, 1 + usize::from((k + 1) % REPEATED_EVERY == 0))).collect();
+            let shown: Vec<usize> = (0..n)
+                .flat_map(|k| std::iter::repeat_n(k, 1 + usize::from((k + 1).is_multiple_of(REPEATED_EVERY))))
+                .collect();
             show(&shown, frames, rows);
             return Ok(rate_hz * (REPEATED_EVERY + 1) as f64 / REPEATED_EVERY as f64);
         }
@@ -96,7 +97,7 @@ fn show(shown: &[usize], frames: &mut Vec<Image<u8>>, rows: &mut Vec<TrackRow>) 
     let of = std::mem::take(rows);
     for (k, from) in shown.iter().enumerate() {
         rows.extend(of.iter().filter(|r| r.frame as usize == *from).map(|r| {
-            let mut row = r.clone();
+            let mut row = *r;
             row.frame = k as u32;
             row
         }));
@@ -117,7 +118,7 @@ fn doubled(of: &Image<u8>) -> Result<Image<u8>> {
     let (w, h) = (of.width(), of.height());
     let two = |k: usize, n: usize| {
         let near = k / 2;
-        let other = if k % 2 == 0 { near.saturating_sub(1) } else { (near + 1).min(n - 1) };
+        let other = if k.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(n - 1) };
         [near, other]
     };
     image(2 * w, 2 * h, |x, y| {

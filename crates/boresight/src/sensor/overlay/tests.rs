@@ -154,7 +154,7 @@ fn frames_too_few_too_small_or_of_several_sizes_have_none() {
 }
 
 /// Frames of coded video.
-struct Shown(SourceInfo, std::vec::IntoIter<Image<u8>>, u64);
+struct Shown(SourceInfo, Vec<Image<u8>>, u64);
 
 impl Shown {
     fn of(frames: &[Image<u8>]) -> Box<dyn FrameSource> {
@@ -168,7 +168,7 @@ impl Shown {
             rate_hz: Some(25.0),
             true_times: true,
         };
-        Box::new(Self(info, frames.to_vec().into_iter(), 0))
+        Box::new(Self(info, frames.to_vec(), 0))
     }
 }
 
@@ -182,9 +182,10 @@ impl FrameSource for Shown {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
+        let k = self.2;
         self.2 += 1;
-        let (index, time) = (FrameIndex(self.2 - 1), Timestamp::from_secs_f64(self.2 as f64 / 25.0));
-        Ok(self.1.next().map(|image| Frame { index, time, pixels: Pixels::Gray8(image) }))
+        let (index, time) = (FrameIndex(k), Timestamp::from_secs_f64(k as f64 / 25.0));
+        Ok(self.1.get(k as usize).map(|image| Frame { index, time, pixels: Pixels::Gray8(image.clone()) }))
     }
 }
 
