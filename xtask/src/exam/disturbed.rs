@@ -1,6 +1,6 @@
 //! What recorders, links, lamps and displays do to a clip: variants in which the targets are where they were, so that figures that fall show what the default run takes for something else.
 
-use super::variants::Variant;
+use super::variant::Variant;
 use anyhow::{Context, Result};
 use boresight::{Image, TrackRow};
 use rand::{RngExt, SeedableRng};

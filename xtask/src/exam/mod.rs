@@ -13,6 +13,7 @@ mod disturbed;
 mod scenes;
 pub mod score;
 mod tables;
+mod variant;
 mod variants;
 
 use anyhow::{Result, ensure};
@@ -48,7 +49,7 @@ pub struct Args {
     own_near_px: f64,
     /// The grey clips of 8 bits seen in another way; nothing is written then.
     #[arg(long)]
-    variant: Option<variants::Variant>,
+    variant: Option<variant::Variant>,
     /// Only so many composed clips of one seed: real stills under a moving camera with targets drawn on them; nothing is written to the page then.
     #[arg(long, conflicts_with_all = ["own", "variant"], value_parser = clap::value_parser!(u64).range(1..))]
     composed: Option<u64>,
