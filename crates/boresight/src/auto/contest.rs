@@ -36,8 +36,9 @@ pub(super) fn is_often_blind(scans: &[Scan]) -> bool {
     scans.iter().filter(|s| s.blind).count() as f64 > OFTEN_BLIND * scans.len() as f64
 }
 
-/// Why what came next is taken: its chains gain more in scans in which the choice was blind than those of the choice that go with none of them in all others; nothing if they do not.
+/// Why what came next is taken (the choice's chains are `evidence`): its chains gain more in scans in which the choice was blind than those of the choice that go with none of them in all others; nothing if they do not.
 pub(super) fn beaten(
+    evidence: &Evidence,
     scans: &[Scan],
     of_next: &[Scan],
     area_px2: f64,
@@ -49,8 +50,7 @@ pub(super) fn beaten(
         kept.iter_mut().zip(scans).for_each(|(next, own)| next.blind |= own.blind != own_is_blind);
         Evidence::of_scans(&kept, area_px2)
     };
-    let own = Evidence::of_scans(scans, area_px2);
-    let (alone, beside) = (next(true), own.gain_beside(&next(false)).max(0.0));
+    let (alone, beside) = (next(true), evidence.gain_beside(&next(false)).max(0.0));
     (alone.gain() > beside + SURE_GAIN).then(|| {
         let [name, other] = [choice, instead].map(|c| c.config.detector.threshold.name());
         format!(
@@ -58,7 +58,7 @@ pub(super) fn beaten(
              {} others: so it is taken.",
             alone.times_s.len(),
             alone.words(),
-            own.times_s.len(),
+            evidence.times_s.len(),
         )
     })
 }
@@ -108,7 +108,8 @@ mod tests {
             };
             all.iter().enumerate().map(of).collect()
         };
-        let beaten = |own: &[Scan], next: &[Scan]| beaten(own, next, 9e4, &choice, &choice);
+        let beaten =
+            |own: &[Scan], next: &[Scan]| beaten(&Evidence::of_scans(own, 9e4), own, next, 9e4, &choice, &choice);
         assert!(is_often_blind(&one(1, 12)) && !is_often_blind(&one(1, 35)));
         let reason = beaten(&one(1, 12), &one(0, 40)).unwrap();
         assert!(reason.contains("In 28 frames") && reason.contains("1 chain in motion"), "{reason}");

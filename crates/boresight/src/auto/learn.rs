@@ -233,16 +233,19 @@ fn learn_on(
     pass.take_on(frames, &mut at_once, usize::MAX);
     let evidence = Evidence::of_scans(pass.scans(), area_px2);
     if let Some(other) = choice.runner_up.take() {
-        let mut reason = contest::lost(&evidence, pass.scans(), choice, &other);
-        if reason.is_none() && contest::is_often_blind(pass.scans()) {
-            let (mut next, mut at_once) = first_pass(frames, &other.config, request)?;
-            next.take_on(frames, &mut at_once, pass.scans().len().min(evidence::MOST_SCANS));
-            reason = contest::beaten(pass.scans(), next.scans(), area_px2, choice, &other);
-        }
-        if let Some(reason) = reason {
+        if let Some(reason) = contest::lost(&evidence, pass.scans(), choice, &other) {
             *choice = *other;
             choice.reasons.push(reason);
             return learn_set(frames, choice, request);
+        }
+        if contest::is_often_blind(pass.scans()) {
+            let (mut next, mut at_once) = first_pass(frames, &other.config, request)?;
+            next.take_on(frames, &mut at_once, pass.scans().len().min(evidence::MOST_SCANS));
+            if let Some(reason) = contest::beaten(&evidence, pass.scans(), next.scans(), area_px2, choice, &other) {
+                *choice = *other;
+                choice.reasons.push(reason);
+                return learn_on(next, at_once, frames, choice, request);
+            }
         }
     }
     speed::learn(&evidence, LengthUnit::Pixel, &mut choice.config, &mut choice.reasons);

@@ -64,7 +64,10 @@ pub fn open_and_choose(input: impl AsRef<OsStr>, base: &Config, request: &Reques
     };
     let (mut frames, found) = read(&mut base, beside.clone())?;
     let base = &base;
-    let anew = || Read::All(second_look::frames(input, base, PROBE_FRAMES));
+    // What was found drawn is filled in the frames of a second look as well, and not looked for again.
+    let mut unfilled = base.clone();
+    unfilled.input.sensor.overlay = given.overlay;
+    let anew = || Read::All(second_look::frames(input, &unfilled, PROBE_FRAMES));
     let mut overlay = found.overlay(frames.info().width, frames.info().height);
     let second = |frames: &mut Replay, wanted: Wanted| {
         let read = match (wanted, &beside) {

@@ -21,7 +21,7 @@ pub struct SensorConfig {
     /// frame's height that never moves is taken for one. Left out: as bad pixels, where the scene moves over the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column_noise: Option<bool>,
-    /// Whether what a camera or a recorder draws on the picture (a cross, a clock, text) is looked for in the first 400 frames, of a stream 48, or as many as 128 MB hold, and filled from around:
+    /// Whether what a camera or a recorder draws on the picture (a cross, a clock, text) is looked for in the first 400 frames, 48 where their number is not known, or as many as 128 MB hold, and filled from around:
     /// what stands still to a tenth of a pixel while the scene moves, and digits that change. Left out: where a configuration is chosen, in grey frames of 8 bits; where one is given, not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overlay: Option<bool>,

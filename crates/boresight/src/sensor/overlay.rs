@@ -10,7 +10,7 @@
 //!
 //! Around both, what is contrasted in most frames, by the level that is drawn with, is drawn as well: digits in other states, and letters beside them. Of a scene that stands nothing else is taken but sharp edges of the digits' own level.
 //! Symbols: w, h size of the frame, px; s pixels of a stroke, one for each [`STROKE_PX`] of height; edges are the larger step to one of the two neighbours along an axis, counts.
-//! Limits: 8 bits; what is half transparent, blurred, or less than [`CONTRAST`] from what is around it is left; so is all of a scene that stands for these seconds and moves later; hard-edged things
+//! Limits: 8 bits; frames of which fewer than twelve may be held; what is half transparent, blurred, or less than [`CONTRAST`] from what is around it is left; so is all of a scene that stands for these seconds and moves later, and what is drawn first in the midst of them; hard-edged things
 //! drawn by a simulation at the same place in every frame pass for marks.
 
 mod counts;
@@ -33,6 +33,9 @@ const SHARP: f32 = 0.6;
 /// Tiles along each axis in which it is counted what moves, edges in each, and the majority of those that move.
 const TILES: usize = 8;
 const TILE_EDGES: u32 = 6;
+/// Edges that move for each that stands, in a tile that moves; and every so many-th of the frames compared tells it as well as all.
+const MOVED_OF_TILE: u32 = 2;
+const MOVING_EVERY: usize = 3;
 /// Tiles that move for each that stands, and at least; and fewer where nearly all that stands is of one level, as what is drawn is and no scenery.
 const MAJORITY: [f64; 2] = [1.5, 4.0];
 const OF_ONE_LEVEL: [f64; 2] = [0.2, 3.0];
@@ -40,6 +43,8 @@ const ONE_LEVEL_SHARE: f64 = 0.85;
 const ONE_LEVEL: usize = 20;
 /// Edges of each direction that stand within half of a window around a mark's, share of them among all that are as strong in the mean of the frames, and such places from which there is a mark.
 const OF_EACH: u32 = 2;
+/// What is along an axis within a fifth counts for it: ends of lines count for both.
+const ALONG: f32 = 0.8;
 const STANDING: f32 = 0.7;
 const LEAST_MARKS: usize = 20;
 /// Distance from one of two levels, as a share of theirs; share of the frames in which a pixel keeps to them, number of its changes, and of pixels like it in a window.
@@ -47,10 +52,16 @@ const NEAR_LEVEL: f32 = 0.12;
 const KEEPS: f32 = 0.95;
 const CHANGES: u32 = 4;
 const LEAST_SWITCHING: u32 = 8;
+/// The edge that such a pixel makes at its upper level, as a share of their distance, and in which share of the frames there.
+const SWITCHED: f32 = 0.5;
+const MOSTLY: f32 = 0.7;
 /// Share of the frames in which a place is contrasted, so that it is drawn beside what is, and how far from it, strokes: the height of a letter; and the widest gap in a line of text.
 const PERSISTS: f32 = 0.7;
 const BESIDE: usize = 12;
 const GAP: usize = 4;
+/// What is filled around marks and digits, which a codec smears them over, strokes; more around letters that nothing but their level tells, which are found without their soft rims.
+const RIM: usize = 1;
+const SOFT_RIM: usize = 3;
 /// Share of the picture within reach of text, at most: what goes on farther is scenery.
 const MOST_TEXT: f64 = 0.25;
 /// How far thin strokes are from the level that is drawn with, as a share of its height above the scene; and the least edge they make where the ground is nearly as bright, counts.
@@ -142,9 +153,14 @@ impl Look {
         steps.max().map_or(0.0, f32::from)
     }
 
-    /// Smallest and largest value near a place.
+    /// Smallest and largest value near a place, stroke by stroke: large frames are asked for as many pixels as small ones.
     fn extremes<T: Copy + Into<f32>>(&self, image: &[T], i: usize) -> [f32; 2] {
-        let near = self.around(i, NEAR * self.s).map(|j| image[j].into());
+        let steps = |at: usize, n: usize| {
+            let first = at - (at / self.s).min(NEAR) * self.s;
+            (first..=(at + NEAR * self.s).min(n - 1)).step_by(self.s)
+        };
+        let (x, y) = (i % self.w, i / self.w);
+        let near = steps(y, self.h).flat_map(|y| steps(x, self.w).map(move |x| image[y * self.w + x].into()));
         near.fold([f32::MAX, f32::MIN], |[low, high], v| [low.min(v), high.max(v)])
     }
 
@@ -172,9 +188,8 @@ impl Look {
         if standing.len() < LEAST_MARKS || !self.moves(&standing, samples) {
             return Marks::default();
         }
-        // What is along an axis within a fifth counts for it: ends of lines count for both.
         let along = |axis: usize| {
-            let of = |e: &[f32; 2]| e[axis] >= 0.8 * e[1 - axis];
+            let of = |e: &[f32; 2]| e[axis] >= ALONG * e[1 - axis];
             Counts::of(self.w, self.h, standing.iter().filter(|(_, e)| of(e)).map(|(i, _)| *i))
         };
         let (vertical, horizontal) = (along(0), along(1));
@@ -199,7 +214,11 @@ impl Look {
         if sure.len() < LEAST_MARKS * self.s {
             return Marks::default();
         }
-        let mut all = self.joined(sharp, &standing);
+        let mut left = vec![false; self.w * self.h];
+        standing.iter().for_each(|(i, _)| left[*i] = true);
+        sharp.iter().for_each(|i| left[*i] = false);
+        let mut all = sharp;
+        self.join(&mut all, &mut left, 1);
         let ink = self.ink(&sure, &[]);
         let is_faint = |i: &usize| {
             let [x, y] = self.edge(&self.mean, *i);
@@ -209,17 +228,13 @@ impl Look {
         Marks { sure, all }
     }
 
-    /// The places, and all that stand and hang together with them.
-    fn joined(&self, mut places: Vec<usize>, standing: &[(usize, [f32; 2])]) -> Vec<usize> {
-        let mut left = vec![false; self.w * self.h];
-        standing.iter().for_each(|(i, _)| left[*i] = true);
-        places.iter().for_each(|i| left[*i] = false);
+    /// Adds to the places all of those left that hang together with them, over gaps of less than `reach`, and takes them from these.
+    fn join(&self, places: &mut Vec<usize>, left: &mut [bool], reach: usize) {
         let mut next = 0;
         while let Some(i) = places.get(next).copied() {
             next += 1;
-            places.extend(self.around(i, 1).filter(|j| std::mem::take(&mut left[*j])));
+            places.extend(self.around(i, reach).filter(|j| std::mem::take(&mut left[*j])));
         }
-        places
     }
 
     /// Whether the scene moves under these edges.
@@ -229,8 +244,7 @@ impl Look {
         let axis = |[x, y]: [f32; 2]| usize::from(y >= x);
         let (mut still, mut moved) = ([[0u32; TILES * TILES]; 2], [[0u32; TILES * TILES]; 2]);
         standing.iter().for_each(|(i, e)| still[axis(*e)][tile(*i)] += 1);
-        // Some frames and rows tell as much as all.
-        let some: Vec<&[u8]> = samples.iter().step_by(3).copied().collect();
+        let some: Vec<&[u8]> = samples.iter().step_by(MOVING_EVERY).copied().collect();
         for sample in &some {
             for i in self.inner(self.s) {
                 let e = self.edge(sample, i);
@@ -240,21 +254,24 @@ impl Look {
             }
         }
         let frames = some.len() as u32;
-        let [majority, least_tiles] = if self.is_of_one_level(standing) { OF_ONE_LEVEL } else { MAJORITY };
-        (0..2).any(|axis| {
-            let (mut n_moved, mut n_still) = (0, 0);
+        // Tiles that move and that stand, across each axis.
+        let tiles = [0, 1].map(|axis| {
+            let (mut n_moved, mut n_still) = (0.0, 0.0);
             for (moved, still) in moved[axis].iter().zip(&still[axis]) {
                 // All rows of those that stand, some of the others.
                 let (moved, still) = (moved * self.s as u32 / frames, *still);
                 let least = TILE_EDGES * self.s as u32;
-                if moved >= least && moved >= 2 * still {
-                    n_moved += 1;
+                if moved >= least && moved >= MOVED_OF_TILE * still {
+                    n_moved += 1.0;
                 } else if still >= least {
-                    n_still += 1;
+                    n_still += 1.0;
                 }
             }
-            f64::from(n_moved) >= least_tiles.max(majority * f64::from(n_still))
-        })
+            [n_moved, n_still]
+        });
+        let are_most =
+            |[majority, least]: [f64; 2]| tiles.iter().any(|[moved, still]| *moved >= least.max(majority * still));
+        are_most(MAJORITY) || are_most(OF_ONE_LEVEL) && self.is_of_one_level(standing)
     }
 
     /// Whether the bright side of nearly all these edges, or the dark one, is of one level.
@@ -279,7 +296,7 @@ impl Look {
             if range < CONTRAST {
                 return false;
             }
-            let (mut odd, mut changes, mut up, mut sharp, mut was_up) = (0, 0, 0, 0, None);
+            let (mut odd, mut changes, mut up, mut sharp, mut was_up) = (0, 0, 0usize, 0usize, None);
             for sample in samples {
                 let v = f32::from(sample[*i]);
                 let is_up = v >= high - NEAR_LEVEL * range;
@@ -294,10 +311,10 @@ impl Look {
                 if is_up {
                     let [x, y] = self.edge(sample, *i);
                     up += 1;
-                    sharp += usize::from(x.max(y) >= 0.5 * range);
+                    sharp += usize::from(x.max(y) >= SWITCHED * range);
                 }
             }
-            changes >= CHANGES && 10 * sharp >= 7 * up
+            changes >= CHANGES && sharp as f32 >= MOSTLY * up as f32
         };
         let found: Vec<usize> = self.inner(1).filter(switches).collect();
         if found.len() < LEAST_SWITCHING as usize {
@@ -308,7 +325,7 @@ impl Look {
         found.into_iter().filter(|i| counts.near(*i, reach) >= LEAST_SWITCHING * self.s as u32).collect()
     }
 
-    /// What is drawn: marks and digits with a pixel around them, which a codec smears them over, and what is contrasted beside those that are sure in most frames.
+    /// What is drawn: marks and digits with their rims, and what is contrasted beside them in most frames.
     fn with_beside(&self, marks: &Marks, switching: &[usize], samples: &[&[u8]]) -> Vec<[u32; 2]> {
         let mut drawn = vec![false; self.w * self.h];
         let mut asked = drawn.clone();
@@ -341,8 +358,7 @@ impl Look {
         if left == 0 {
             drawn.fill(false);
         }
-        // Letters that nothing but their level tells are found without their soft rims.
-        let rim = if marks.sure.is_empty() { 3 } else { 1 };
+        let rim = if marks.sure.is_empty() { SOFT_RIM } else { RIM };
         for i in marks.all.iter().chain(switching) {
             self.around(*i, rim * self.s).for_each(|j| drawn[j] = true);
         }

@@ -132,6 +132,10 @@ impl LookedAt {
                 }
             }
             defects.overlay = find_overlay(&self.ahead.iter().take(self.n_drawn).filter_map(grey).collect::<Vec<_>>());
+            // Thin lines are unlike all around as bad pixels are: they count once. Both are in the order of rows.
+            let place = |[x, y]: &[u32; 2]| [*y, *x];
+            let Defects { pixels, overlay, .. } = &mut defects;
+            pixels.retain(|p| overlay.binary_search_by_key(&place(p), place).is_err());
         }
         defects
     }

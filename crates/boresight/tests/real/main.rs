@@ -12,6 +12,7 @@ mod kitti_scores;
 mod lcg;
 mod mot_scores;
 mod needs;
+mod overlay;
 mod radar;
 mod spots;
 mod tables;
@@ -25,6 +26,7 @@ fn main() -> std::process::ExitCode {
         fuse::tests(),
         kitti_scores::tests(),
         mot_scores::tests(),
+        overlay::tests(),
         radar::tests(),
         spots::tests(),
         tables::tests(),

@@ -13,15 +13,12 @@ impl Look {
             }
             text.clear();
             text.push(start);
-            let mut next = 0;
+            self.join(&mut text, &mut left, GAP * self.s);
             let (mut x, mut y) = ([self.w, 0], [self.h, 0]);
-            while let Some(i) = text.get(next).copied() {
-                next += 1;
+            for i in &text {
                 x = [x[0].min(i % self.w), x[1].max(i % self.w)];
                 y = [y[0].min(i / self.w), y[1].max(i / self.w)];
-                text.extend(self.around(i, GAP * self.s).filter(|j| std::mem::take(&mut left[*j])));
             }
-
             let [width, height] = [x, y].map(|v| v[1] + 1 - v[0]);
             // A single letter, or a line of them; not the square that is drawn around a target.
             let is_line =
