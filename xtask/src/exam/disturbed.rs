@@ -1,4 +1,4 @@
-//! What recorders, links, lamps and displays do to a clip: variants in which the targets are where they were, so that figures that fall show what the default run takes for something else.
+//! What recorders, links, lamps and displays do to a clip: variants in which the targets are where they were, so that figures that fall show what the default run takes for something else. (Where the picture stands they are not where it shows them.)
 
 use super::variant::Variant;
 use anyhow::{Context, Result};
@@ -51,8 +51,8 @@ pub fn apply(how: Variant, frames: &mut Vec<Image<u8>>, rows: &mut Vec<TrackRow>
             let [stands, every] = STALL_S.map(|s| (s * rate_hz) as usize);
             // The first stall comes after the first seconds.
             let last = |k: usize| if k >= every && k % every < stands { k - k % every } else { k };
-            let shown: Vec<usize> = (0..n).map(last).collect();
-            show(&shown, frames, rows);
+            // What it shows of the targets stands; they go on.
+            *frames = (0..n).map(|k| frames[last(k)].clone()).collect();
         }
         Variant::Flickering => {
             for (k, frame) in frames.iter_mut().enumerate() {
@@ -189,8 +189,8 @@ mod tests {
 
     #[test]
     fn the_truth_is_where_the_pixel_is_shown() {
-        use Variant::{Barred, Flickering, Jittering, Lost, Overlaid, Repeated, Stalling, Transposed};
-        for how in [Transposed, Repeated, Lost, Stalling, Flickering, Overlaid, Barred, Jittering] {
+        use Variant::{Barred, Flickering, Jittering, Lost, Overlaid, Repeated, Transposed};
+        for how in [Transposed, Repeated, Lost, Flickering, Overlaid, Barred, Jittering] {
             let (mut frames, mut rows) = clip();
             apply(how, &mut frames, &mut rows, 2.0).unwrap();
             assert_eq!(frames.len(), rows.len(), "{how:?}");
@@ -199,6 +199,14 @@ mod tests {
                 assert!(frame.row(y)[x] > 230, "{how:?}, frame {}", row.frame);
             }
         }
+    }
+
+    #[test]
+    fn a_picture_that_stands_shows_where_the_targets_were() {
+        let (mut frames, mut rows) = clip();
+        apply(Variant::Stalling, &mut frames, &mut rows, 4.0).unwrap();
+        assert_eq!((frames[17].clone(), frames[18].row(15)[28]), (frames[16].clone(), 250));
+        assert_eq!(rows.iter().map(|r| r.bbox[0] as usize).collect::<Vec<_>>(), (10..30).collect::<Vec<_>>());
     }
 
     #[test]

@@ -12,6 +12,7 @@ use super::integrate::IntegrateDetector;
 use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
 use super::region_finder::RegionFinder;
+use super::repeated::Repeated;
 use super::spatial::{SpatialConfig, SpatialFilter};
 use super::steadied::Steadied;
 use super::strongest::Strongest;
@@ -33,10 +34,11 @@ pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Det
         return Err(needs_colour(&format!("{:?}", source.kind)));
     }
     let detector = Box::new(FrameDetector::new(config, (source.width, source.height), source.kind)?);
-    Ok(match config.camera {
+    let detector: Box<dyn Detector> = match config.camera {
         CameraConfig::Fixed => detector,
         CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotionEstimator::default() }),
-    })
+    };
+    Ok(if config.look_at_repeated { detector } else { Box::new(Repeated::new(detector)) })
 }
 
 /// Builds the way of finding that the configuration names: the one place that knows them all.

@@ -29,6 +29,7 @@ pub mod probability;
 mod ranks;
 pub(crate) mod region;
 mod region_finder;
+mod repeated;
 mod runs;
 mod segmenter;
 pub mod spatial;
