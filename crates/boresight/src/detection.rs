@@ -1,6 +1,6 @@
 //! A detection is a position with its covariance and what was seen there; a scan is all detections of one time.
 
-use crate::{CameraMotion, FrameIndex, Timestamp};
+use crate::{CameraMotion, FrameIndex, Homography, Timestamp};
 use boresight_filters::converted::Polar;
 use nalgebra::{Matrix2, Vector2};
 
@@ -25,6 +25,13 @@ impl Extent {
     /// A box of this size (px) around a position.
     pub fn around(centre: Vector2<f64>, width_px: f64, height_px: f64) -> Self {
         Self { left_px: centre.x - 0.5 * width_px, top_px: centre.y - 0.5 * height_px, width_px, height_px }
+    }
+
+    /// The box around the place of its middle, zoomed, its sides along the axes.
+    pub(crate) fn moved(self, by: &Homography) -> Self {
+        let middle = Vector2::new(self.left_px + 0.5 * self.width_px, self.top_px + 0.5 * self.height_px);
+        let zoom = by.zoom_at(middle);
+        Self::around(by.apply(middle), zoom * self.width_px, zoom * self.height_px)
     }
 }
 
@@ -126,6 +133,18 @@ impl Detection {
     /// A point at (x, y), px, known to `std_px` along both axes; else as [`Detection::at`].
     pub fn point(x_px: f64, y_px: f64, std_px: f64) -> Self {
         Self::at(Vector2::new(x_px, y_px), Matrix2::identity() * (std_px * std_px))
+    }
+
+    /// Moves it with its covariance, box and velocity.
+    pub(crate) fn move_by(&mut self, by: &Homography) {
+        if let Some(v) = &mut self.velocity {
+            let turn = |cov: &Matrix2<f64>| by.turn_cov_at(self.position, cov);
+            (v.mean, v.cov, v.with_position) =
+                (by.turn_at(self.position, v.mean), turn(&v.cov), turn(&v.with_position));
+        }
+        self.cov = by.turn_cov_at(self.position, &self.cov);
+        self.extent = self.extent.moved(by);
+        self.position = by.apply(self.position);
     }
 
     /// With this bounding box.

@@ -103,6 +103,7 @@ mod validate;
 pub mod verdict;
 mod view;
 pub mod vision;
+mod warp;
 pub mod world;
 
 pub(crate) use camera_motion::motion_jacobian;

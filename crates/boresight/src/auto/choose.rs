@@ -82,14 +82,18 @@ pub(super) fn choose_seen(
     choose_looked(frames, &looked_again(scene, second, info)?, second, info, base, request)
 }
 
-/// What moves before a fixed camera as the frames are, or in one light where that hides it; and the share of it that isolated blobs explain.
+/// What moves before a fixed camera as the frames are, or in one light where that hides it, or brought to one place where it shakes; and the share of it that isolated blobs explain.
 fn moving_in_any_light<'s>(
     frames: &[&Frame],
     scene: &'s Scene,
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Option<(&'s Scene, f64)>> {
-    for scene in std::iter::once(scene).chain(scene.in_one_light.as_deref()) {
+    let steady = scene.steady();
+    if steady.camera != Camera::Fixed {
+        return Ok(None);
+    }
+    for scene in std::iter::once(steady).chain(steady.in_one_light.as_deref()) {
         if let Some(explained) = moving::look(frames, scene, info, n_threads)? {
             return Ok(Some((scene, explained)));
         }
@@ -152,9 +156,7 @@ pub(super) fn choose_looked(
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
         colour::configure(&reference, tempo, info, &mut config, &mut reasons);
-    } else if scene.camera == Camera::Fixed
-        && let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)?
-    {
+    } else if let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)? {
         moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
         particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;

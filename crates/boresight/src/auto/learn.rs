@@ -130,7 +130,9 @@ fn with_smaller<E: From<Error>>(
 ) -> Result<Option<(FirstPass, AtOnce)>, E> {
     let mut every = choice.config.clone();
     let DetectorConfig { threshold, cluster, camera, max_detections, .. } = &mut every.detector;
-    let (ThresholdConfig::Moving(_), CameraConfig::Fixed) = (threshold, camera) else { return Ok(None) };
+    let (ThresholdConfig::Moving(_), CameraConfig::Fixed | CameraConfig::Shaking) = (threshold, camera) else {
+        return Ok(None);
+    };
     let Some(least_px) = cluster.min_area_px.filter(|a| *a > moving::LEAST_PX) else { return Ok(None) };
     let most = *max_detections;
     cluster.min_area_px = Some(moving::LEAST_PX);

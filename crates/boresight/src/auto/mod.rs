@@ -48,6 +48,7 @@ mod request;
 mod scene;
 mod score_statistics;
 mod second_look;
+mod shake;
 mod sighting_density;
 mod sightings;
 mod speed;

@@ -4,6 +4,7 @@ use super::chains::Chain;
 use super::digits::round;
 use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::scene::{Camera, Scene};
+use super::shake;
 use super::sightings::Sighting;
 use super::stretch;
 use crate::camera::CameraConfig;
@@ -86,7 +87,14 @@ pub fn configure(
     reasons: &mut Vec<String>,
 ) {
     let [w, h] = scene.size_px;
+    let shakes = !scene.places.is_empty();
     let camera = match scene.camera {
+        Camera::Fixed if shakes => {
+            let rms_px = shake::rms_px(&scene.places, (info.width, info.height));
+            &format!(
+                "A camera that stays in its place but shakes by {rms_px:.1} px rms: its frames are brought to the first one's (detector.camera = \"shaking\")"
+            )
+        }
         Camera::Fixed => "Fixed camera",
         Camera::Moving => "Moving camera",
         Camera::Unknown => "A camera whose motion cannot be seen",
@@ -113,7 +121,7 @@ pub fn configure(
     };
     config.detector.cluster.min_area_px = Some(least);
     config.detector.cluster.distance_px = round((PARTS_APART * w.min(h)).clamp(2.0, 12.0));
-    config.detector.camera = CameraConfig::Fixed;
+    config.detector.camera = if shakes { CameraConfig::Shaking } else { CameraConfig::Fixed };
     tracker(w.max(h), info, &mut config.tracker);
     // What differs from the background where it is (an exposure that changed, a thing that was taken away) never moves.
     config.tracker.report = Report::Moving;

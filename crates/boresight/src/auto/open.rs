@@ -162,7 +162,7 @@ fn choose_from(
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
     // Who does not know whether it stands looks longer.
-    let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
+    let look_again = scene.steady().camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
     let mut read = second(frames, if look_again { Wanted::First } else { Wanted::None });
     if let Some(held @ Read::Coloured(_)) = &read {
         if request.detector.is_none()
@@ -195,7 +195,7 @@ pub(super) fn of_held(
     let ahead = frames.ahead();
     let looked = read.with(ahead);
     let seen = looked_again(scene.clone(), &looked, &info)?;
-    if moving::is_open(&seen, &info) {
+    if moving::is_open(seen.steady(), &info) {
         return Ok(None);
     }
     Ok(Some(choose_looked(probed(ahead), &seen, &looked, &info, base, request)?).filter(Choice::is_evident))

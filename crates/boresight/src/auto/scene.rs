@@ -7,13 +7,14 @@
 //!    in a frame, without shadows and changes of light, is joined to regions;
 //! 3. where it is asked for, which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
 //!
-//! Where the light changes, 1 and 2 are asked once more of the frames brought to one light.
+//! Where the light changes, 1 and 2 are asked once more of the frames brought to one light; where the camera shakes, 2 of those brought to the first one's place ([`shake`]).
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
 use super::fixed_blocks;
 use super::ground::{self, Ground};
 use super::looks;
+use super::shake;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage, in_one_light};
@@ -23,6 +24,7 @@ use crate::vision::config::{ClusterConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
+use crate::warp::draw_onto;
 use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Pixels, Result, SourceInfo};
 use nalgebra::Vector2;
 
@@ -80,6 +82,10 @@ pub struct Scene {
     pub ground: Vec<Ground>,
     /// The same of the frames brought to one light, where that changes before a fixed camera.
     pub in_one_light: Option<Box<Scene>>,
+    /// The same of the frames brought to the first one's place, where the camera shakes and their edges stand so.
+    pub shaken: Option<Box<Scene>>,
+    /// Where the first frame's view lies in each frame, of a camera that shakes.
+    pub places: Vec<Homography>,
 }
 
 /// A moving region, px of the frame.
@@ -107,7 +113,11 @@ pub fn look<'f>(frames: impl IntoIterator<Item = &'f Frame>, info: &SourceInfo) 
     let background = primed(&grids, bytes)?;
     let moved = edges_moved(&background, &grids, bytes);
     let mut scene = what_moves(background, &grids, info, step)?;
-    (scene.camera, scene.ground) = camera(&frames, &grids, moved);
+    let (steps, still) = follow(&frames);
+    (scene.camera, scene.ground) = camera(&frames, &grids, moved, &steps, still);
+    if moved.is_some() && !edges_stand(moved) {
+        scene.shaken = shaken(&frames, &steps, info, step)?.map(Box::new);
+    }
     // A change that would not count as moving is left.
     let least = if bytes { MIN_COUNTS } else { 0.0 };
     let Some(lit) = in_one_light(&grids.iter().collect::<Vec<_>>(), LIGHT_STEP, least) else { return Ok(scene) };
@@ -236,13 +246,11 @@ fn edges(background: &Background<f32>, w: usize, h: usize, bytes: bool) -> Vec<E
         .collect()
 }
 
-/// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
-/// edges.
-fn camera(frames: &[&Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> (Camera, Vec<Ground>) {
+/// The motion from each frame to the next, the identity where nothing is known of it; in how many frames it is known, and the view lies where it lay first.
+fn follow(frames: &[&Frame]) -> (Vec<Homography>, [u32; 2]) {
     let mut motion = CameraMotionEstimator::default();
     let (mut said, mut still) = (0u32, 0u32);
     let (mut moved, mut steps) = (Homography::identity(), Vec::with_capacity(frames.len()));
-    let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     for frame in frames {
         let step = motion.step(&frame.pixels);
         steps.push(step.map_or(Homography::identity(), |s| s.now_from_before));
@@ -258,20 +266,50 @@ fn camera(frames: &[&Frame], grids: &[Image<f32>], edges_moved: Option<f64>) -> 
             }
         }
     }
+    (steps, [said, still])
+}
+
+/// What moves before a camera that shakes, if it does, and the frames' edges stand where they are brought to one place.
+fn shaken(frames: &[&Frame], steps: &[Homography], info: &SourceInfo, step: usize) -> Result<Option<Scene>> {
+    let Some(places) = shake::places(steps, (info.width, info.height)) else { return Ok(None) };
+    let bytes = matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8);
+    let mut canvas = frames[0].pixels.clone();
+    let steadied = frames.iter().zip(&places).map(|(frame, place)| {
+        draw_onto(&frame.pixels, place, &mut canvas);
+        grid(&canvas, step)
+    });
+    let grids: Vec<Image<f32>> = steadied.collect();
+    let background = primed(&grids, bytes)?;
+    if !edges_stand(edges_moved(&background, &grids, bytes)) {
+        return Ok(None);
+    }
+    Ok(Some(Scene { camera: Camera::Fixed, places, ..what_moves(background, &grids, info, step)? }))
+}
+
+/// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
+/// edges; `steps` and in how many frames they are known, and the view lies where it lay, as [`follow`] says.
+fn camera(
+    frames: &[&Frame],
+    grids: &[Image<f32>],
+    edges_moved: Option<f64>,
+    steps: &[Homography],
+    [said, still]: [u32; 2],
+) -> (Camera, Vec<Ground>) {
+    let n_steps = u32::try_from(frames.len().saturating_sub(1)).unwrap_or(u32::MAX).max(1);
     if edges_stand(edges_moved) || (2 * said >= n_steps && still == said) {
         return (Camera::Fixed, Vec::new());
     }
     // Patches that are followed may be the targets' own; the ground is most of the frame.
     let stands = fixed_blocks::stands(grids);
     if 2 * said >= n_steps && !stands {
-        return (Camera::Moving, ground::follow(frames, &steps));
+        return (Camera::Moving, ground::follow(frames, steps));
     }
     // Too little texture to follow: that targets cross the edges is no motion of the camera.
     let edges_stay = edges_moved.is_some_and(|share| share < 0.2);
     if edges_stay || stands {
         return (Camera::Fixed, Vec::new());
     }
-    (Camera::Unknown, ground::follow(frames, &steps))
+    (Camera::Unknown, ground::follow(frames, steps))
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -301,6 +339,11 @@ fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
 }
 
 impl Scene {
+    /// What is seen of the frames as they are, or as they lie in one place where the camera shakes.
+    pub fn steady(&self) -> &Self {
+        self.shaken.as_deref().unwrap_or(self)
+    }
+
     /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
     /// # Errors
     /// Frames of more than one size or pixel type.
@@ -324,7 +367,8 @@ impl Scene {
             for m in &moved[i] {
                 let area = (m.right - m.left) * (m.bottom - m.top);
                 let hit = scan.detections.iter().any(|d| {
-                    let (x, y) = (d.position.x, d.position.y);
+                    let at = self.places.get(i).map_or(d.position, |place| place.inverse().apply(d.position));
+                    let (x, y) = (at.x, at.y);
                     let within = x >= m.left - 2.0 && x <= m.right + 1.0 && y >= m.top - 2.0 && y <= m.bottom + 1.0;
                     within && 4.0 * d.extent.width_px * d.extent.height_px >= area
                 });

@@ -43,6 +43,8 @@ pub enum CameraConfig {
     Fixed,
     /// The background's motion is measured in every frame and taken from every position before tracking.
     Moving,
+    /// The camera stays in its place but shakes or nods: frames are brought to the first one's place before anything is detected in them, so that what is made for a camera at rest (`moving`) can be used.
+    Shaking,
 }
 
 /// An even texture is believed once the image has moved by this, reduced px: a sensor's fixed pattern and a codec's copies never do.

@@ -1,13 +1,14 @@
 //! Views as a camera at rest would have them: the frame warped, its detections and tracks moved, and given to another sink.
 //!
-//! Source: inverse warping with bilinear interpolation (R. Szeliski, *Computer Vision*, 2nd ed., 2022, section 3.6.1).
+//! Source: our own, with the warp of [`crate::warp`].
 //! How: the motions that scans carry are added up, so that the ground of the first frame stands still in the picture, upright as it was there. Where the frame's middle leaves
 //! the picture's inner half, or the ground has grown or shrunk by [`MOST_ZOOM`], the picture goes along with the frame by as much as is needed: a shake and a turn vanish, a long pan
 //! stays one. Around the frame the picture shows, darker, what was last seen there: a mosaic.
 //! Symbols: H, picture from image. Limits: one plane; where the motion is unknown the picture begins anew.
 
 use super::colours::Colours;
-use crate::{CameraMotion, Detection, Extent, Frame, Homography, Image, Pixels, Result, Scan, Sink, TrackState, View};
+use crate::warp::{Mix, between};
+use crate::{CameraMotion, Frame, Homography, Image, Pixels, Result, Scan, Sink, TrackState, View};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 /// Share of the picture's side by which the frame's middle may leave the picture's before the picture goes along.
@@ -107,7 +108,7 @@ impl Sink for SteadyView {
         self.scan.clone_from(view.scan);
         self.scan.camera_motion =
             along.map(|along| CameraMotion { now_from_before: along, ..CameraMotion::exact_shift(Vector2::zeros()) });
-        self.scan.detections.iter_mut().for_each(|d| move_detection(d, &h));
+        self.scan.detections.iter_mut().for_each(|d| d.move_by(&h));
         self.tracks.clear();
         self.tracks.extend(view.tracks.iter().cloned());
         self.tracks.iter_mut().for_each(|t| move_track(t, &h));
@@ -117,12 +118,6 @@ impl Sink for SteadyView {
     fn finish(self: Box<Self>) -> Result<()> {
         self.sink.finish()
     }
-}
-
-fn move_detection(d: &mut Detection, h: &Homography) {
-    d.cov = h.turn_cov_at(d.position, &d.cov);
-    d.extent = move_box(d.extent, h);
-    d.position = h.apply(d.position);
 }
 
 fn move_track(t: &mut TrackState, h: &Homography) {
@@ -139,53 +134,34 @@ fn move_track(t: &mut TrackState, h: &Homography) {
         *cov = by * *cov * by.transpose();
     }
     (mean[0], mean[1], mean[2], mean[3]) = (to.x, velocity.x, to.y, velocity.y);
-    t.extent = move_box(t.extent, h);
-}
-
-/// The box around the place of its middle, zoomed, its sides along the axes.
-fn move_box(e: Extent, h: &Homography) -> Extent {
-    let middle = Vector2::new(e.left_px + 0.5 * e.width_px, e.top_px + 0.5 * e.height_px);
-    let zoom = h.zoom_at(middle);
-    Extent::around(h.apply(middle), zoom * e.width_px, zoom * e.height_px)
+    t.extent = t.extent.moved(h);
 }
 
 /// A kind of pixel that can be mixed and darkened.
-trait Mix: Copy + Default {
-    fn mix(four: [Self; 4], weights: [f32; 4]) -> Self;
+trait Dim: Mix {
     fn dim(self) -> Self;
 }
 
-macro_rules! mix_whole {
+macro_rules! dim_whole {
     ($($kind:ty),*) => {$(
-        impl Mix for $kind {
-            fn mix(four: [Self; 4], weights: [f32; 4]) -> Self {
-                four.into_iter().zip(weights).map(|(v, w)| w * f32::from(v)).sum::<f32>().round() as Self
-            }
+        impl Dim for $kind {
             fn dim(self) -> Self {
                 (u32::from(self) * DIM / 256) as Self
             }
         }
     )*};
 }
-mix_whole!(u8, u16);
+dim_whole!(u8, u16);
 
-impl Mix for f32 {
-    fn mix(four: [Self; 4], weights: [f32; 4]) -> Self {
-        four.into_iter().zip(weights).map(|(v, w)| w * v).sum()
-    }
-
+impl Dim for f32 {
     fn dim(self) -> Self {
         self * DIM as f32 / 256.0
     }
 }
 
-impl Mix for [u8; 3] {
-    fn mix(four: [Self; 4], weights: [f32; 4]) -> Self {
-        std::array::from_fn(|i| u8::mix(four.map(|v| v[i]), weights))
-    }
-
+impl Dim for [u8; 3] {
     fn dim(self) -> Self {
-        self.map(Mix::dim)
+        self.map(Dim::dim)
     }
 }
 
@@ -246,7 +222,7 @@ fn warp(pixels: &Pixels, h: &Homography, seen: &mut Pixels, out: &mut Pixels) {
     of_one_kind!(pixels, seen, out, |i, s, o| draw(i, h, s, o));
 }
 
-fn draw<T: Mix>(image: &Image<T>, h: &Homography, seen: &mut Image<T>, out: &mut Image<T>) {
+fn draw<T: Dim>(image: &Image<T>, h: &Homography, seen: &mut Image<T>, out: &mut Image<T>) {
     let back = h.inverse();
     out.reset(image.width(), image.height(), T::default());
     for y in 0..image.height() {
@@ -260,20 +236,6 @@ fn draw<T: Mix>(image: &Image<T>, h: &Homography, seen: &mut Image<T>, out: &mut
             };
         }
     }
-}
-
-/// Value between pixels; `None` outside.
-fn between<T: Mix>(image: &Image<T>, p: Vector2<f64>) -> Option<T> {
-    let (w, h) = (image.width(), image.height());
-    if !(p.x >= 0.0 && p.y >= 0.0 && p.x <= (w - 1) as f64 && p.y <= (h - 1) as f64) {
-        return None;
-    }
-    let (x, y) = ((p.x as usize).min(w.saturating_sub(2)), (p.y as usize).min(h.saturating_sub(2)));
-    let (u, v) = ((p.x - x as f64) as f32, (p.y - y as f64) as f32);
-    let (right, below) = ((x + 1).min(w - 1), (y + 1).min(h - 1));
-    let (a, b) = (image.row(y), image.row(below));
-    let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-    Some(T::mix([a[x], a[right], b[x], b[right]], weights))
 }
 
 #[cfg(test)]

@@ -13,10 +13,11 @@ use super::isolated::IsolatedDetector;
 use super::pixel::Pixel;
 use super::region_finder::RegionFinder;
 use super::repeated::Repeated;
+use super::shaking::Shaking;
 use super::spatial::{SpatialConfig, SpatialFilter};
 use super::steadied::Steadied;
 use super::strongest::Strongest;
-use super::target_finder::{TargetFinder, TypedFrame};
+use super::target_finder::{PRIME_FRAMES, TargetFinder, TypedFrame};
 use super::threshold::ThresholdConfig;
 use super::threshold::local::LocalThreshold;
 use super::threshold::otsu::OtsuThreshold;
@@ -33,10 +34,12 @@ pub fn build(config: &DetectorConfig, source: &SourceInfo) -> Result<Box<dyn Det
     if matches!(config.threshold, ThresholdConfig::Colour(_)) && source.kind != PixelKind::Rgb8 {
         return Err(needs_colour(&format!("{:?}", source.kind)));
     }
-    let detector = Box::new(FrameDetector::new(config, (source.width, source.height), source.kind)?);
+    let (of, size, kind) = (config.clone(), (source.width, source.height), source.kind);
+    let make = move || FrameDetector::new(&of, size, kind).map(|detector| Box::new(detector) as Box<dyn Detector>);
     let detector: Box<dyn Detector> = match config.camera {
-        CameraConfig::Fixed => detector,
-        CameraConfig::Moving => Box::new(WithCamera { detector, camera: CameraMotionEstimator::default() }),
+        CameraConfig::Fixed => make()?,
+        CameraConfig::Moving => Box::new(WithCamera { detector: make()?, camera: CameraMotionEstimator::default() }),
+        CameraConfig::Shaking => Box::new(Shaking::new(make)?),
     };
     Ok(if config.look_at_repeated { detector } else { Box::new(Repeated::new(detector)) })
 }
@@ -59,9 +62,6 @@ fn finder<T: Pixel>(config: &DetectorConfig) -> Result<Box<dyn TargetFinder<T>>>
         ThresholdConfig::Bernoulli(c) => Box::new(BernoulliDetector::new(c)),
     })
 }
-
-/// Frames of the first seconds that a detector is shown beforehand, evenly spread: a median that five of them do not move.
-const PRIME_FRAMES: usize = 11;
 
 /// A detector that also says how the background moved.
 struct WithCamera {

@@ -32,6 +32,7 @@ mod region_finder;
 mod repeated;
 mod runs;
 mod segmenter;
+mod shaking;
 pub mod spatial;
 pub mod steadied;
 mod strongest;

@@ -252,7 +252,10 @@ mod tests {
     #[test]
     fn a_picture_that_stands_for_seconds_is_looked_at_again() {
         let shown: Vec<usize> = (0..40).map(|k| k.min(5)).collect();
-        assert_eq!(blind(&scans(PixelKind::Gray8, true, &shown, &DetectorConfig::default())), (6..26).collect::<Vec<_>>());
+        assert_eq!(
+            blind(&scans(PixelKind::Gray8, true, &shown, &DetectorConfig::default())),
+            (6..26).collect::<Vec<_>>()
+        );
     }
 
     #[test]

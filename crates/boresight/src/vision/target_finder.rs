@@ -8,6 +8,9 @@ use super::noise_level::noise_level;
 use super::pixel::Pixel;
 use crate::{Detection, Image, Result};
 
+/// Frames of the first seconds that a detector is shown beforehand, evenly spread: a median that five of them do not move.
+pub(super) const PRIME_FRAMES: usize = 11;
+
 /// A frame as a finder sees it.
 pub(super) struct TypedFrame<'a, T> {
     /// The pixels as they came.

@@ -17,6 +17,7 @@ const LEAVES: &[&str] = &[
     "geodesy",
     "camera_motion",
     "detection",
+    "warp",
     "record",
     "tracks",
     "view",
