@@ -71,7 +71,8 @@ pub fn configure(
             carried::configure(scene, interval_s, info, config, reasons);
         }
         DetectorKind::Moving => {
-            let explained = scene.explained(&second.or(frames), info, n_threads)?;
+            let (scene, looked) = second.shaken.clone().unwrap_or_else(|| (scene, second.or(frames)));
+            let explained = scene.explained(&looked, info, n_threads)?;
             moving::configure(&seen_or_assumed(scene, info, reasons), explained, tempo, info, config, reasons);
         }
         DetectorKind::Steadied => steadied::configure_asked(frames, scene, tempo, info, config, reasons)?,

@@ -14,7 +14,7 @@ use super::scene::{self, Camera, Scene};
 use super::second_look::Second;
 use super::spread::growing;
 use super::whole_tracks::report_whole;
-use super::{cells, colour, faint, if_fixed, moving, particles, spots, steadied};
+use super::{cells, colour, faint, if_fixed, moving, particles, shaken, spots, steadied};
 use crate::io::Colour;
 use crate::tempo::Tempo;
 use crate::track::ReidentificationConfig;
@@ -67,7 +67,14 @@ impl Choice {
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn choose(frames: &[Frame], info: &SourceInfo, base: &Config) -> Result<Choice> {
-    choose_seen(frames, scene::look(frames, info)?, &Second::default(), info, base, &Request::default())
+    choose_among(frames, info, base, &Request::default())
+}
+
+/// As [`choose`], with what is asked for.
+pub(super) fn choose_among(frames: &[Frame], info: &SourceInfo, base: &Config, request: &Request) -> Result<Choice> {
+    let scene = scene::look(frames, info)?;
+    let shaken = shaken::look(&scene, frames, info)?;
+    choose_seen(frames, scene, &Second::default().with(shaken.as_ref(), frames), info, base, request)
 }
 
 /// As [`choose`], from the first frames, what they show as a whole, and the frames of a second look, in colour if there is any, or none.
@@ -86,14 +93,17 @@ pub(super) fn choose_seen(
 fn moving_in_any_light<'s>(
     frames: &[&Frame],
     scene: &'s Scene,
+    shaken: Option<&(&'s Scene, Vec<&Frame>)>,
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Option<(&'s Scene, f64)>> {
-    let steady = scene.steady();
-    if steady.camera != Camera::Fixed {
+    if let Some((scene, frames)) = shaken {
+        return Ok(moving::look(frames, scene, info, n_threads)?.map(|explained| (*scene, explained)));
+    }
+    if scene.camera != Camera::Fixed {
         return Ok(None);
     }
-    for scene in std::iter::once(steady).chain(steady.in_one_light.as_deref()) {
+    for scene in std::iter::once(scene).chain(scene.in_one_light.as_deref()) {
         if let Some(explained) = moving::look(frames, scene, info, n_threads)? {
             return Ok(Some((scene, explained)));
         }
@@ -156,7 +166,9 @@ pub(super) fn choose_looked(
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
     } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
         colour::configure(&reference, tempo, info, &mut config, &mut reasons);
-    } else if let Some((scene, explained)) = moving_in_any_light(looked, scene, info, n_threads)? {
+    } else if let Some((scene, explained)) =
+        moving_in_any_light(looked, scene, second.shaken.as_ref(), info, n_threads)?
+    {
         moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
         particles::configure(&seen, frames, info, n_threads, interval_s, &mut config, &mut reasons)?;

@@ -8,14 +8,13 @@
 //! pieces where both are looked for, so that both must be needed.
 //! Limits: a target of another kind that comes beside one that was seen; what comes after the frames read ahead, and between the places looked at.
 
-use super::choose::{Choice, choose_seen};
+use super::choose::{Choice, choose_among};
 use super::evidence::Evidence;
 use super::first_scans::PROBE_FRAMES;
+use super::looks;
 use super::request::Request;
-use super::second_look::Second;
 use super::spots::{self, Seen, Side};
 use super::spread::growing;
-use super::{looks, scene};
 use crate::io::Replay;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
 use crate::{Config, Frame, FrameSource, Result, Scan, SourceInfo};
@@ -32,7 +31,7 @@ pub(super) fn choice(frames: &mut Replay, base: &Config, request: &Request) -> R
     let mut most: Option<Choice> = None;
     for start in starts(ahead.len()) {
         let window = &ahead[start..start + PROBE_FRAMES];
-        let later = choose_seen(window, scene::look(window, &info)?, &Second::default(), &info, base, request)?;
+        let later = choose_among(window, &info, base, request)?;
         if later.gain > most.as_ref().map_or(0.0, |m| m.gain) {
             most = Some(later);
         }
@@ -119,6 +118,7 @@ fn on_their_way(scans: &[Scan], places: &[usize], found: &[Scan]) -> Vec<Scan> {
 mod tests {
     use super::super::in_memory::InMemory;
     use super::super::open::of_held;
+    use super::super::scene;
     use super::super::second_look::Read;
     use super::*;
     use crate::{FrameIndex, Image, PixelKind, Pixels, Timestamp};

@@ -49,6 +49,7 @@ mod scene;
 mod score_statistics;
 mod second_look;
 mod shake;
+mod shaken;
 mod sighting_density;
 mod sightings;
 mod speed;

@@ -15,6 +15,7 @@ use super::moving;
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera, Scene};
 use super::second_look::{self, Read, SECOND_LOOK_FRAMES};
+use super::shaken::{self, Shaken};
 use crate::io::{Colour, ColoursBeside, MOST_BYTES, OpenOptions, Replay, frames_ahead};
 use crate::sensor::{Found, if_defective};
 use crate::track::Tracking;
@@ -161,12 +162,16 @@ fn choose_from(
 ) -> Result<Choice> {
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
+    let shaken = match shaken::may_shake(&scene, &info) {
+        true => shaken::look(&scene, frames.read_on(usize::MAX), &info)?,
+        false => None,
+    };
     // Who does not know whether it stands looks longer.
-    let look_again = scene.steady().camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
+    let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
     let mut read = second(frames, if look_again { Wanted::First } else { Wanted::None });
     if let Some(held @ Read::Coloured(_)) = &read {
         if request.detector.is_none()
-            && let Some(choice) = of_held(held, frames, &scene, base, request)?
+            && let Some(choice) = of_held(held, frames, &scene, shaken.as_ref(), base, request)?
         {
             return Ok(choice);
         }
@@ -174,7 +179,7 @@ fn choose_from(
         read = second(frames, Wanted::Anew);
     }
     let ahead = frames.ahead();
-    let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default();
+    let looked = read.as_ref().map(|read| read.with(ahead)).unwrap_or_default().with(shaken.as_ref(), ahead);
     let choice = choose_seen(probed(ahead), scene, &looked, &info, base, request)?;
     if choice.is_evident() || request.detector.is_some() {
         return Ok(choice);
@@ -188,14 +193,15 @@ pub(super) fn of_held(
     read: &Read,
     frames: &mut Replay,
     scene: &Scene,
+    shaken: Option<&Shaken>,
     base: &Config,
     request: &Request,
 ) -> Result<Option<Choice>> {
     let info = frames.info().clone();
     let ahead = frames.ahead();
-    let looked = read.with(ahead);
+    let looked = read.with(ahead).with(shaken, ahead);
     let seen = looked_again(scene.clone(), &looked, &info)?;
-    if moving::is_open(seen.steady(), &info) {
+    if moving::is_open(shaken.map_or(&seen, |s| &s.scene), &info) {
         return Ok(None);
     }
     Ok(Some(choose_looked(probed(ahead), &seen, &looked, &info, base, request)?).filter(Choice::is_evident))

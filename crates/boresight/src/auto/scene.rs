@@ -7,14 +7,13 @@
 //!    in a frame, without shadows and changes of light, is joined to regions;
 //! 3. where it is asked for, which of these regions hold an isolated blob of fitting size, as the detector of small targets would find it.
 //!
-//! Where the light changes, 1 and 2 are asked once more of the frames brought to one light; where the camera shakes, 2 of those brought to the first one's place ([`shake`]).
+//! Where the light changes, 1 and 2 are asked once more of the frames brought to one light.
 //!
 //! Limits: a target that stands in the same place in half of the frames is background.
 
 use super::fixed_blocks;
 use super::ground::{self, Ground};
 use super::looks;
-use super::shake;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::vision::background::{Background, BackgroundConfig, BitImage, in_one_light};
@@ -24,12 +23,11 @@ use crate::vision::config::{ClusterConfig, DetectorConfig};
 use crate::vision::isolated::IsolatedConfig;
 use crate::vision::pixel::Pixel;
 use crate::vision::threshold::{Polarity, ThresholdConfig};
-use crate::warp::draw_onto;
 use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Pixels, Result, SourceInfo};
 use nalgebra::Vector2;
 
 /// Width of the grid, px.
-const GRID_PX: usize = 400;
+pub(super) const GRID_PX: usize = 400;
 /// The light is compared at one pixel in so many both ways, px of the grid.
 const LIGHT_STEP: usize = 4;
 /// Smallest region that counts, px of the grid.
@@ -82,10 +80,12 @@ pub struct Scene {
     pub ground: Vec<Ground>,
     /// The same of the frames brought to one light, where that changes before a fixed camera.
     pub in_one_light: Option<Box<Scene>>,
-    /// The same of the frames brought to the first one's place, where the camera shakes and their edges stand so.
-    pub shaken: Option<Box<Scene>>,
-    /// Where the first frame's view lies in each frame, of a camera that shakes.
+    /// Where the first frame's view lies in each frame, of a camera that shakes ([`super::shaken`]).
     pub places: Vec<Homography>,
+    /// The motion from each frame to the next, the identity where nothing is known of it.
+    pub steps: Vec<Homography>,
+    /// Share of the background's edge pixels that move, if there are enough.
+    pub edges_moved: Option<f64>,
 }
 
 /// A moving region, px of the frame.
@@ -115,9 +115,7 @@ pub fn look<'f>(frames: impl IntoIterator<Item = &'f Frame>, info: &SourceInfo) 
     let mut scene = what_moves(background, &grids, info, step)?;
     let (steps, still) = follow(&frames);
     (scene.camera, scene.ground) = camera(&frames, &grids, moved, &steps, still);
-    if moved.is_some() && !edges_stand(moved) {
-        scene.shaken = shaken(&frames, &steps, info, step)?.map(Box::new);
-    }
+    (scene.edges_moved, scene.steps) = (moved, steps);
     // A change that would not count as moving is left.
     let least = if bytes { MIN_COUNTS } else { 0.0 };
     let Some(lit) = in_one_light(&grids.iter().collect::<Vec<_>>(), LIGHT_STEP, least) else { return Ok(scene) };
@@ -132,7 +130,7 @@ pub fn look<'f>(frames: impl IntoIterator<Item = &'f Frame>, info: &SourceInfo) 
 }
 
 /// The background of grids.
-fn primed(grids: &[Image<f32>], bytes: bool) -> Result<Background<f32>> {
+pub(super) fn primed(grids: &[Image<f32>], bytes: bool) -> Result<Background<f32>> {
     let config =
         BackgroundConfig { start_s: 0.0, min_difference: bytes.then_some(MIN_COUNTS), ..BackgroundConfig::default() };
     let mut background = Background::<f32>::new(config)?;
@@ -141,7 +139,7 @@ fn primed(grids: &[Image<f32>], bytes: bool) -> Result<Background<f32>> {
 }
 
 /// Share of the background's edge pixels that move, if there are enough.
-fn edges_moved(background: &Background<f32>, grids: &[Image<f32>], bytes: bool) -> Option<f64> {
+pub(super) fn edges_moved(background: &Background<f32>, grids: &[Image<f32>], bytes: bool) -> Option<f64> {
     let edges = edges(background, grids[0].width(), grids[0].height(), bytes);
     let n_moved: usize = grids.iter().map(|g| edges.iter().filter(|e| e.has_moved(g)).count()).sum();
     let enough = edges.len() * 1000 > grids[0].as_slice().len();
@@ -149,7 +147,12 @@ fn edges_moved(background: &Background<f32>, grids: &[Image<f32>], bytes: bool) 
 }
 
 /// What moves in grids before their background.
-fn what_moves(mut background: Background<f32>, grids: &[Image<f32>], info: &SourceInfo, step: usize) -> Result<Scene> {
+pub(super) fn what_moves(
+    mut background: Background<f32>,
+    grids: &[Image<f32>],
+    info: &SourceInfo,
+    step: usize,
+) -> Result<Scene> {
     let mut scene = Scene { n_frames: grids.len(), ..Scene::default() };
     let mut moved = Vec::with_capacity(grids.len());
     let (mut ever, mut all) = (BitImage::new(grids[0].width(), grids[0].height()), 0);
@@ -182,7 +185,7 @@ fn what_moves(mut background: Background<f32>, grids: &[Image<f32>], info: &Sour
 }
 
 /// Whether edges are seen and stand: strong ones would show the smallest shift.
-fn edges_stand(edges_moved: Option<f64>) -> bool {
+pub(super) fn edges_stand(edges_moved: Option<f64>) -> bool {
     edges_moved.is_some_and(|share| share <= 0.03)
 }
 
@@ -192,7 +195,7 @@ pub(super) fn grey_of(pixels: &Pixels) -> Image<f32> {
 }
 
 /// Every `step`-th pixel both ways, as grey.
-fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
+pub(super) fn grid(pixels: &Pixels, step: usize) -> Image<f32> {
     fn take<P: Copy>(image: &Image<P>, step: usize, value: impl Fn(P) -> f32) -> Image<f32> {
         let (w, h) = (image.width().div_ceil(step), image.height().div_ceil(step));
         let mut out = Image::filled(w, h, 0.0f32);
@@ -269,23 +272,6 @@ fn follow(frames: &[&Frame]) -> (Vec<Homography>, [u32; 2]) {
     (steps, [said, still])
 }
 
-/// What moves before a camera that shakes, if it does, and the frames' edges stand where they are brought to one place.
-fn shaken(frames: &[&Frame], steps: &[Homography], info: &SourceInfo, step: usize) -> Result<Option<Scene>> {
-    let Some(places) = shake::places(steps, (info.width, info.height)) else { return Ok(None) };
-    let bytes = matches!(info.kind, PixelKind::Gray8 | PixelKind::Rgb8);
-    let mut canvas = frames[0].pixels.clone();
-    let steadied = frames.iter().zip(&places).map(|(frame, place)| {
-        draw_onto(&frame.pixels, place, &mut canvas);
-        grid(&canvas, step)
-    });
-    let grids: Vec<Image<f32>> = steadied.collect();
-    let background = primed(&grids, bytes)?;
-    if !edges_stand(edges_moved(&background, &grids, bytes)) {
-        return Ok(None);
-    }
-    Ok(Some(Scene { camera: Camera::Fixed, places, ..what_moves(background, &grids, info, step)? }))
-}
-
 /// Whether the camera stands still, and where the first frame's ground lies in each frame; `edges_moved` is the share of edge pixels that move, if there are
 /// edges; `steps` and in how many frames they are known, and the view lies where it lay, as [`follow`] says.
 fn camera(
@@ -339,11 +325,6 @@ fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
 }
 
 impl Scene {
-    /// What is seen of the frames as they are, or as they lie in one place where the camera shakes.
-    pub fn steady(&self) -> &Self {
-        self.shaken.as_deref().unwrap_or(self)
-    }
-
     /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
     /// # Errors
     /// Frames of more than one size or pixel type.

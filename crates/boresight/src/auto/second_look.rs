@@ -5,6 +5,8 @@
 //! things move that do not fit what is looked for, nothing is chosen by them, or too few can be held, is the file read a second time.
 
 use super::first_scans::PROBE_FRAMES;
+use super::scene::Scene;
+use super::shaken::Shaken;
 use super::spread::spread;
 use crate::io::{Colour, ColoursBeside, KeepColours, MOST_BYTES, OpenOptions, Replay};
 use crate::sensor::Correction;
@@ -27,13 +29,20 @@ pub(super) struct Second<'a> {
     pub frames: Vec<&'a Frame>,
     /// Those that are in colour, or the same.
     pub coloured: Vec<&'a Frame>,
+    /// What moves before a camera that shakes, and the frames in which it was looked for.
+    pub shaken: Option<(&'a Scene, Vec<&'a Frame>)>,
 }
 
 impl<'a> Second<'a> {
     /// Frames that are looked at and are in colour, if the file is.
     pub(super) fn of(frames: &'a [Frame]) -> Self {
         let all: Vec<&Frame> = frames.iter().collect();
-        Self { frames: all.clone(), coloured: all }
+        Self { frames: all.clone(), coloured: all, shaken: None }
+    }
+
+    /// With what moves in those held before a camera that shakes, if it does.
+    pub(super) fn with(self, shaken: Option<&'a Shaken>, held: &'a [Frame]) -> Self {
+        Self { shaken: shaken.map(|s| (&s.scene, s.frames(held))), ..self }
     }
 
     /// The frames, or those of the first look where there are none.
@@ -65,7 +74,7 @@ impl Read {
         match self {
             Self::All(frames) => Second::of(frames),
             Self::Coloured(small) => {
-                Second { frames: spread(held, PROBE_FRAMES).collect(), coloured: small.iter().collect() }
+                Second { frames: spread(held, PROBE_FRAMES).collect(), coloured: small.iter().collect(), shaken: None }
             }
         }
     }

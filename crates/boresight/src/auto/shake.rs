@@ -11,12 +11,11 @@ const MOST_SHARE: f64 = 0.05;
 /// Share of the variance that a straight line explains, from which on the camera pans: of a slow nod, half a period of which is seen, it explains all but a hundredth, of a whole period 0.6.
 const DRIFT: f64 = 0.5;
 /// Fewer frames than this tell neither.
-const LEAST_FRAMES: usize = 12;
+pub(super) const LEAST_FRAMES: usize = 12;
 
-/// Where the first frame's view lies in each frame, if the camera shakes, of frames of `size` px, by the motions from each frame to the next.
-pub fn places(steps: &[Homography], size: (usize, usize)) -> Option<Vec<Homography>> {
+/// Whether the camera of frames of `size` px shakes, by the motions from each frame to the next.
+pub fn shakes(steps: &[Homography], size: (usize, usize)) -> bool {
     let size = Vector2::new(size.0 as f64, size.1 as f64);
-    let corners = [[0.0, 0.0], [size.x, 0.0], [0.0, size.y], [size.x, size.y]].map(Vector2::from);
     let mut at = Homography::identity();
     let places: Vec<Homography> = steps
         .iter()
@@ -25,10 +24,15 @@ pub fn places(steps: &[Homography], size: (usize, usize)) -> Option<Vec<Homograp
             at
         })
         .collect();
-    let far = |h: &Homography| corners.iter().map(|c| h.shift_at(*c).norm()).fold(0.0, f64::max);
-    let is_near = |h: &Homography| h.is_sound() && far(h) <= MOST_SHARE * size.x;
-    let shakes = places.len() >= LEAST_FRAMES && places.iter().all(is_near) && drift(&places, 0.5 * size) <= DRIFT;
-    shakes.then_some(places)
+    places.len() >= LEAST_FRAMES
+        && places.iter().all(|place| is_near(place, size))
+        && drift(&places, 0.5 * size) <= DRIFT
+}
+
+/// Whether the view lies near where it lay first.
+pub fn is_near(place: &Homography, size: Vector2<f64>) -> bool {
+    let corners = [[0.0, 0.0], [size.x, 0.0], [0.0, size.y], [size.x, size.y]].map(Vector2::from);
+    place.is_sound() && corners.iter().all(|c| place.shift_at(*c).norm() <= MOST_SHARE * size.x)
 }
 
 /// Deviation of the middle from its mean place, px.
@@ -67,13 +71,14 @@ mod tests {
 
     #[test]
     fn what_comes_back_shakes_and_what_goes_on_does_not() {
-        let shakes = |place: &dyn Fn(f64) -> f64| places(&steps(place), (320, 256)).is_some();
+        let shakes = |place: &dyn Fn(f64) -> f64| shakes(&steps(place), (320, 256));
         assert!(shakes(&|k| 5.0 * (1.7 * k).sin()), "a fast shake");
         assert!(shakes(&|k| 5.0 * (k * std::f64::consts::TAU / 24.0).sin()), "a nod of a second");
         assert!(!shakes(&|k| 0.2 * k), "a pan");
         assert!(!shakes(&|k| 0.2 * k + (1.7 * k).sin()), "a pan that shakes");
         assert!(!shakes(&|k| 20.0 * (1.7 * k).sin()), "a shake that leaves the view");
-        let places = places(&steps(|k| 5.0 * (1.7 * k).sin()), (320, 256)).unwrap();
+        let place = |k: i32| Homography::shift(Vector2::new(5.0 * (1.7 * f64::from(k)).sin(), 0.0));
+        let places: Vec<Homography> = (0..480).map(place).collect();
         assert!((rms_px(&places, (320, 256)) - 5.0 / 2f64.sqrt()).abs() < 0.1);
     }
 }

@@ -19,6 +19,7 @@ use super::open::{of_held, probed};
 use super::request::{DetectorKind, Request};
 use super::scene::{self, Camera};
 use super::second_look::Second;
+use super::shaken;
 use super::sightings::Sightings;
 use super::{PROBE_FRAMES, second_look};
 use crate::camera::{CameraConfig, CameraMotionEstimator};
@@ -96,13 +97,17 @@ fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(Source
     let mut first = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
     let info = first.info().clone();
     let seen = scene::look(probed(first.ahead()), &info)?;
+    let shaken = match shaken::may_shake(&seen, &info) {
+        true => shaken::look(&seen, first.read_on(usize::MAX), &info)?,
+        false => None,
+    };
     let camera = seen.camera;
     // As for a run: frames held say it, or those of another reading; for a detector that is asked for always the latter.
     let beside = beside.filter(|_| camera != Camera::Moving);
     let kept = beside.and_then(|beside| second_look::from_beside(&beside, &mut first));
     let alone = Request { threads: NonZeroUsize::new(1), ..*request };
     let chosen = match &kept {
-        Some(held @ second_look::Read::Coloured(_)) => of_held(held, &mut first, &seen, base, &alone)?,
+        Some(held @ second_look::Read::Coloured(_)) => of_held(held, &mut first, &seen, shaken.as_ref(), base, &alone)?,
         _ => None,
     };
     let second = match kept {
@@ -110,8 +115,9 @@ fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(Source
         _ if camera == Camera::Moving => Vec::new(),
         _ => second_look::frames(input, base, PROBE_FRAMES),
     };
-    let second = Second::of(&second);
-    let frames = probed(first.ahead());
+    let held = first.ahead();
+    let second = Second::of(&second).with(shaken.as_ref(), held);
+    let frames = probed(held);
     let seen = looked_again(seen, &second, &info)?;
     let of_all = chosen.is_none().then_some(None);
     let kinds: Vec<_> = of_all.into_iter().chain(DetectorKind::ALL.into_iter().map(Some)).collect();
