@@ -206,7 +206,7 @@ mod tests {
             let scene = scene::look(&frames[..PROBE_FRAMES], &info).unwrap();
             let mut replay = Replay::new(Box::new(InMemory(frames.into_iter(), info)), 100);
             let small = Read::Coloured(Vec::new());
-            of_held(&small, &mut replay, &scene, &Config::default(), &Request::default()).unwrap()
+            of_held(&small, &mut replay, &scene, None, &Config::default(), &Request::default()).unwrap()
         };
         // Every third of 100 frames of 25 Hz, to the last, where the first look ends at 1.9 s.
         let reasons = chosen(-60.0).unwrap().reasons;
@@ -225,8 +225,8 @@ mod tests {
         let (frames, info) = with_spot(height, 300);
         let at = |start: usize| {
             let window = &frames[start..start + PROBE_FRAMES];
-            let (scene, request) = (scene::look(window, &info).unwrap(), Request::default());
-            choose_seen(window, scene, &Second::default(), &info, &Config::default(), &request).unwrap().gain
+            let request = Request::default();
+            choose_among(window, &info, &Config::default(), &request).unwrap().gain
         };
         let [short, long] = [at(48), at(150)];
         assert!(0.0 < short && short < long, "{short} {long}");

@@ -241,7 +241,7 @@ fn draw<T: Dim>(image: &Image<T>, h: &Homography, seen: &mut Image<T>, out: &mut
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrameIndex, Timestamp, TrackId, TrackStatus};
+    use crate::{Extent, FrameIndex, Timestamp, TrackId, TrackStatus};
     use boresight_filters::Gaussian;
     use std::sync::mpsc::{Sender, channel};
 

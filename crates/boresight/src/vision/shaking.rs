@@ -122,3 +122,116 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Detector for Shaking<F> {
         self.detector.leave_out_below(area_px)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::CameraConfig;
+    use crate::vision::DetectorConfig;
+    use crate::vision::threshold::ThresholdConfig;
+    use crate::{FrameIndex, PixelKind, Similarity, SourceInfo, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const SIZE: [usize; 2] = [240, 160];
+
+    /// Where the ground lies in a frame: shaken by some pixels and a little turned.
+    fn place(k: usize) -> Homography {
+        let t = k as f64;
+        let shift =
+            Vector2::new(3.1 * (1.9 * t).sin(), 2.3 * (2.7 * t + 1.0).sin()) - Vector2::new(0.0, 2.3 * 1f64.sin());
+        let middle = Vector2::new(120.0, 80.0);
+        Homography::of_similarity(&Similarity::about(middle, shift, 0.004 * (0.8 * t).sin(), 1.0))
+    }
+
+    /// The middle of a square of 13 px on the ground.
+    fn square(k: usize) -> Vector2<f64> {
+        Vector2::new(40.0 + 2.0 * k as f64, 70.5)
+    }
+
+    fn film(n: usize) -> Vec<Frame> {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let waves: Vec<[f64; 4]> = (0..60)
+            .map(|_| {
+                let (angle, length) = (6.3 * rng.random::<f64>(), 0.1 + 0.7 * rng.random::<f64>());
+                [5.0 * rng.random::<f64>(), length * angle.cos(), length * angle.sin(), 6.3 * rng.random::<f64>()]
+            })
+            .collect();
+        let ground =
+            |g: Vector2<f64>| -> f64 { waves.iter().map(|[a, x, y, p]| a * (x * g.x + y * g.y + p).sin()).sum() };
+        (0..n)
+            .map(|k| {
+                let (back, at) = (place(k).inverse(), square(k));
+                let mut image = Image::filled(SIZE[0], SIZE[1], 0u8);
+                for y in 0..SIZE[1] {
+                    for (x, v) in image.row_mut(y).iter_mut().enumerate() {
+                        let g = back.apply(Vector2::new(x as f64, y as f64));
+                        let far = (g - at).abs();
+                        let seen = if far.x <= 6.5 && far.y <= 6.5 { 220.0 } else { 110.0 + ground(g) };
+                        *v = (seen + 3.0 * (rng.random::<f64>() - 0.5)).round().clamp(0.0, 255.0) as u8;
+                    }
+                }
+                let time = Timestamp::from_secs_f64(0.04 * k as f64);
+                Frame { index: FrameIndex(k as u64), time, pixels: Pixels::Gray8(image) }
+            })
+            .collect()
+    }
+
+    fn detector(camera: CameraConfig) -> Box<dyn Detector> {
+        let threshold = ThresholdConfig::Moving(Default::default());
+        let mut config = DetectorConfig { threshold, camera, ..DetectorConfig::default() };
+        config.cluster.min_area_px = Some(20);
+        let (label, reader) = (String::new(), String::new());
+        let (width, height, kind) = (SIZE[0], SIZE[1], PixelKind::Gray8);
+        let (n_frames, rate_hz, true_times) = (None, Some(25.0), true);
+        crate::vision::build(&config, &SourceInfo { label, reader, width, height, kind, n_frames, rate_hz, true_times })
+            .unwrap()
+    }
+
+    /// In how many of the frames from the twentieth on the square alone is found where it lies in the frame.
+    fn alone(camera: CameraConfig, frames: &[Frame]) -> usize {
+        let mut detector = detector(camera);
+        detector.prime(frames).unwrap();
+        let mut scan = Scan::default();
+        let is_alone = |(k, frame): (usize, &Frame)| {
+            detector.detect(frame, &mut scan).unwrap();
+            assert_eq!((scan.index, scan.time), (frame.index, frame.time));
+            let at = place(k).apply(square(k));
+            k >= 20 && matches!(&scan.detections[..], [d] if (d.position - at).norm() < 1.0)
+        };
+        frames.iter().enumerate().map(is_alone).filter(|is| *is).count()
+    }
+
+    #[test]
+    fn what_moves_before_a_camera_that_shakes_is_found_alone_and_where_it_lies_in_the_frame() {
+        let frames = film(70);
+        let [shaking, fixed] = [CameraConfig::Shaking, CameraConfig::Fixed].map(|camera| alone(camera, &frames));
+        assert!(shaking >= 47 && fixed + 10 < shaking, "{shaking} and {fixed} of 50");
+    }
+
+    #[test]
+    fn another_view_is_learnt_anew_and_the_motion_is_that_of_the_frames() {
+        let frames = film(30);
+        let mut detector = detector(CameraConfig::Shaking);
+        let (mut scan, mut errors) = (Scan::default(), Vec::new());
+        for (k, frame) in frames.iter().enumerate() {
+            detector.detect(frame, &mut scan).unwrap();
+            if let Some(motion) = scan.camera_motion.filter(|_| k > 0) {
+                let expected = place(k - 1).inverse().then(&place(k));
+                let middle = Vector2::new(120.0, 80.0);
+                errors.push((motion.now_from_before.shift_at(middle) - expected.shift_at(middle)).norm());
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        assert!(errors.len() > 25 && errors[errors.len() / 2] < 0.1, "{errors:?}");
+        // What is the other way round is another view; the detector goes on from there.
+        for (k, frame) in frames.iter().enumerate() {
+            let Pixels::Gray8(image) = &frame.pixels else { panic!("grey") };
+            let turned = image.as_slice().iter().rev().map(|v| 255 - v).collect();
+            let pixels = Pixels::Gray8(Image::from_vec(SIZE[0], SIZE[1], turned).unwrap());
+            let time = Timestamp::from_secs_f64(0.04 * (30 + k) as f64);
+            detector.detect(&Frame { index: FrameIndex(30 + k as u64), time, pixels }, &mut scan).unwrap();
+        }
+        assert!(!scan.blind && scan.camera_motion.is_some());
+    }
+}

@@ -188,7 +188,9 @@ fn a_warm_detector_takes_no_memory_in_a_frame() {
     let window = WindowConfig { size: 5, ..WindowConfig::default() };
     let mut configs: Vec<DetectorConfig> =
         thresholds().into_iter().map(|threshold| DetectorConfig { threshold, ..DetectorConfig::default() }).collect();
-    configs.push(DetectorConfig { camera: CameraConfig::Moving, ..DetectorConfig::default() });
+    for camera in [CameraConfig::Moving, CameraConfig::Shaking] {
+        configs.push(DetectorConfig { camera, ..DetectorConfig::default() });
+    }
     configs.push(DetectorConfig { max_detections: Some(2), ..configs[1].clone() });
     for filter in
         [SpatialConfig::Mean(window), SpatialConfig::Median(window), SpatialConfig::Gaussian(Default::default())]

@@ -6,6 +6,8 @@
 mod auto;
 mod camera;
 mod colour;
+mod disturbed;
+mod follow;
 mod fuse;
 mod kitti_scores;
 #[path = "../it/metrics/lcg.rs"]
@@ -23,6 +25,7 @@ fn main() -> std::process::ExitCode {
         auto::tests(),
         camera::tests(),
         colour::tests(),
+        disturbed::tests(),
         fuse::tests(),
         kitti_scores::tests(),
         mot_scores::tests(),
