@@ -3,7 +3,7 @@
 use crate::{FrameIndex, Image, Result, Timestamp};
 
 /// The pixels of one frame in the type the file holds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub enum Pixels {
     /// 8-bit grey.
     Gray8(Image<u8>),
@@ -13,6 +13,28 @@ pub enum Pixels {
     GrayF32(Image<f32>),
     /// 8-bit red, green, blue.
     Rgb8(Image<[u8; 3]>),
+}
+
+impl Clone for Pixels {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Gray8(i) => Self::Gray8(i.clone()),
+            Self::Gray16(i) => Self::Gray16(i.clone()),
+            Self::GrayF32(i) => Self::GrayF32(i.clone()),
+            Self::Rgb8(i) => Self::Rgb8(i.clone()),
+        }
+    }
+
+    /// Uses the memory of pixels of the same kind again.
+    fn clone_from(&mut self, source: &Self) {
+        match (self, source) {
+            (Self::Gray8(to), Self::Gray8(of)) => to.clone_from(of),
+            (Self::Gray16(to), Self::Gray16(of)) => to.clone_from(of),
+            (Self::GrayF32(to), Self::GrayF32(of)) => to.clone_from(of),
+            (Self::Rgb8(to), Self::Rgb8(of)) => to.clone_from(of),
+            (to, of) => *to = of.clone(),
+        }
+    }
 }
 
 /// The type of a frame's pixels.

@@ -16,6 +16,7 @@ use crate::vision::background::{BackgroundConfig, ShadowConfig};
 use crate::vision::config::DetectorConfig;
 use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Detection, Frame, Result, Scan, SourceInfo};
+use nalgebra::Vector2;
 
 /// Share of the frames in which something must move.
 const SHARE_OF_FRAMES: f64 = 0.2;
@@ -90,7 +91,7 @@ pub fn configure(
     let shakes = !scene.places.is_empty();
     let camera = match scene.camera {
         Camera::Fixed if shakes => {
-            let rms_px = shake::rms_px(&scene.places, (info.width, info.height));
+            let rms_px = shake::rms_px(&scene.places, Vector2::new(info.width as f64, info.height as f64));
             &format!(
                 "A camera that stays in its place but shakes by {rms_px:.1} px rms: its frames are brought to the first one's (detector.camera = \"shaking\")"
             )

@@ -10,6 +10,8 @@ use nalgebra::Vector2;
 const MOST_SHARE: f64 = 0.05;
 /// Share of the variance that a straight line explains, from which on the camera pans: of a slow nod, half a period of which is seen, it explains all but a hundredth, of a whole period 0.6.
 const DRIFT: f64 = 0.5;
+/// Deviation of the view's middle, px, with which a camera stands: an edge seems to move when it is half a pixel away.
+pub(super) const LEAST_PX: f64 = 0.3;
 /// Fewer frames than this tell neither.
 pub(super) const LEAST_FRAMES: usize = 12;
 
@@ -26,6 +28,7 @@ pub fn shakes(steps: &[Homography], size: (usize, usize)) -> bool {
         .collect();
     places.len() >= LEAST_FRAMES
         && places.iter().all(|place| is_near(place, size))
+        && rms_px(&places, size) > LEAST_PX
         && drift(&places, 0.5 * size) <= DRIFT
 }
 
@@ -36,9 +39,8 @@ pub fn is_near(place: &Homography, size: Vector2<f64>) -> bool {
 }
 
 /// Deviation of the middle from its mean place, px.
-pub fn rms_px(places: &[Homography], size: (usize, usize)) -> f64 {
-    let middle = 0.5 * Vector2::new(size.0 as f64, size.1 as f64);
-    let shifts: Vec<Vector2<f64>> = places.iter().map(|h| h.shift_at(middle)).collect();
+pub fn rms_px(places: &[Homography], size: Vector2<f64>) -> f64 {
+    let shifts: Vec<Vector2<f64>> = places.iter().map(|h| h.shift_at(0.5 * size)).collect();
     let n = shifts.len().max(1) as f64;
     let mean = shifts.iter().sum::<Vector2<f64>>() / n;
     (shifts.iter().map(|s| (s - mean).norm_squared()).sum::<f64>() / n).sqrt()
@@ -74,11 +76,12 @@ mod tests {
         let shakes = |place: &dyn Fn(f64) -> f64| shakes(&steps(place), (320, 256));
         assert!(shakes(&|k| 5.0 * (1.7 * k).sin()), "a fast shake");
         assert!(shakes(&|k| 5.0 * (k * std::f64::consts::TAU / 24.0).sin()), "a nod of a second");
+        assert!(!shakes(&|_| 0.0) && !shakes(&|k| 0.3 * (1.7 * k).sin()), "a camera at rest");
         assert!(!shakes(&|k| 0.2 * k), "a pan");
         assert!(!shakes(&|k| 0.2 * k + (1.7 * k).sin()), "a pan that shakes");
         assert!(!shakes(&|k| 20.0 * (1.7 * k).sin()), "a shake that leaves the view");
         let place = |k: i32| Homography::shift(Vector2::new(5.0 * (1.7 * f64::from(k)).sin(), 0.0));
         let places: Vec<Homography> = (0..480).map(place).collect();
-        assert!((rms_px(&places, (320, 256)) - 5.0 / 2f64.sqrt()).abs() < 0.1);
+        assert!((rms_px(&places, Vector2::new(320.0, 256.0)) - 5.0 / 2f64.sqrt()).abs() < 0.1);
     }
 }

@@ -10,7 +10,7 @@ use super::shake;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
 use crate::warp::draw_onto;
-use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Result, SourceInfo};
+use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Pixels, Result, SourceInfo};
 use nalgebra::Vector2;
 
 /// Share of the edge pixels that move where the frames are brought to one place, at most, and as a share of those that moved before: what goes by crosses edges, and what lies between pixels is not as they are.
@@ -44,10 +44,18 @@ pub(super) fn look(scene: &Scene, held: &[Frame], info: &SourceInfo) -> Result<O
     let Some(first) = held.first().filter(|_| may_shake(scene, info)) else { return Ok(None) };
     let size = Vector2::new(info.width as f64, info.height as f64);
     let (mut motion, mut place, mut found) = (CameraMotionEstimator::default(), Homography::identity(), Vec::new());
-    for (k, frame) in held.iter().enumerate() {
+    let like_first = |f: &&Frame| {
+        let of = |p: &Pixels| (p.width(), p.height(), p.kind());
+        of(&f.pixels) == of(&first.pixels)
+    };
+    for (k, frame) in held.iter().take_while(like_first).enumerate() {
         let step = motion.step(&frame.pixels);
+        // Behind what hides the view its place is not known any more.
+        if found.len() > 1 && step.is_none_or(|m| matches!(m.basis, MotionBasis::Resumed | MotionBasis::Cut)) {
+            break;
+        }
         place = step.map_or(place, |step| place.then(&step.now_from_before));
-        let is_measured = step.is_some_and(|m| matches!(m.basis, MotionBasis::Measured | MotionBasis::Resumed));
+        let is_measured = step.is_some_and(|m| m.basis == MotionBasis::Measured);
         if k == 0 || is_measured && shake::is_near(&place, size) {
             found.push((k, place));
         }
@@ -57,6 +65,9 @@ pub(super) fn look(scene: &Scene, held: &[Frame], info: &SourceInfo) -> Result<O
         return Ok(None);
     }
     let (at, places): (Vec<usize>, Vec<Homography>) = looked.into_iter().unzip();
+    if shake::rms_px(&places, size) <= shake::LEAST_PX {
+        return Ok(None);
+    }
     let step = info.width.div_ceil(GRID_PX).max(1);
     let mut canvas = first.pixels.clone();
     let grids = at.iter().zip(&places).map(|(k, place)| {

@@ -29,8 +29,8 @@ pub struct DetectorConfig {
     pub noise: NoiseConfig,
     /// Whether the camera's motion is followed, so that tracks live on steady ground.
     pub camera: CameraConfig,
-    /// Whether a frame is looked at that shows the picture before once more, to the last pixel, as behind a shutter, of a link that stalls, or where 30 frames are made of 25. If not, tracks coast in it, for 2 s of a
-    /// picture that stands; where little but the targets changes from frame to frame, as in pictures without noise, it is looked at in any case.
+    /// Whether a frame is looked at that shows the picture before once more, to the last pixel or to the few counts that a codec leaves, as behind a shutter, of a link that stalls, or where 30 frames are made of 25. If not, tracks coast in it, for 2 s of a
+    /// picture that stands; as long as not more than a sixteenth of the pixels has ever changed, as in pictures without noise, it is looked at in any case.
     pub look_at_repeated: bool,
     /// Follow a single target: only the largest cluster in a window around the predicted place is kept. Absent: all are.
     #[serde(skip_serializing_if = "Option::is_none")]

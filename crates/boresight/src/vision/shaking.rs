@@ -2,15 +2,15 @@
 //!
 //! Source: our own; a background model on frames that were steadied, as before surveillance cameras on masts.
 //! How: the estimator's motions are added up (against a key frame, so that errors do not), and the frame is drawn onto a canvas of the first one's view. What of the view the frame does not show stays on the canvas as it was last
-//! seen, so that nothing moves there. The detector sees the canvas alone; its detections are moved to where they lie in the frame, and the tracker steadies them once more.
-//! Symbols: image_from_ground, from a place of the canvas to the frame. Limits: one plane; what lies beyond the first view is not seen. Where the view is farther away than [`MOST_AWAY`], or another one begins, all is learnt
+//! seen, so that nothing moves there, and what is detected there is left out. The detector sees the canvas alone; its detections are moved to where they lie in the frame, and the tracker steadies them once more.
+//! Symbols: image_from_ground, from a place of the canvas to the frame. Limits: one plane; what lies beyond the first view is not seen. Where the view is farther away than [`MOST_AWAY`], another one begins, or its place was lost, all is learnt
 //! anew. Frames whose motion is not measured are no look at the scene once one was.
 
 use super::Detector;
 use super::target_finder::PRIME_FRAMES;
 use crate::camera::CameraMotionEstimator;
 use crate::warp::draw_onto;
-use crate::{Frame, Homography, Image, MotionBasis, Pixels, Result, Scan};
+use crate::{CameraMotion, Frame, Homography, Image, MotionBasis, Pixels, Result, Scan};
 use nalgebra::Vector2;
 
 /// Share of the view's width and height that the frame's middle may come away from the view's: more is no shake.
@@ -25,8 +25,11 @@ pub(super) struct Shaking<F> {
     image_from_ground: Homography,
     canvas: Frame,
     started: bool,
-    /// Whether a motion was measured.
+    /// Whether a motion was measured, and whether it was not known any more since.
     known: bool,
+    lost: bool,
+    /// Area from which on regions count, if another than the configuration's.
+    least_px: Option<u32>,
 }
 
 impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Shaking<F> {
@@ -43,6 +46,8 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Shaking<F> {
             canvas: Frame { index: Default::default(), time: Default::default(), pixels: nothing },
             started: false,
             known: false,
+            lost: false,
+            least_px: None,
         })
     }
 
@@ -50,11 +55,19 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Shaking<F> {
     fn start_anew(&mut self) -> Result<()> {
         if std::mem::replace(&mut self.started, true) {
             self.detector = (self.make)()?;
+            if let Some(area_px) = self.least_px {
+                self.detector.leave_out_below(area_px);
+            }
         }
         self.image_from_ground = Homography::identity();
-        self.known = false;
+        (self.known, self.lost) = (false, false);
         Ok(())
     }
+}
+
+/// Whether where the view lies is not known any more behind such a motion.
+fn breaks(motion: Option<&CameraMotion>) -> bool {
+    motion.is_none_or(|m| matches!(m.basis, MotionBasis::Resumed | MotionBasis::Cut))
 }
 
 /// Whether the view's middle lies far from the frame's, or outside of all sense.
@@ -71,8 +84,11 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Detector for Shaking<F> {
         if let Some(motion) = &motion {
             self.image_from_ground = self.image_from_ground.then(&motion.now_from_before);
         }
+        // Of what was not known of the place nothing is ever made up for.
+        self.lost |= self.known && breaks(motion.as_ref());
         let is_cut = motion.is_some_and(|m| m.is_cut());
-        if !self.started || is_cut || is_away(&self.image_from_ground, &frame.pixels) {
+        let is_found = self.lost && is_measured;
+        if !self.started || is_cut || is_found || is_away(&self.image_from_ground, &frame.pixels) {
             self.start_anew()?;
         }
         self.known |= is_measured;
@@ -84,6 +100,10 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Detector for Shaking<F> {
             self.detector.detect(canvas, scan)?;
             if !self.image_from_ground.is_identity() {
                 scan.detections.iter_mut().for_each(|d| d.move_by(&self.image_from_ground));
+                // What stood there when it was last seen is no detection of this frame.
+                let size = [frame.pixels.width() as f64, frame.pixels.height() as f64];
+                let is_in = |v: f64, n: f64| (-0.5..n - 0.5).contains(&v);
+                scan.detections.retain(|d| is_in(d.position.x, size[0]) && is_in(d.position.y, size[1]));
             }
         } else {
             (scan.index, scan.time, scan.blind) = (frame.index, frame.time, true);
@@ -99,16 +119,19 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Detector for Shaking<F> {
 
     fn prime(&mut self, frames: &[Frame]) -> Result<()> {
         let (mut camera, mut image_from_ground) = (CameraMotionEstimator::default(), Homography::identity());
+        let mut known = false;
         let n = PRIME_FRAMES.min(frames.len());
         let mut some = Vec::with_capacity(n);
         let Some(mut canvas) = frames.first().cloned() else { return Ok(()) };
         for (k, frame) in frames.iter().enumerate() {
-            if let Some(motion) = camera.step(&frame.pixels) {
+            let motion = camera.step(&frame.pixels);
+            if let Some(motion) = &motion {
                 image_from_ground = image_from_ground.then(&motion.now_from_before);
             }
-            if is_away(&image_from_ground, &frame.pixels) {
+            if known && breaks(motion.as_ref()) || is_away(&image_from_ground, &frame.pixels) {
                 break;
             }
+            known |= motion.is_some();
             draw_onto(&frame.pixels, &image_from_ground, &mut canvas.pixels);
             if k == some.len() * (frames.len() - 1) / (n - 1).max(1) {
                 (canvas.index, canvas.time) = (frame.index, frame.time);
@@ -119,7 +142,9 @@ impl<F: Fn() -> Result<Box<dyn Detector>> + Send> Detector for Shaking<F> {
     }
 
     fn leave_out_below(&mut self, area_px: u32) -> bool {
-        self.detector.leave_out_below(area_px)
+        let is_possible = self.detector.leave_out_below(area_px);
+        self.least_px = is_possible.then_some(area_px).or(self.least_px);
+        is_possible
     }
 }
 
@@ -224,14 +249,21 @@ mod tests {
         }
         errors.sort_by(f64::total_cmp);
         assert!(errors.len() > 25 && errors[errors.len() / 2] < 0.1, "{errors:?}");
-        // What is the other way round is another view; the detector goes on from there.
-        for (k, frame) in frames.iter().enumerate() {
+        // What is the other way round is another view, which is learnt anew, with the least area that was asked for.
+        assert!(detector.leave_out_below(30));
+        let (mut breaks, mut near) = (0, 0);
+        for (k, frame) in film(130).iter().enumerate() {
             let Pixels::Gray8(image) = &frame.pixels else { panic!("grey") };
             let turned = image.as_slice().iter().rev().map(|v| 255 - v).collect();
             let pixels = Pixels::Gray8(Image::from_vec(SIZE[0], SIZE[1], turned).unwrap());
             let time = Timestamp::from_secs_f64(0.04 * (30 + k) as f64);
             detector.detect(&Frame { index: FrameIndex(30 + k as u64), time, pixels }, &mut scan).unwrap();
+            breaks += usize::from(super::breaks(scan.camera_motion.as_ref()));
+            let at = Vector2::new(SIZE[0] as f64 - 1.0, SIZE[1] as f64 - 1.0) - place(k).apply(square(k));
+            near += usize::from(k > 80 && matches!(&scan.detections[..], [d] if (d.position - at).norm() < 1.0));
+            assert!(scan.detections.iter().all(|d| d.area_px >= 30), "frame {k}");
         }
-        assert!(!scan.blind && scan.camera_motion.is_some());
+        assert!((1..20).contains(&breaks), "{breaks}");
+        assert!(near > 12, "{near} of the frames from 80 to where the square leaves");
     }
 }

@@ -303,7 +303,10 @@ fn row(
 
 /// The scans of the runs, on a clock in which a run follows the one before without a gap.
 fn detect(config: &DetectorConfig, runs: &[Vec<Frame>], info: &SourceInfo) -> Result<Vec<Scan>> {
-    let config = DetectorConfig { camera: CameraConfig::Fixed, ..config.clone() };
+    let mut config = config.clone();
+    if config.camera == CameraConfig::Moving {
+        config.camera = CameraConfig::Fixed;
+    }
     let kind = runs.iter().flatten().next().map_or(info.kind, |f| f.pixels.kind());
     let mut detector = crate::vision::build(&config, &SourceInfo { kind, ..info.clone() })?;
     if detector.prime_s() > 0.0 {
