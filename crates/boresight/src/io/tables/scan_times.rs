@@ -8,13 +8,13 @@ use super::options::TableOptions;
 use crate::{Error, ErrorKind, FrameIndex, Result, Scan, Timestamp};
 
 /// A sequence of frames with a hole larger than this is taken for a wrong number, not for a pause.
-const MAX_GAP_FRAMES: u64 = 1_000_000;
+const MAX_GAP_FRAMES: u64 = 400_000;
 
-/// All holes of a table together may have this many frames, 22 hours of 25 a second: empty scans take memory as well, [`MAX_EMPTY_BYTES`] at most.
-const MAX_EMPTY_FRAMES: u64 = 2_000_000;
+/// All holes of a table together may have this many frames, 4.4 hours of 25 a second: empty scans take memory as well, [`MAX_EMPTY_BYTES`] at most.
+const MAX_EMPTY_FRAMES: u64 = 400_000;
 
 /// What the scans of all holes may take, bytes.
-const MAX_EMPTY_BYTES: usize = 1_400_000_000;
+const MAX_EMPTY_BYTES: usize = 300_000_000;
 
 const _: () = assert!(MAX_EMPTY_FRAMES as usize * size_of::<Scan>() <= MAX_EMPTY_BYTES);
 
