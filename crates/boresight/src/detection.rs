@@ -138,9 +138,10 @@ impl Detection {
     /// Moves it with its covariance, box and velocity.
     pub(crate) fn move_by(&mut self, by: &Homography) {
         if let Some(v) = &mut self.velocity {
-            let turn = |cov: &Matrix2<f64>| by.turn_cov_at(self.position, cov);
-            (v.mean, v.cov, v.with_position) =
-                (by.turn_at(self.position, v.mean), turn(&v.cov), turn(&v.with_position));
+            let a = by.linear_at(self.position);
+            v.mean = by.turn_at(self.position, v.mean);
+            v.cov = by.turn_cov_at(self.position, &v.cov);
+            v.with_position = a * v.with_position * a.transpose();
         }
         self.cov = by.turn_cov_at(self.position, &self.cov);
         self.extent = self.extent.moved(by);
@@ -234,5 +235,36 @@ impl Scan {
     /// As one in which nothing could be detected, or not.
     pub fn with_blind(self, blind: bool) -> Self {
         Self { blind, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Similarity;
+
+    #[test]
+    fn what_is_moved_by_a_quarter_turn_and_doubled_is_turned_and_doubled_in_all_its_parts() {
+        let velocity = DetectedVelocity {
+            mean: Vector2::new(3.0, 1.0),
+            cov: Matrix2::new(4.0, 1.0, 1.0, 2.0),
+            with_position: Matrix2::new(0.1, 0.2, 0.3, 0.4),
+        };
+        let at = Vector2::new(10.0, 20.0);
+        let mut d = Detection::at(at, Matrix2::new(1.0, 0.0, 0.0, 9.0))
+            .with_extent(Extent::around(at, 4.0, 4.0))
+            .with_velocity(Some(velocity));
+        // (x, y) -> 2 (-y, x) about (10, 20), and 5 px on: by hand.
+        let by = Similarity::about(at, Vector2::new(5.0, 0.0), std::f64::consts::FRAC_PI_2, 2.0);
+        d.move_by(&Homography::of_similarity(&by));
+        let v = d.velocity.unwrap();
+        let near = |a: Matrix2<f64>, b: Matrix2<f64>| (a - b).norm() < 1e-9;
+        assert!(
+            (d.position - Vector2::new(15.0, 20.0)).norm() < 1e-9 && (v.mean - Vector2::new(-2.0, 6.0)).norm() < 1e-9
+        );
+        assert!(near(d.cov, Matrix2::new(36.0, 0.0, 0.0, 4.0)));
+        assert!(near(v.cov, Matrix2::new(8.0, -4.0, -4.0, 16.0)));
+        assert!(near(v.with_position, Matrix2::new(1.6, -1.2, -0.8, 0.4)), "{}", v.with_position);
+        assert!((d.extent.left_px - 11.0).abs() < 1e-9 && (d.extent.width_px - 8.0).abs() < 1e-9);
     }
 }

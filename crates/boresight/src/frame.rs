@@ -93,6 +93,11 @@ impl Pixels {
         }
     }
 
+    /// Whether others are of the same size and type.
+    pub(crate) fn are_like(&self, others: &Self) -> bool {
+        (self.width(), self.height(), self.kind()) == (others.width(), others.height(), others.kind())
+    }
+
     /// The type of the pixels.
     pub fn kind(&self) -> PixelKind {
         match self {

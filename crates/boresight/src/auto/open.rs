@@ -162,10 +162,7 @@ fn choose_from(
 ) -> Result<Choice> {
     let info = frames.info().clone();
     let scene = scene::look(probed(frames.ahead()), &info)?;
-    let shaken = match shaken::may_shake(&scene, &info) {
-        true => shaken::look(&scene, frames.read_on(usize::MAX), &info)?,
-        false => None,
-    };
+    let shaken = shaken::look_on(&scene, frames)?;
     // Who does not know whether it stands looks longer.
     let look_again = scene.camera != Camera::Moving || request.detector == Some(DetectorKind::Colour);
     let mut read = second(frames, if look_again { Wanted::First } else { Wanted::None });

@@ -345,10 +345,11 @@ impl Scene {
         let scans = looks::scans(&config, spread(&moving, LOOKS).map(|&i| frames[i]), &seen, n_threads)?;
         let (mut n, mut hits) = (0usize, 0usize);
         for (scan, &i) in scans.iter().zip(spread(&moving, LOOKS)) {
+            let ground = self.places.get(i).map(Homography::inverse);
             for m in &moved[i] {
                 let area = (m.right - m.left) * (m.bottom - m.top);
                 let hit = scan.detections.iter().any(|d| {
-                    let at = self.places.get(i).map_or(d.position, |place| place.inverse().apply(d.position));
+                    let at = ground.map_or(d.position, |ground| ground.apply(d.position));
                     let (x, y) = (at.x, at.y);
                     let within = x >= m.left - 2.0 && x <= m.right + 1.0 && y >= m.top - 2.0 && y <= m.bottom + 1.0;
                     within && 4.0 * d.extent.width_px * d.extent.height_px >= area

@@ -9,8 +9,9 @@ use super::scene::{Camera, GRID_PX, Scene, edges_moved, edges_stand, grid, prime
 use super::shake;
 use super::spread::spread;
 use crate::camera::CameraMotionEstimator;
+use crate::io::Replay;
 use crate::warp::draw_onto;
-use crate::{Frame, Homography, Image, MotionBasis, PixelKind, Pixels, Result, SourceInfo};
+use crate::{Frame, FrameSource, Homography, Image, MotionBasis, PixelKind, Result, SourceInfo};
 use nalgebra::Vector2;
 
 /// Share of the edge pixels that move where the frames are brought to one place, at most, and as a share of those that moved before: what goes by crosses edges, and what lies between pixels is not as they are.
@@ -32,8 +33,16 @@ impl Shaken {
     }
 }
 
+/// As [`look`], of all frames that may be held, which are read only where they are needed.
+/// # Errors
+/// Frames of more than one size or pixel type.
+pub(super) fn look_on(scene: &Scene, frames: &mut Replay) -> Result<Option<Shaken>> {
+    let info = frames.info().clone();
+    if may_shake(scene, &info) { look(scene, frames.read_on(usize::MAX), &info) } else { Ok(None) }
+}
+
 /// Whether the first frames, of which `scene` speaks, show a camera that may shake.
-pub(super) fn may_shake(scene: &Scene, info: &SourceInfo) -> bool {
+fn may_shake(scene: &Scene, info: &SourceInfo) -> bool {
     !edges_stand(scene.edges_moved) && shake::shakes(&scene.steps, (info.width, info.height))
 }
 
@@ -44,11 +53,7 @@ pub(super) fn look(scene: &Scene, held: &[Frame], info: &SourceInfo) -> Result<O
     let Some(first) = held.first().filter(|_| may_shake(scene, info)) else { return Ok(None) };
     let size = Vector2::new(info.width as f64, info.height as f64);
     let (mut motion, mut place, mut found) = (CameraMotionEstimator::default(), Homography::identity(), Vec::new());
-    let like_first = |f: &&Frame| {
-        let of = |p: &Pixels| (p.width(), p.height(), p.kind());
-        of(&f.pixels) == of(&first.pixels)
-    };
-    for (k, frame) in held.iter().take_while(like_first).enumerate() {
+    for (k, frame) in held.iter().take_while(|f| f.pixels.are_like(&first.pixels)).enumerate() {
         let step = motion.step(&frame.pixels);
         // Behind what hides the view its place is not known any more.
         if found.len() > 1 && step.is_none_or(|m| matches!(m.basis, MotionBasis::Resumed | MotionBasis::Cut)) {

@@ -38,9 +38,8 @@ pub(super) struct Repeated {
     /// Which of some pixels have changed, until they are enough.
     changed: Vec<bool>,
     lively: bool,
-    /// The largest differences between the last new pictures, and their median.
+    /// The largest differences between the last new pictures.
     news: Vec<u8>,
-    sorted: Vec<u8>,
 }
 
 impl Repeated {
@@ -54,7 +53,6 @@ impl Repeated {
             changed: Vec::new(),
             lively: false,
             news: Vec::with_capacity(LAST + 1),
-            sorted: Vec::with_capacity(LAST + 1),
         }
     }
 
@@ -104,13 +102,15 @@ impl Repeated {
     }
 
     /// The largest difference of a picture that is shown again, counts.
-    fn most(&mut self) -> u8 {
-        if self.news.len() < LEAST {
+    fn most(&self) -> u8 {
+        let n = self.news.len();
+        if n < LEAST {
             return 0;
         }
-        self.sorted.clone_from(&self.news);
-        self.sorted.sort_unstable();
-        CODED.min((SMALL * f64::from(self.sorted[self.sorted.len() / 2])) as u8)
+        let mut news = [0; LAST];
+        news[..n].copy_from_slice(&self.news);
+        let median = *news[..n].select_nth_unstable(n / 2).1;
+        CODED.min((SMALL * f64::from(median)) as u8)
     }
 }
 

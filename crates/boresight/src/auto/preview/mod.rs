@@ -97,10 +97,7 @@ fn candidates(input: &OsStr, base: &Config, request: &Request) -> Result<(Source
     let mut first = Replay::new(source, n.min(PROBE_FRAMES)).up_to(n);
     let info = first.info().clone();
     let seen = scene::look(probed(first.ahead()), &info)?;
-    let shaken = match shaken::may_shake(&seen, &info) {
-        true => shaken::look(&seen, first.read_on(usize::MAX), &info)?,
-        false => None,
-    };
+    let shaken = shaken::look_on(&seen, &mut first)?;
     let camera = seen.camera;
     // As for a run: frames held say it, or those of another reading; for a detector that is asked for always the latter.
     let beside = beside.filter(|_| camera != Camera::Moving);

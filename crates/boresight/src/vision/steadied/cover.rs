@@ -1,16 +1,14 @@
 //! An image as another view of the same plane sees it, and the working image that the comparison is made on.
 //!
 //! Source: inverse warping with bilinear interpolation (R. Szeliski, *Computer Vision*, 2nd ed., 2022, section 3.6.1).
-//! How: along a row the place in the other image is computed at every [`SPAN`]-th pixel and runs in a straight line between: with a perspective that bends
-//! by 1 % of the width over the image, [`SPAN`] = 16 of 960 px leave 3·10⁻⁴ px.
+//! How: along a row span by span, as [`crate::warp`] does.
 //! Limits: outside the other image there is NaN.
 
 use crate::vision::pixel::Pixel;
+use crate::warp::{SPAN, spans};
 use crate::{Homography, Image, Pixels};
 use nalgebra::Vector2;
 
-/// Pixels over which a place runs in a straight line.
-const SPAN: usize = 16;
 /// Wider or higher frames are made smaller by a whole factor, px.
 const WORKING_PX: usize = 960;
 
@@ -101,15 +99,9 @@ pub(super) fn cover(other: &Image<f32>, other_from_own: &Homography, out: &mut I
         return;
     }
     for y in 0..out.height() {
-        let row = out.row_mut(y);
-        let at = |x: usize| other_from_own.apply(Vector2::new(x as f64, y as f64));
-        let mut from = at(0);
-        for (i, span) in row.chunks_mut(SPAN).enumerate() {
-            let to = at((i + 1) * SPAN);
-            let step = (to - from) / SPAN as f64;
+        spans(out.row_mut(y), y, other_from_own, |span, from, step| {
             cover_span(other, [from.x as f32, from.y as f32], [step.x as f32, step.y as f32], span);
-            from = to;
-        }
+        });
     }
 }
 
