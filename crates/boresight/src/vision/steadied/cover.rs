@@ -7,7 +7,6 @@
 use crate::vision::pixel::Pixel;
 use crate::warp::{SPAN, spans};
 use crate::{Homography, Image, Pixels};
-use nalgebra::Vector2;
 
 /// Wider or higher frames are made smaller by a whole factor, px.
 const WORKING_PX: usize = 960;
@@ -141,7 +140,7 @@ widest! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix3;
+    use nalgebra::{Matrix3, Vector2};
 
     #[test]
     fn a_plane_of_slopes_is_drawn_exactly_where_it_is_seen_and_nowhere_else() {
