@@ -37,7 +37,7 @@ const CLEAR: f32 = 1.15;
 const PEAK: usize = 2;
 /// Share of the tiles that must be explained: more than half of the area, by the deviation of a share of 600 tiles of which each is explained or not, 0.5 / √600. The reduced image has up to so
 /// many.
-pub(super) const LEAST_SHARE: f64 = 0.52;
+const LEAST_SHARE: f64 = 0.52;
 
 type Sums = [[f32; LANES]; SIDE];
 type Window = [[f32; ACROSS]; DOWN];
@@ -61,15 +61,21 @@ pub(super) struct Cover {
 }
 
 impl Cover {
-    /// Share of the area that the motion from `key` to `now` explains; 0 where nothing is asked.
-    pub fn share(&mut self, key: &Image<f32>, now: &Image<f32>, motion: &Homography) -> f64 {
+    /// Whether the motion from `key` to `now` explains most of the area ([`LEAST_SHARE`]); not where nothing is asked. It is asked no longer than it is open.
+    pub fn is_most(&mut self, key: &Image<f32>, now: &Image<f32>, motion: &Homography) -> bool {
         let ([n_across, left], [n_down, top]) = (tiles(key.width()), tiles(key.height()));
         self.rows.iter_mut().for_each(|row| {
             row.clear();
             row.resize(n_across, Tile::default());
         });
-        let (mut n, mut n_explained) = (0u32, 0u32);
+        let (mut n, mut n_explained) = (0, 0);
         for last in 0..=n_down {
+            // Whether those that are left could still change it, if all were asked and all of them explained, or none.
+            let n_left = n_across * (n_down + 1 - last.max(1));
+            let needed = LEAST_SHARE * (n + n_left) as f64;
+            if n_explained as f64 >= needed || ((n_explained + n_left) as f64) < needed {
+                return n > 0 && n_explained as f64 >= needed;
+            }
             for (x, tile) in self.rows[last % 3].iter_mut().enumerate() {
                 let patch = Patch { x: left + x * PATCH, y: top + last * PATCH, weight: 1.0 };
                 // Below the last row there is none.
@@ -79,11 +85,11 @@ impl Cover {
             // The rows above and below a row must be laid.
             if last > 0 {
                 for x in (0..n_across).filter(|x| self.rows[(last - 1) % 3][*x].is_asked) {
-                    (n, n_explained) = (n + 1, n_explained + u32::from(self.off_px(last - 1, x) < NEAR));
+                    (n, n_explained) = (n + 1, n_explained + usize::from(self.off_px(last - 1, x) < NEAR));
                 }
             }
         }
-        f64::from(n_explained) / f64::from(n.max(1))
+        n > 0 && n_explained as f64 >= LEAST_SHARE * n as f64
     }
 
     /// Distance of a tile's best place from the motion's, by the tiles around it where it does not stand clear alone.
@@ -248,7 +254,7 @@ mod tests {
     }
 
     fn is_most([key, now]: &[Image<f32>; 2], motion: Vector2<f64>) -> bool {
-        Cover::default().share(key, now, &Homography::shift(motion)) >= LEAST_SHARE
+        Cover::default().is_most(key, now, &Homography::shift(motion))
     }
 
     #[test]

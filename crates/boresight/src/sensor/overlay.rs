@@ -6,7 +6,7 @@
 //!    that. The scene moves if in one direction of edges at least (a pan leaves those along it where they are) more of the frame's tiles hold edges that move than such that stand. Optics make no edge
 //!    as sharp as a drawn one ([`SHARP`]), and lines of the scene that run along a pan have no ends: a mark begins where sharp edges of both directions stand close together. Where there are enough,
 //!    every sharp edge that stands is drawn.
-//! 2. Digits that change. A pixel that goes to and fro between two levels, keeps to them ([`NEAR_LEVEL`]), and has a sharp edge wherever it is at the upper one, with others like it beside it.
+//! 2. Digits that change. A pixel that goes to and fro between two levels, keeps to them ([`NEAR_LEVEL`]), and wherever it is at the upper one has a sharp edge and no brighter neighbour, with others like it beside it.
 //!
 //! Around both, what is contrasted in most frames, by the level that is drawn with, is drawn as well: digits in other states, and letters beside them. Of a scene that stands nothing else is taken but sharp edges of the digits' own level.
 //! Symbols: w, h size of the frame, px; s pixels of a stroke, one for each [`STROKE_PX`] of height; edges are the larger step to one of the two neighbours along an axis, counts.
@@ -311,7 +311,9 @@ impl Look {
                 if is_up {
                     let [x, y] = self.edge(sample, *i);
                     up += 1;
-                    sharp += usize::from(x.max(y) >= SWITCHED * range);
+                    // On the flank of a spot, which a lens draws, the pixels towards its middle are brighter.
+                    let is_top = || self.around(*i, 1).all(|j| f32::from(sample[j]) <= v + NEAR_LEVEL * range);
+                    sharp += usize::from(x.max(y) >= SWITCHED * range && is_top());
                 }
             }
             changes >= CHANGES && sharp as f32 >= MOSTLY * up as f32
