@@ -1,6 +1,6 @@
 //! The ring around a cluster's box: a plane through it, the spread about the plane, and how far the cluster stands clear.
 //!
-//! The ring begins one pixel outside the box (blurred edges) and is as wide as half the cluster, at least 3 px. Large rings are
+//! The ring begins one pixel outside the box (blurred edges) and is as wide as half the cluster's longer side, at least 3 px; beyond [`WIDE`] px no wider than half its shorter side. Large rings are
 //! sampled evenly with at most about 600 pixels. The plane takes a gradient of the sky or of the optics out.
 
 use super::blob::Blob;
@@ -18,6 +18,16 @@ const EDGE_SPREAD: f64 = 0.5;
 /// Share of the squares about the plane that is surely there: sums of f32 round.
 const SURE: f64 = 0.98;
 pub const TAIL: f64 = 0.5;
+
+/// Least and usual widths of a ring, px. Around a box of twice the usual one its 1 800 px tell their spread to 2 %, or, where texture is 4 px wide, to 7 %: what a wider one adds is what stands
+/// farther off, a roof below a helicopter.
+const LEAST: u32 = 3;
+const WIDE: u32 = 12;
+
+/// The ring's width around a box, px.
+fn margin(w: u32, h: u32) -> u32 {
+    (w.max(h) / 2).max(LEAST).min((w.min(h) / 2).max(WIDE))
+}
 
 /// A cluster of one level; values times the sign of the side.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +86,7 @@ impl Ring {
     ) -> Option<Ground> {
         let blob = &cluster.blob;
         let (w, h) = blob.sides();
-        let margin = (w.max(h) / 2).max(3) as usize;
+        let margin = margin(w, h) as usize;
         let inner = [blob.left as usize - 1, blob.top as usize - 1, blob.right as usize + 1, blob.bottom as usize + 1];
         let outer = [
             inner[0].saturating_sub(margin),
@@ -380,6 +390,20 @@ mod tests {
         same(scores(3000.0, 500.0, |v| v as u16));
         same(scores(0.5, 0.1, |v| v as f32));
         same(scores(1e9, 2e4, |v| v as f32));
+    }
+
+    #[test]
+    fn a_roof_below_a_long_target_is_not_in_its_ring() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let ground = |y: usize| if y < 80 { 50 } else { 200 };
+        let pixels = (0..160 * 120).map(|i| ground(i / 160) + rng.random_range(0..3u8)).collect();
+        let mut image = Image::from_vec(160, 120, pixels).unwrap();
+        (50..64).for_each(|y| image.row_mut(y)[60..100].fill(250));
+        let cluster = Cluster { blob: Blob::of_box([60, 50, 99, 63]), level: 220.0, mean: 250.0 };
+        // 12 px, which end above the roof; half the longer side are 20.
+        let found = Ring::default().ground(&image, 1.0, &cluster, 1.0, 4.0).unwrap();
+        assert!((found.level - 51.0).abs() < 0.2 && found.score(250.0, 1.0).unwrap() > 80.0, "{found:?}");
+        assert_eq!([(1, 1), (12, 9), (40, 14), (63, 35), (90, 80)].map(|(w, h)| margin(w, h)), [3, 6, 12, 17, 40]);
     }
 
     #[test]
