@@ -131,6 +131,30 @@ fn a_target_that_the_camera_follows_is_none() {
 }
 
 #[test]
+fn spots_that_come_to_the_same_places_again_are_no_digits() {
+    // In every sixth frame a crowd of alike spots stands where it stood six frames before; none stands there in the others.
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let spots: Vec<[f64; 2]> =
+        (0..40).map(|_| [rng.random_range(8.0..152.0), rng.random_range(8.0..112.0)]).collect();
+    let come = |k: usize, image: &mut Image<u8>| {
+        for [x, y] in spots.iter().filter(|_| k % 6 < 2) {
+            for (yy, xx) in (*y as usize - 6..*y as usize + 8).flat_map(|yy| (0..14).map(move |i| (yy, i))) {
+                let xx = *x as usize - 6 + xx;
+                let r2 = (xx as f64 - x).powi(2) + (yy as f64 - y).powi(2);
+                let v = &mut image.row_mut(yy)[xx];
+                *v = (f64::from(*v) + 180.0 * (-0.125 * r2).exp()).min(255.0) as u8;
+            }
+        }
+    };
+    let even = |k: usize| {
+        let mut image = Image::filled(W, H, 30u8);
+        come(k, &mut image);
+        image
+    };
+    assert!(found(&(0..N).map(even).collect::<Vec<_>>()).is_empty());
+}
+
+#[test]
 fn lines_along_a_pan_and_what_comes_by_are_none() {
     // A horizon that the pan runs along, and a square that crosses a scene that stands.
     let horizon = |_: usize, image: &mut Image<u8>| (0..3).for_each(|y| image.row_mut(70 + y).fill(250));
