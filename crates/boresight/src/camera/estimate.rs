@@ -276,8 +276,10 @@ impl CameraMotionEstimator {
         if key.even && !key.proven && !moved {
             return None;
         }
-        // Nothing but the frames themselves speaks for a first motion; what most of the area moves by is the ground's, however few pieces it has.
-        if !self.known || found.by_chance {
+        // Nothing but the frames themselves speaks for a first motion; what most of the area moves by is the ground's, however few pieces it has. A camera that rests is asked where it would else move.
+        let places = key.patches.iter().map(|p| p.middle());
+        let would_move = || moves(&last, &Found { by_chance: false, ..found }, middle, places);
+        if !self.known || found.by_chance && would_move() {
             let is_most = self.cover.is_most(&key.image, &self.now, &found.now_from_key);
             found.covers &= self.known || is_most;
             found.by_chance &= !is_most;
