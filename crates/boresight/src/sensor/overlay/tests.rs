@@ -132,10 +132,9 @@ fn a_target_that_the_camera_follows_is_none() {
 
 #[test]
 fn spots_that_come_to_the_same_places_again_are_no_digits() {
-    // In every sixth frame a crowd of alike spots stands where it stood six frames before; none stands there in the others.
+    // In two of six frames a crowd of alike spots stands where it stood six frames before; none stands there in the others.
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let spots: Vec<[f64; 2]> =
-        (0..40).map(|_| [rng.random_range(8.0..152.0), rng.random_range(8.0..112.0)]).collect();
+    let spots: Vec<[f64; 2]> = (0..40).map(|_| [rng.random_range(8.0..152.0), rng.random_range(8.0..112.0)]).collect();
     let come = |k: usize, image: &mut Image<u8>| {
         for [x, y] in spots.iter().filter(|_| k % 6 < 2) {
             for (yy, xx) in (*y as usize - 6..*y as usize + 8).flat_map(|yy| (0..14).map(move |i| (yy, i))) {

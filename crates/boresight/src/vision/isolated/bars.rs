@@ -21,7 +21,7 @@ const TAIL_NEAR: f64 = 2.0;
 /// The same of large rings, whose spread is counted by half.
 const TAIL: f64 = 1.5;
 
-/// Rings of cells: within `.1` cells of the middle, but not within `.0`. A cluster of side w has a ring that ends w from its middle.
+/// Rings of cells: within `.1` cells of the middle, but not within `.0`. A cluster of side w has a ring that ends between w/2 + 12 px and w from its middle.
 const RINGS: [(usize, usize); 10] =
     [(0, 1), (1, 2), (2, 4), (4, 8), (8, 16), (16, 32), (32, 64), (64, 128), (128, 256), (256, 512)];
 
