@@ -7,7 +7,7 @@
 //! is chosen by what they say ([`super::plane`]). Where nothing was known before, the motion must explain most of the image's area ([`super::cover`]), and its covariance is that of residuals left out of the fit ([`super::plane_cov`]).
 //! Against a key frame errors do not add up. A camera at rest stays exactly at rest ([`super::rest`]).
 //! A frame in which nothing is found is bridged: the course goes on and its covariance grows ([`MotionBasis::Held`]); the key frame stays, and is found
-//! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched; where nothing is known for long, seldom ([`super::patience`]). When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
+//! again or, where the last frame is found, replaced. Where a camera at rest has not moved ([`CameraMotionEstimator::look_at_rest`]) nothing is searched. When the course is too uncertain to look for patches along it, the motion is unknown (`None`).
 //! Where nothing is found and the frame as a whole is another one ([`super::other_view`]), another view has begun ([`MotionBasis::Cut`]), and all begins anew.
 //! Symbols: from_key, from the key frame to the last frame (reduced px).
 //! Limits: one plane. At a new key frame its error stays in the ground for good.
@@ -22,7 +22,6 @@ use super::found::{Found, coarse};
 use super::key_frame::{CELLS, KeyFrame, MIN_PATCHES};
 use super::light::Light;
 use super::other_view::OtherView;
-use super::patience::Patience;
 use super::plane::{self, Limits, corners_apart};
 use super::plane_cov::plane_cov;
 use super::reduce::{factor, reduce};
@@ -32,6 +31,21 @@ use super::votes;
 use super::wide::Wide;
 use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels};
 use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Whether the camera's motion is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CameraConfig {
+    /// The camera stands still, or its motion is none of the tracker's business.
+    #[default]
+    Fixed,
+    /// The background's motion is measured in every frame and taken from every position before tracking.
+    Moving,
+    /// The camera stays in its place but shakes or nods: frames are brought to the first one's place before anything is detected in them, so that what is made for a camera at rest (`moving`) can be used.
+    Shaking,
+}
 
 /// An even texture is believed once the image has moved by this, reduced px: a sensor's fixed pattern and a codec's copies never do.
 const BELIEVED: f64 = 1.0;
@@ -74,7 +88,6 @@ pub struct CameraMotionEstimator {
     known: bool,
     /// Frames, one after the other, in which a first motion was found that shows in too few places.
     n_unsure: u32,
-    patience: Patience,
     /// Whether turn or zoom changed in the last frame.
     turning: bool,
     rest: Rest,
@@ -97,32 +110,22 @@ impl CameraMotionEstimator {
             self.start_anew(pixels, &scales);
             return None;
         }
-        let mut found = None;
-        let searches = self.patience.searches();
-        if searches {
-            found = self.find(pixels, &scales);
-            found = found.or_else(|| self.find_in_other_light(pixels, &scales));
-        }
+        let mut found = self.find(pixels, &scales);
+        found = found.or_else(|| self.find_in_other_light(pixels, &scales));
         let last = if self.key_is_last { &self.key.image } else { &self.last.image };
         if found.is_none() && self.view.is_other(last, &self.now) {
             self.start_anew(pixels, &scales);
-            self.patience = Patience::default();
             return Some(full_size(&Homography::identity(), &MotionCov::zeros(), MotionBasis::Cut, &scales));
         }
         let is_unsure = !self.known && found.is_some_and(|f| !f.0.covers);
         let is_of_ground = is_unsure && found.is_some_and(|f| !f.0.may_be_a_thing && !f.0.by_chance);
         self.n_unsure = if is_of_ground { self.n_unsure + 1 } else { 0 };
-        self.patience.take(self.known || is_of_ground);
         if is_unsure && self.n_unsure < UNSURE_FRAMES {
             found = None;
         }
         let at_last = found.is_some_and(|f| f.1);
         self.last.forget();
         self.key_is_last = false;
-        if !searches {
-            self.last.keep(&mut self.now);
-            return None;
-        }
         let (step, cov, basis) = match found {
             Some((found, _)) => self.measured(found, at_last, pixels, &scales),
             None => self.held(pixels, &scales)?,

@@ -5,7 +5,6 @@
 //! coordinates of the first scan's background and tracks back into the image's.
 
 mod apart;
-mod config;
 mod course;
 mod cover;
 mod estimate;
@@ -19,7 +18,6 @@ mod light;
 mod mixed;
 mod motion;
 mod other_view;
-mod patience;
 mod plane;
 mod plane_cov;
 mod reduce;
@@ -31,8 +29,7 @@ mod votes;
 mod wide;
 mod wide_search;
 
-pub use config::CameraConfig;
-pub use estimate::CameraMotionEstimator;
+pub use estimate::{CameraConfig, CameraMotionEstimator};
 pub use follow_plane::PlaneFollower;
 pub use motion::CameraPath;
 pub(crate) use register::PlanePatches;

@@ -20,7 +20,7 @@ const SURE: f64 = 0.98;
 pub const TAIL: f64 = 0.5;
 
 /// Least and usual widths of a ring, px. Around a box of twice the usual one its 1 800 px tell their spread to 2 %, or, where texture is 4 px wide, to 7 %: what a wider one adds is what stands
-/// farther off, a roof below a helicopter.
+/// farther off, a roof below a helicopter. Of 8, 12 and 16 px, all of which tell enough, 12 holds most of the public clips' targets.
 const LEAST: u32 = 3;
 const WIDE: u32 = 12;
 
