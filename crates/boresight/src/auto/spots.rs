@@ -153,7 +153,8 @@ impl Seen {
             true => (Polarity::Dark, &self.dark, &self.bright),
             false => (Polarity::Bright, &self.bright, &self.dark),
         };
-        let counts = self.is_poor() || other.per_frame >= POOR;
+        // Between many of one polarity gaps of the other one move as they do.
+        let counts = !self.are_many() || other.per_frame >= POOR;
         let beside = other.chains.gain_beside(&most.chains) > SURE_GAIN;
         if counts && most.chains.is_sure() && beside { Polarity::Both } else { polarity }
     }
@@ -353,6 +354,11 @@ mod tests {
         assert_eq!(seen(moving(50.0), still()), Polarity::Bright);
         assert_eq!(seen(moving(50.0), moving(150.0)), Polarity::Both);
         assert_ne!(seen(moving(50.0), moving(56.0)), Polarity::Both, "a thing and its dark edge");
+        let clear = || side(1.0, 20.0, 50.0, 50.0, 4.0);
+        assert_eq!(seen(clear(), moving(150.0)), Polarity::Both, "a clear one and a faint one that goes elsewhere");
+        assert_ne!(seen(clear(), moving(56.0)), Polarity::Both, "a clear one and its dark edge");
+        assert_ne!(seen(side(40.0, 20.0, 50.0, 50.0, 4.0), moving(150.0)), Polarity::Both, "gaps between many");
+        assert_ne!(seen(clear(), side(0.0, 0.0, 50.0, 150.0, 0.0)), Polarity::Both, "what stands is none");
         // What stands clear decides where there is any.
         assert_eq!(seen(moving(50.0), side(1.0, 20.0, 90.0, 150.0, 0.0)), Polarity::Dark);
         assert_eq!(seen(still(), still()), Polarity::Bright);
