@@ -2,7 +2,7 @@
 //!
 //! The fast decoder refuses what it does not do, and whatever looks damaged. Then the complete one decodes again from the last refresh,
 //! throws away what has been handed out, and its word on the sample is the last one. The next refresh is the fast one's again, unless it
-//! refused too often.
+//! refused too often. Order counts compare within a period, from one instantaneous refresh to the next; whichever decodes, the periods are counted here.
 //! Limits: after three refusals the fast decoder is not asked again, so a stream's samples are decoded a second time at most three times over.
 
 use super::h264::AccessUnits;
@@ -23,6 +23,8 @@ pub(super) struct Decoders {
     complete: AccessUnits,
     /// Whether the fast one may be asked.
     may_be_fast: bool,
+    /// Instantaneous refreshes and resets so far.
+    period: u32,
     /// Step from which the fast one decodes: the last refresh, or the first sample after a reset. `None`: the complete one decodes.
     since: Option<usize>,
     refusals: u32,
@@ -31,11 +33,12 @@ pub(super) struct Decoders {
 }
 
 impl Decoders {
-    pub fn new(configurations: Vec<Vec<u8>>, max_pixels: u64) -> Self {
+    pub fn new(configurations: Vec<Vec<u8>>, max_pixels: u64, may_be_fast: bool) -> Self {
         Self {
             fast: Progressive::new(configurations.clone(), max_pixels),
             complete: AccessUnits::new(configurations, max_pixels),
-            may_be_fast: false,
+            may_be_fast,
+            period: 0,
             since: None,
             refusals: 0,
             is_new: true,
@@ -45,11 +48,6 @@ impl Decoders {
     /// Reads the parameter sets of a sample description, so that the size is known.
     pub fn configure(&mut self, description: u16) -> Result<(), Refusal> {
         self.complete.configure(description)
-    }
-
-    /// Says that pictures are ordered by the file's times, so that the fast decoder's order counts do not matter.
-    pub fn allow_fast(&mut self) {
-        self.may_be_fast = true;
     }
 
     /// The newest sequence parameter set.
@@ -70,12 +68,30 @@ impl Decoders {
     /// Decodes the sample of a step; `read` reads the sample of an earlier one again.
     pub fn decode(
         &mut self,
+        sample: (&[u8], &Sample, usize),
+        read: &mut ReadAgain<'_>,
+        out: &mut Vec<Picture>,
+    ) -> Result<(), Refusal> {
+        let refreshes = self.fast.refreshes(sample.0);
+        self.period += u32::from(refreshes);
+        let done = out.len();
+        let result = self.decode_either(sample, refreshes, read, out);
+        // Fields may come with a later sample: their decoder counts for itself.
+        if self.may_be_fast && !self.fast.unfit {
+            out[done..].iter_mut().for_each(|p| p.period = self.period);
+        }
+        result
+    }
+
+    fn decode_either(
+        &mut self,
         (data, sample, step): (&[u8], &Sample, usize),
+        refreshes: bool,
         read: &mut ReadAgain<'_>,
         out: &mut Vec<Picture>,
     ) -> Result<(), Refusal> {
         let ask_fast = self.may_be_fast && self.refusals < MAX_REFUSALS && !self.fast.unfit;
-        if ask_fast && (self.is_new || self.fast.refreshes(data)) {
+        if ask_fast && (self.is_new || refreshes) {
             if self.since.is_none() {
                 self.fast.reset();
             }
@@ -117,6 +133,7 @@ impl Decoders {
     pub fn reset(&mut self) {
         self.fast.reset();
         self.complete.reset();
+        self.period += 1;
         self.since = None;
         self.is_new = true;
     }
@@ -125,7 +142,7 @@ impl Decoders {
 #[cfg(test)]
 mod tests {
     use super::super::source::{Opened, open_by};
-    use crate::io::{Colour, OpenOptions};
+    use crate::io::{Colour, ColoursBeside, KeepColours, OpenOptions};
     use crate::{Frame, FrameSource};
     use std::path::{Path, PathBuf};
 
@@ -160,6 +177,68 @@ mod tests {
                 );
                 assert!(!got.is_empty() && got == want, "{name}: {} and {} frames", got.len(), want.len());
             }
+        }
+    }
+
+    /// A clip whose file does not say in which order its pictures are shown: its composition offsets are renamed, and the edit list that goes with them.
+    fn without_order(name: &str, dir: &Path) -> PathBuf {
+        let mut bytes = std::fs::read(clip(name)).unwrap();
+        for kind in [b"ctts", b"edts"] {
+            let at = bytes.windows(4).position(|w| w == kind).unwrap();
+            bytes[at..at + 4].copy_from_slice(b"free");
+        }
+        let path = dir.join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    #[test]
+    fn pictures_that_their_counts_order_are_the_same_by_both_decoders() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["b_frames.mp4", "open_gop.mp4"] {
+            let path = without_order(name, dir.path());
+            let (reader, got) = frames(&path, Colour::Native, true);
+            let (slower, want) = frames(&path, Colour::Native, false);
+            assert!(
+                reader.ends_with("fast decoder") && !slower.ends_with("fast decoder"),
+                "{name}: {reader}, {slower}"
+            );
+            // As the file itself says where it does.
+            let (_, ordered) = frames(&clip(name), Colour::Native, true);
+            let pixels = |all: &[Frame]| all.iter().map(|f| f.pixels.clone()).collect::<Vec<_>>();
+            assert!(!got.is_empty() && got == want && pixels(&got) == pixels(&ordered), "{name}");
+        }
+    }
+
+    #[test]
+    fn frames_that_are_wanted_are_whole_where_only_counts_order_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = without_order("b_frames.mp4", dir.path());
+        let all = frames(&path, Colour::Native, true).1;
+        let Ok(Opened::Source(mut source)) = open_by(&path, &OpenOptions::default(), true) else { panic!("no video") };
+        source.want_only(Box::new(|k| [3, 7, 11].contains(&k)));
+        let mut seen = 0;
+        while let Some(frame) = source.next_frame().unwrap() {
+            if [3, 7, 11].contains(&frame.index.0) {
+                assert_eq!(frame, all[frame.index.0 as usize]);
+                seen += 1;
+            }
+        }
+        assert_eq!(seen, 3);
+    }
+
+    #[test]
+    fn frames_kept_in_colour_beside_grey_ones_are_those_of_their_numbers_whatever_orders_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let name = "b_frames.mp4";
+        let coloured = frames(&clip(name), Colour::Rgb, true).1;
+        for path in [clip(name), without_order(name, dir.path())] {
+            let colours = ColoursBeside::new(|_, _| KeepColours { over: 25, most: 25, every_px: 1 });
+            let options = OpenOptions { colours_beside: Some(colours.clone()), ..OpenOptions::default() };
+            let Ok(Opened::Source(mut source)) = open_by(&path, &options, true) else { panic!("no video") };
+            while source.next_frame().unwrap().is_some() {}
+            let kept = colours.take(25).unwrap();
+            assert!(kept.iter().map(|f| &f.pixels).eq(coloured.iter().map(|f| &f.pixels)), "{}", path.display());
         }
     }
 

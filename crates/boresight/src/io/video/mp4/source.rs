@@ -71,14 +71,13 @@ pub(super) fn open_by(path: &Path, options: &OpenOptions, may_be_fast: bool) -> 
     let (frame_in, frame_out) = channel();
     let ahead = Arc::<Ahead>::default();
     let (spare_in, spare_out) = channel();
-    let units = Decoders::new(configurations, options.max_pixels);
+    let units = Decoders::new(configurations, options.max_pixels, may_be_fast);
     let wanted = Arc::<OnceLock<Wanted>>::default();
     let worker = Worker {
         file,
         movie,
         ranks,
         units,
-        may_be_fast,
         colour: options.colour,
         colours_beside: options.colours_beside.clone(),
         out: frame_in,

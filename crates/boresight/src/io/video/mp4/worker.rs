@@ -11,6 +11,7 @@ use crate::io::ColoursBeside;
 use crate::io::options::Colour;
 use crate::io::video::yuv::{Matrix, Planes, to_rgb, to_u16};
 use crate::{Frame, FrameIndex, Image, Pixels, Timestamp, Wanted};
+use rust_h264::nal::SpsInfo;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::sync::mpsc::{Receiver, Sender};
@@ -35,7 +36,6 @@ pub(super) struct Worker {
     pub movie: Movie,
     pub ranks: Vec<Option<u64>>,
     pub units: Decoders,
-    pub may_be_fast: bool,
     pub colour: Colour,
     pub colours_beside: Option<ColoursBeside>,
     pub out: Sender<Message>,
@@ -57,9 +57,6 @@ impl Worker {
             return;
         }
         let order = self.order();
-        if self.may_be_fast && order == Order::Rank {
-            self.units.allow_fast();
-        }
         let mut reorder = Reorder::new(order);
         match self.decode_all(&mut reorder, &mut tally) {
             Ok(None) => {
@@ -85,7 +82,11 @@ impl Worker {
     }
 
     /// Decodes every step; gives the refusal that stops the stream before its first picture.
-    fn decode_all(&mut self, reorder: &mut Reorder<Pixels>, tally: &mut Tally) -> Result<Option<Refusal>, Gone> {
+    fn decode_all(
+        &mut self,
+        reorder: &mut Reorder<Option<Decoded>>,
+        tally: &mut Tally,
+    ) -> Result<Option<Refusal>, Gone> {
         let mut data = Vec::new();
         let mut pictures = Vec::new();
         let mut due = Vec::new();
@@ -99,9 +100,9 @@ impl Worker {
                     Err(wanted) => look_at = wanted + 1,
                     Ok(next) => {
                         self.units.finish(&mut pictures);
-                        self.place(&mut pictures, reorder, &mut due, tally);
+                        self.place(&mut pictures, reorder, &mut due);
                         for rank in (step..next).filter_map(|s| self.ranks.get(s).copied().flatten()) {
-                            reorder.push(0, 0, rank, nothing(), &mut due);
+                            reorder.push(0, 0, rank, None, &mut due);
                         }
                         self.send(&mut due, tally)?;
                         // What begins here depends on nothing that was passed over.
@@ -128,8 +129,8 @@ impl Worker {
                     Some(read_sample(file, &sample, movie.file_len, data).map(|()| sample))
                 };
                 match read(step, &mut data) {
-                    Some(Ok(_)) if unwanted.is_some() && self.units.may_leave_out(&data) => {
-                        unwanted.iter().for_each(|rank| reorder.push(0, 0, *rank, nothing(), &mut due));
+                    Some(Ok(_)) if unwanted.is_some() && reorder.is_by_rank() && self.units.may_leave_out(&data) => {
+                        unwanted.iter().for_each(|rank| reorder.push(0, 0, *rank, None, &mut due));
                         Ok(())
                     }
                     Some(Ok(sample)) => self.units.decode((&data, &sample, step), &mut read, &mut pictures),
@@ -151,11 +152,11 @@ impl Worker {
                     reorder.lose(rank, &mut due);
                 }
             }
-            self.place(&mut pictures, reorder, &mut due, tally);
+            self.place(&mut pictures, reorder, &mut due);
             self.send(&mut due, tally)?;
         }
         self.units.finish(&mut pictures);
-        self.place(&mut pictures, reorder, &mut due, tally);
+        self.place(&mut pictures, reorder, &mut due);
         reorder.finish(&mut due);
         self.send(&mut due, tally)?;
         Ok(None)
@@ -182,33 +183,35 @@ impl Worker {
     fn place(
         &mut self,
         pictures: &mut Vec<Picture>,
-        reorder: &mut Reorder<Pixels>,
-        due: &mut Vec<(u64, Pixels)>,
-        tally: &mut Tally,
+        reorder: &mut Reorder<Option<Decoded>>,
+        due: &mut Vec<(u64, Option<Decoded>)>,
     ) {
         for picture in pictures.drain(..) {
             let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
             let (period, count) = (picture.period, picture.order_count);
-            if !is_wanted(&self.wanted, rank) {
-                reorder.push(period, count, rank, nothing(), due);
-                continue;
-            }
-            self.keep_colours(&picture, rank, tally);
-            match self.pixels(picture) {
-                Some(pixels) => reorder.push(period, count, rank, pixels, due),
-                None => reorder.lose(rank, due),
-            }
+            // Where counts order them it is not known yet which one this is.
+            let may_be_wanted = !reorder.is_by_rank() || is_wanted(&self.wanted, rank);
+            let decoded = may_be_wanted.then(|| Decoded { picture, info: self.units.info() });
+            reorder.push(period, count, rank, decoded, due);
         }
     }
 
-    fn send(&mut self, due: &mut Vec<(u64, Pixels)>, tally: &mut Tally) -> Result<(), Gone> {
-        for (rank, pixels) in due.drain(..) {
+    fn send(&mut self, due: &mut Vec<(u64, Option<Decoded>)>, tally: &mut Tally) -> Result<(), Gone> {
+        for (rank, decoded) in due.drain(..) {
             // Times that run backwards can only come from tables that lie; such a frame counts as lost.
             if rank < tally.next_rank {
                 continue;
             }
-            let time = self.time(rank, tally);
             tally.next_rank = rank + 1;
+            let pixels = match decoded.filter(|_| is_wanted(&self.wanted, rank)) {
+                None => Some(nothing()),
+                Some(decoded) => {
+                    self.keep_colours(&decoded, rank, tally);
+                    self.pixels(decoded)
+                }
+            };
+            let Some(pixels) = pixels else { continue };
+            let time = self.time(rank, tally);
             tally.sent += 1;
             let frame = Frame { index: FrameIndex(rank), time, pixels };
             self.ahead.wait_for(rank).then_some(()).ok_or(Gone)?;
@@ -227,43 +230,32 @@ impl Worker {
     }
 
     /// Keeps a picture in colour, if that is asked for.
-    fn keep_colours(&mut self, picture: &Picture, rank: u64, tally: &mut Tally) {
+    fn keep_colours(&mut self, decoded: &Decoded, rank: u64, tally: &mut Tally) {
         let Some(beside) = &self.colours_beside else { return };
+        let picture = &decoded.picture;
         if !tally.kept_began {
             tally.kept_began = true;
             beside.begin(self.n_frames, (picture.width, picture.height));
         }
         if beside.wants(rank)
-            && let Some(image) = self.rgb(picture, std::mem::take(&mut tally.in_colour))
+            && let Some(image) = rgb(decoded, std::mem::take(&mut tally.in_colour))
         {
             beside.keep(FrameIndex(rank), self.time(rank, tally), &image);
             tally.in_colour = image.into_vec();
         }
     }
 
-    /// A picture in colour, in memory that is given; `None` where it has none.
-    fn rgb(&self, f: &Picture, mut rgb: Vec<[u8; 3]>) -> Option<Image<[u8; 3]>> {
-        let info = self.units.info()?;
-        if info.chroma_format == 0 {
-            return None;
-        }
-        let matrix = Matrix::new(info.matrix, info.full_range, f.height);
-        let (width, height, shift) = (f.width, f.height, (1, f.chroma_row_shift));
-        let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
-        to_rgb(&planes, &matrix, &mut rgb).then(|| Image::from_vec(width, height, rgb))?
-    }
-
-    fn pixels(&mut self, picture: Picture) -> Option<Pixels> {
-        let f = picture;
-        let (width, height) = (f.width, f.height);
+    fn pixels(&mut self, decoded: Decoded) -> Option<Pixels> {
         let spare = self.spare.try_recv().ok();
-        if self.colour == Colour::Rgb && self.units.info().is_some_and(|i| i.chroma_format != 0) {
-            let rgb = match spare {
+        if self.colour == Colour::Rgb && decoded.info.is_some_and(|i| i.chroma_format != 0) {
+            let memory = match spare {
                 Some(Pixels::Rgb8(image)) => image.into_vec(),
                 _ => Vec::new(),
             };
-            return self.rgb(&f, rgb).map(Pixels::Rgb8);
+            return rgb(&decoded, memory).map(Pixels::Rgb8);
         }
+        let f = decoded.picture;
+        let (width, height) = (f.width, f.height);
         if f.bits > 8 {
             let mut gray = match spare {
                 Some(Pixels::Gray16(image)) => image.into_vec(),
@@ -274,6 +266,21 @@ impl Worker {
         }
         Image::from_vec(width, height, f.y).map(Pixels::Gray8)
     }
+}
+
+/// A picture whose turn is to come, and the parameter set that it was coded with.
+struct Decoded {
+    picture: Picture,
+    info: Option<SpsInfo>,
+}
+
+/// A picture in colour, in memory that is given; `None` where it has none.
+fn rgb(Decoded { picture: f, info }: &Decoded, mut rgb: Vec<[u8; 3]>) -> Option<Image<[u8; 3]>> {
+    let info = info.filter(|i| i.chroma_format != 0)?;
+    let matrix = Matrix::new(info.matrix, info.full_range, f.height);
+    let (width, height, shift) = (f.width, f.height, (1, f.chroma_row_shift));
+    let planes = Planes { width, height, y: &f.y, u: &f.u, v: &f.v, shift, bits: f.bits };
+    to_rgb(&planes, &matrix, &mut rgb).then(|| Image::from_vec(width, height, rgb))?
 }
 
 /// What stands for a picture that nobody wants.
