@@ -7,6 +7,7 @@
 
 use super::model::BackgroundPixel;
 use crate::Image;
+use crate::vision::middle::upper_middle;
 
 /// Light of a frame against the model: v = gain * m + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,9 @@ pub(super) const SAME: Light = Light { gain: 1.0, offset: 0.0 };
 pub(super) struct Grid {
     pairs: Vec<(f32, f32)>,
     work: Vec<f32>,
+    /// Means and differences of the pairs near the line, and the same of the dark ones with the bright ones behind them.
+    near: [Vec<f32>; 2],
+    sides: [Vec<f32>; 2],
 }
 
 impl Grid {
@@ -46,7 +50,9 @@ impl Grid {
         // Covered pixels on one side shift a median: fit again without those far from the line.
         for _ in 0..2 {
             let residual = |p: &(f32, f32)| (p.1 - line(light, p.0)).abs();
-            let Some(mad) = median(&mut self.work, self.pairs.iter().map(residual)) else { return light };
+            self.work.clear();
+            self.work.extend(self.pairs.iter().map(residual));
+            let Some(mad) = upper_middle(&self.work) else { return light };
             light = self.fit(2.0 * 1.4826 * mad.max(deviation), light, deviation);
         }
         light
@@ -54,14 +60,27 @@ impl Grid {
 
     /// The line through the medians of the dark and the bright pairs within `reach` of the line before.
     fn fit(&mut self, reach: f32, before: Light, deviation: f32) -> Light {
-        let Self { pairs, work } = self;
-        let near = || pairs.iter().filter(|p| (p.1 - line(before, p.0)).abs() <= reach);
-        let Some(split) = median(work, near().map(|p| p.0)) else { return before };
-        let mut side = |bright: bool| {
-            let group = || near().filter(|p| (p.0 > split) == bright);
-            Some((median(work, group().map(|p| p.0))?, median(work, group().map(|p| p.1))?))
-        };
-        let (dark, bright) = (side(false), side(true));
+        let Self { pairs, near: [near_means, near_differences], sides: [means, differences], .. } = self;
+        for v in [&mut *near_means, &mut *near_differences, &mut *means, &mut *differences] {
+            v.resize(pairs.len(), 0.0);
+        }
+        // Places are computed and not branched to: which pairs are near, and which bright, cannot be foreseen.
+        let mut n = 0;
+        for &(m, d) in pairs.iter() {
+            (near_means[n], near_differences[n]) = (m, d);
+            n += usize::from((d - line(before, m)).abs() <= reach);
+        }
+        let Some(split) = upper_middle(&near_means[..n]) else { return before };
+        let mut n_dark = 0;
+        for (i, (m, d)) in near_means[..n].iter().zip(&near_differences[..n]).enumerate() {
+            let is_dark = *m <= split;
+            let at = if is_dark { n_dark } else { n - 1 - (i - n_dark) };
+            (means[at], differences[at]) = (*m, *d);
+            n_dark += usize::from(is_dark);
+        }
+        let side =
+            |of: std::ops::Range<usize>| Some((upper_middle(&means[of.clone()])?, upper_middle(&differences[of])?));
+        let (dark, bright) = (side(0..n_dark), side(n_dark..n));
         let Some((m0, d0)) = dark else { return before };
         let Some((m1, d1)) = bright else { return Light { gain: 1.0, offset: d0 } };
         if m1 - m0 < 16.0 * deviation.max(f32::MIN_POSITIVE) {
@@ -75,16 +94,6 @@ impl Grid {
 /// The difference that the light gives at a mean.
 fn line(light: Light, mean: f32) -> f32 {
     (light.gain - 1.0) * mean + light.offset
-}
-
-fn median(work: &mut Vec<f32>, values: impl Iterator<Item = f32>) -> Option<f32> {
-    work.clear();
-    work.extend(values);
-    if work.is_empty() {
-        return None;
-    }
-    let middle = work.len() / 2;
-    Some(*work.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// Least change of light that is taken off frames which a background is learnt from, deviations of a pixel: less widens its noise by little.
@@ -105,7 +114,9 @@ pub(crate) fn in_one_light<T: BackgroundPixel>(frames: &[&Image<T>], step: usize
     let mut grid = Grid::default();
     let mut by_light: Vec<(f32, usize)> = Vec::with_capacity(frames.len());
     for (k, frame) in frames.iter().enumerate() {
-        by_light.push((median(&mut grid.work, places().map(|(x, y)| at(frame, x, y)))?, k));
+        grid.work.clear();
+        grid.work.extend(places().map(|(x, y)| at(frame, x, y)).filter(|v| v.is_finite()));
+        by_light.push((upper_middle(&grid.work)?, k));
     }
     by_light.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let reference = frames[by_light[frames.len() / 2].1];
@@ -123,7 +134,7 @@ pub(crate) fn in_one_light<T: BackgroundPixel>(frames: &[&Image<T>], step: usize
                 grid.push(m, at(frame, x, y) - m);
             });
             let light = grid.light(noise);
-            let Grid { pairs, work } = &mut grid;
+            let Grid { pairs, work, .. } = &mut grid;
             work.clear();
             work.extend(pairs.iter().map(|p| (p.1 - line(light, p.0)).abs()));
             let third = 3 * work.len() / 4;

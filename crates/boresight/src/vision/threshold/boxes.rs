@@ -124,6 +124,8 @@ impl<S: Sum> Sums<S> {
         self.rows.resize(kept * w, S::default());
         self.first.begin(smooth, w);
         self.wide.begin(surround, w);
+        self.smoothed.resize(w, S::default());
+        self.around.resize(w, S::default());
         for columns in [&mut self.first, &mut self.wide] {
             (0..columns.side).for_each(|k| columns.enter(src.row(k.saturating_sub(columns.side / 2).min(h - 1))));
         }
@@ -156,8 +158,7 @@ impl<S: Sum> Sums<S> {
     /// The sums of the first box around the pixels of row `j`, and its columns moved on to the next.
     fn first_row<T: Pixel + Term<S>>(&mut self, src: &Image<T>, j: usize) {
         let (h, w, side) = (src.height(), src.width(), self.first.side);
-        self.first.neighbours(&mut self.windows, &mut self.smoothed);
-        self.rows[(j % (side + 1)) * w..][..w].copy_from_slice(&self.smoothed);
+        self.first.neighbours(&mut self.windows, &mut self.rows[(j % (side + 1)) * w..][..w]);
         self.first.replace(src.row((j + 1 + side / 2).min(h - 1)), src.row(j.saturating_sub(side / 2)));
     }
 }
@@ -190,16 +191,17 @@ impl<S: Sum> Columns<S> {
     }
 
     /// The sums over `side` columns around each; `windows` is scratch.
-    fn neighbours(&mut self, windows: &mut [Vec<S>; 2], out: &mut Vec<S>) {
+    fn neighbours(&mut self, windows: &mut [Vec<S>; 2], out: &mut [S]) {
         let (side, r, n) = (self.side, self.side / 2, self.sums.len());
         let [first, last] = [r, n - 1 - r].map(|x| self.sums[x]);
         self.sums[..r].fill(first);
         self.sums[n - r..].fill(last);
         // The windows of one column are the columns themselves, the first of which stands in every odd sum.
-        out.clear();
-        out.extend_from_slice(&self.sums[..n + 1 - side]);
-        if side == 1 {
-            return;
+        let one = &self.sums[..n + 1 - side];
+        match side {
+            1 => return out.copy_from_slice(one),
+            3 => return add_three(out, one, &self.sums[1..], &self.sums[2..]),
+            _ => {}
         }
         let [window, twice] = windows;
         window.resize(n - 1, S::default());
@@ -207,7 +209,10 @@ impl<S: Sum> Columns<S> {
         let (mut wide, mut from) = (2, 1);
         loop {
             if side & wide != 0 {
-                add(out, &window[from..]);
+                match from {
+                    1 => add_two(out, one, &window[from..]),
+                    _ => add(out, &window[from..]),
+                }
                 from += wide;
             }
             if 2 * wide > side {
@@ -250,6 +255,14 @@ widest! {
     fn add_two<S: Sum>(out: &mut [S], a: &[S], b: &[S]) {
         for ((out, a), b) in out.iter_mut().zip(a).zip(b) {
             *out = *a + *b;
+        }
+    }
+}
+
+widest! {
+    fn add_three<S: Sum>(out: &mut [S], a: &[S], b: &[S], c: &[S]) {
+        for (((out, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
+            *out = *a + (*b + *c);
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::Image;
 use crate::vision::middle::middle;
 use crate::vision::pixel::Pixel;
 use crate::vision::whole;
+use fearless_simd::{Level, dispatch};
 
 /// 1 / Φ⁻¹(3/4): the standard deviation of normal noise in units of its median absolute deviation.
 pub const SD_PER_MAD: f64 = 1.482_602_218_505_602;
@@ -108,10 +109,16 @@ impl BackgroundGrid {
 
     /// Writes the level `median + sign x max(k x deviation, min_contrast)` of row `y` into `level` (width entries).
     pub fn level_row(&self, y: usize, k: f32, min_contrast: f32, sign: f32, level: &mut Vec<f32>) {
-        level.clear();
         if self.median.is_empty() {
+            level.clear();
             return;
         }
+        level.resize(self.width, 0.0);
+        dispatch!(Level::new(), _simd => self.fill_row(y, (k, min_contrast, sign), level));
+    }
+
+    #[inline(always)]
+    fn fill_row(&self, y: usize, (k, min_contrast, sign): (f32, f32, f32), level: &mut [f32]) {
         let (y0, y1, fy) = between(y as f64, self.cell_px, self.ny);
         let fy = fy as f32;
         let node = |cx: usize| {
@@ -123,21 +130,23 @@ impl BackgroundGrid {
         };
         let half = (self.cell_px as f32 - 1.0) / 2.0;
         let per_px = 1.0 / self.cell_px as f32;
-        let first = node(0);
-        let lead = ((half.ceil()) as usize).min(self.width);
-        level.resize(lead, first);
-        let mut left = first;
+        let mut left = node(0);
+        let mut from = ((half.ceil()) as usize).min(self.width);
+        level[..from].fill(left);
         for cx in 1..self.nx {
             let right = node(cx);
             // Pixels between the centres of cells cx - 1 and cx.
             let start = (cx - 1) as f32 * self.cell_px as f32 + half;
             let slope = (right - left) * per_px;
-            let from = level.len();
-            let to = ((start + self.cell_px as f32).ceil() as usize).min(self.width);
-            level.extend((from..to).map(|x| left + (x as f32 - start) * slope));
-            left = right;
+            let to = ((start + self.cell_px as f32).ceil() as usize).clamp(from, self.width);
+            // Columns of an image are far fewer than i32 holds, and vectors turn i32 into f32.
+            let first = from as i32;
+            for (i, level) in (0..).zip(&mut level[from..to]) {
+                *level = left + ((first + i) as f32 - start) * slope;
+            }
+            (from, left) = (to, right);
         }
-        level.resize(self.width, left);
+        level[from..].fill(left);
     }
 }
 
@@ -198,10 +207,22 @@ fn smooth(values: &mut [f32], scratch: &mut Vec<f32>, nx: usize, ny: usize) {
                 let y = (cy + i / 3).saturating_sub(1).min(ny - 1);
                 *w = scratch[y * nx + x];
             }
-            window.sort_unstable_by(f32::total_cmp);
-            values[cy * nx + cx] = window[4];
+            values[cy * nx + cx] = middle_of_nine(window);
         }
     }
+}
+
+/// The middle one of nine: of three sorted threes that of the largest least, the middle middle and the least largest one.
+fn middle_of_nine(v: [f32; 9]) -> f32 {
+    let sorted = |[a, b, c]: [f32; 3]| {
+        let (low, high) = (a.min(b), a.max(b));
+        [low.min(c), low.max(high.min(c)), high.max(c)]
+    };
+    let [a, b, c] = [0, 3, 6].map(|i| sorted([v[i], v[i + 1], v[i + 2]]));
+    let least = a[0].max(b[0]).max(c[0]);
+    let [_, middle, _] = sorted([a[1], b[1], c[1]]);
+    let largest = a[2].min(b[2]).min(c[2]);
+    sorted([least, middle, largest])[1]
 }
 
 #[cfg(test)]
@@ -229,6 +250,17 @@ mod tests {
         assert!((median - 20.3).abs() < 0.05, "{median}");
         // 0.6² and the rounding's 1/12.
         assert!((deviation - 0.666).abs() < 0.05, "{deviation}");
+    }
+
+    #[test]
+    fn the_middle_of_nine_is_that_of_the_sorted_ones() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        for _ in 0..2000 {
+            let v: [f32; 9] = std::array::from_fn(|_| rng.random_range(-6..6) as f32);
+            let mut sorted = v;
+            sorted.sort_unstable_by(f32::total_cmp);
+            assert_eq!(middle_of_nine(v), sorted[4], "{v:?}");
+        }
     }
 
     #[test]
