@@ -15,7 +15,7 @@
 use super::apart::{Pieces, WIDE};
 use super::course::Course;
 use super::cover::Cover;
-use super::find_patch::{SEARCH, find, find_near};
+use super::find_patch::{SEARCH, find_near};
 use super::fine::{FOUND, FinePatches, LOST_PX, fine_factor};
 use super::fit::{AGREE, AGREE_EVEN, BEND, Expected, Match};
 use super::found::{Found, coarse};
@@ -27,7 +27,7 @@ use super::plane_cov::plane_cov;
 use super::reduce::{factor, reduce};
 use super::rest::{Rest, STILL, moves};
 use super::scales::{Scales, full_size, of_similarity, scaled, scaled_cov};
-use super::votes;
+use super::searches::Searches;
 use super::wide::Wide;
 use crate::{CameraMotion, Homography, Image, MotionBasis, MotionCov, Pixels};
 use nalgebra::Vector2;
@@ -94,6 +94,7 @@ pub struct CameraMotionEstimator {
     n_held: u32,
     /// What is left of the uncertainty of frames that were bridged.
     carried: MotionCov,
+    searches: Searches,
     matches: Vec<Match>,
     weights: Vec<f64>,
 }
@@ -236,10 +237,7 @@ impl CameraMotionEstimator {
         let last = if at_last { Homography::identity() } else { self.from_key };
         let key = if at_last { &self.last } else { &self.key };
         self.matches.clear();
-        for p in &key.patches {
-            let to = find(&key.image, &self.now, *p, &predicted.similarity_at(p.middle()));
-            self.matches.extend(to.map(|to| Match { from: p.middle(), to, weight: p.weight }));
-        }
+        self.searches.take(key, &self.now, predicted, &mut self.matches);
         let agree_px = if key.even { AGREE_EVEN } else { AGREE };
         let coarse = coarse(&mut self.matches, predicted, &last, &mut self.weights, &|predicted, last| Expected {
             predicted,
@@ -262,7 +260,7 @@ impl CameraMotionEstimator {
         let mut n_still = 0;
         let n_cells = CELLS.0 * CELLS.1;
         if (n_agree as f64) < CLEAR_COVER * n_cells as f64 {
-            n_still = votes::n_still(key, &self.now, [predicted, &start, &last], agree_px)?;
+            n_still = self.searches.n_still(key, &self.now, [predicted, &start, &last], agree_px)?;
         }
         let may_be_a_thing = !is_wide && 2 * n_still >= n_agree;
         let is_first = !self.known || !self.rest.moving;

@@ -28,41 +28,66 @@ const LAST_STEP: f64 = 0.003;
 pub(super) type Block = [[f32; PATCH]; PATCH];
 type Window = [[f32; WIDE]; TALL];
 
-/// Where the middle of a key frame's patch lies now; `predicted` takes the key frame's points to their places now.
-pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Vector2<f64>> {
-    let template = template(key, p, predicted)?;
-    let half = 0.5 * (PATCH - 1) as f64;
-    let corner = predicted.apply(p.middle()) - Vector2::new(half, half);
-    let (w, h) = (now.width() as i64, now.height() as i64);
-    // Far outside there is nothing to find, and no number too large for a whole one.
-    if !(corner.x.abs() < 2.0 * w as f64 && corner.y.abs() < 2.0 * h as f64) {
-        return None;
-    }
-    let around = (corner.x.round() as i64, corner.y.round() as i64);
-    let window = window(now, (around.0 - SEARCH, around.1 - SEARCH));
-    let mut costs = [[0.0; LANES]; SIDE];
-    differences(&template, &window, &mut costs);
-    let mut best = (f32::INFINITY, 0, 0);
-    for (i, line) in costs.iter().enumerate() {
-        for (j, &cost) in line[..SIDE].iter().enumerate() {
-            if cost < best.0 {
-                best = (cost, i, j);
+/// The sums of differences around the place where a patch is predicted.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search {
+    /// Column and row of the first one; none where nothing was looked for.
+    first: Option<(i64, i64)>,
+    costs: [[f32; LANES]; SIDE],
+    /// The least of them, and its row and column among them.
+    best: (f32, usize, usize),
+}
+
+impl Search {
+    /// Looks for a patch around its predicted place and returns what it should look like; `None`, and nothing looked for, where that needs pixels outside the key frame or lies far outside of the frame.
+    pub fn take(&mut self, key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Block> {
+        self.first = None;
+        let template = template(key, p, predicted)?;
+        let half = 0.5 * (PATCH - 1) as f64;
+        let corner = predicted.apply(p.middle()) - Vector2::new(half, half);
+        let (w, h) = (now.width() as f64, now.height() as f64);
+        // Far outside there is nothing to find, and no number too large for a whole one.
+        if !(corner.x.abs() < 2.0 * w && corner.y.abs() < 2.0 * h) {
+            return None;
+        }
+        let first = (corner.x.round() as i64 - SEARCH, corner.y.round() as i64 - SEARCH);
+        self.first = Some(first);
+        differences(&template, &window(now, first), &mut self.costs);
+        self.best = (f32::INFINITY, 0, 0);
+        for (i, line) in self.costs.iter().enumerate() {
+            for (j, &cost) in line[..SIDE].iter().enumerate() {
+                if cost < self.best.0 {
+                    self.best = (cost, i, j);
+                }
             }
         }
+        Some(template)
     }
-    let (cost, i, j) = best;
-    if !cost.is_finite() || i == 0 || j == 0 || i + 1 == SIDE || j + 1 == SIDE {
-        return None;
+
+    /// Where the middle of the patch lies that was looked for.
+    pub fn place(&self, template: &Block, now: &Image<f32>) -> Option<Vector2<f64>> {
+        let (first, costs, (cost, i, j)) = (self.first?, &self.costs, self.best);
+        if !cost.is_finite() || i == 0 || j == 0 || i + 1 == SIDE || j + 1 == SIDE {
+            return None;
+        }
+        let vertex = |before: f32, at: f32, after: f32| -> Option<f64> {
+            let bend = before - 2.0 * at + after;
+            (bend.is_finite() && bend > 0.0).then(|| f64::from(0.5 * (before - after) / bend).clamp(-0.5, 0.5))
+        };
+        let dx = vertex(costs[i][j - 1], cost, costs[i][j + 1])?;
+        let dy = vertex(costs[i - 1][j], cost, costs[i + 1][j])?;
+        let (x, y) = (first.0 + j as i64, first.1 + i as i64);
+        let part = refine(template, now, (x, y)).unwrap_or(Vector2::new(dx, dy));
+        let half = 0.5 * (PATCH - 1) as f64;
+        Some(Vector2::new(x as f64 + half, y as f64 + half) + part)
     }
-    let vertex = |before: f32, at: f32, after: f32| -> Option<f64> {
-        let bend = before - 2.0 * at + after;
-        (bend.is_finite() && bend > 0.0).then(|| f64::from(0.5 * (before - after) / bend).clamp(-0.5, 0.5))
-    };
-    let dx = vertex(costs[i][j - 1], cost, costs[i][j + 1])?;
-    let dy = vertex(costs[i - 1][j], cost, costs[i + 1][j])?;
-    let (x, y) = (around.0 + j as i64 - SEARCH, around.1 + i as i64 - SEARCH);
-    let part = refine(&template, now, (x, y)).unwrap_or(Vector2::new(dx, dy));
-    Some(Vector2::new(x as f64 + half, y as f64 + half) + part)
+}
+
+/// Where the middle of a key frame's patch lies now; `predicted` takes the key frame's points to their places now.
+pub(super) fn find(key: &Image<f32>, now: &Image<f32>, p: Patch, predicted: &Similarity) -> Option<Vector2<f64>> {
+    let mut search = Search::default();
+    let template = search.take(key, now, p, predicted)?;
+    search.place(&template, now)
 }
 
 /// What a patch says of a motion that it did not choose.
@@ -80,49 +105,39 @@ pub(super) enum Vote {
 /// deviates by 6 %, and the least of 441 lies three deviations below.
 const CLEARLY: f32 = 1.5;
 
-/// Whether a patch lies at `place`, where a motion has its middle, within `agree_px`; what seems to lie where it lay in the last frame, at `still`, votes neither for nor against it: a codec's copies and a
-/// sensor's pattern stand.
-pub(super) fn vote(
-    (key, now): (&Image<f32>, &Image<f32>),
-    p: Patch,
-    predicted: &Similarity,
-    [place, still]: [Vector2<f64>; 2],
-    agree_px: f64,
-) -> Vote {
-    let half = 0.5 * (PATCH - 1) as f64;
-    let corner = predicted.apply(p.middle()) - Vector2::new(half, half);
-    let (w, h) = (now.width() as f64, now.height() as f64);
-    let Some(template) = template(key, p, predicted) else { return Vote::Neither };
-    if !(corner.x.abs() < 2.0 * w && corner.y.abs() < 2.0 * h) {
-        return Vote::Neither;
-    }
-    let first = (corner.x.round() as i64 - SEARCH, corner.y.round() as i64 - SEARCH);
-    let mut costs = [[0.0; LANES]; SIDE];
-    differences(&template, &window(now, first), &mut costs);
-    let (mut best, mut own) = ((f32::INFINITY, Vector2::zeros()), f32::INFINITY);
-    for (i, line) in costs.iter().enumerate() {
-        for (j, &cost) in line[..SIDE].iter().enumerate() {
-            let at = Vector2::new((first.0 + j as i64) as f64 + half, (first.1 + i as i64) as f64 + half);
-            if cost < best.0 {
-                best = (cost, at);
-            }
-            if (at - place).amax() <= 1.5 {
-                own = own.min(cost);
+impl Search {
+    /// Whether a patch lies at `place`, where a motion has its middle, within `agree_px`; what seems to lie where it lay in the last frame, at `still`, votes neither for nor against it: a codec's copies and a
+    /// sensor's pattern stand.
+    pub fn vote(&self, [place, still]: [Vector2<f64>; 2], agree_px: f64) -> Vote {
+        let Some(first) = self.first else { return Vote::Neither };
+        let half = 0.5 * (PATCH - 1) as f64;
+        let at =
+            |i: usize, j: usize| Vector2::new((first.0 + j as i64) as f64 + half, (first.1 + i as i64) as f64 + half);
+        // Those within a pixel and a half, of rows and columns that begin below.
+        let begin = |place: f64, first: i64| (place - half - first as f64 - 2.0).clamp(0.0, SIDE as f64) as usize;
+        let (top, left) = (begin(place.y, first.1), begin(place.x, first.0));
+        let mut own = f32::INFINITY;
+        for (i, line) in self.costs.iter().enumerate().skip(top).take(5) {
+            for (j, cost) in line[..SIDE].iter().enumerate().skip(left).take(5) {
+                if (at(i, j) - place).amax() <= 1.5 {
+                    own = own.min(*cost);
+                }
             }
         }
-    }
-    // A whole place is right to half a pixel.
-    let is_near = |p: Vector2<f64>| (best.1 - p).amax() <= agree_px + 0.5;
-    if !(best.0.is_finite() && own.is_finite()) {
-        Vote::Neither
-    } else if is_near(still) && !is_near(place) {
-        Vote::Still
-    } else if is_near(place) {
-        Vote::For
-    } else if own > CLEARLY * best.0 {
-        Vote::Against
-    } else {
-        Vote::Neither
+        let (least, i, j) = self.best;
+        // A whole place is right to half a pixel.
+        let is_near = |p: Vector2<f64>| (at(i, j) - p).amax() <= agree_px + 0.5;
+        if !(least.is_finite() && own.is_finite()) {
+            Vote::Neither
+        } else if is_near(still) && !is_near(place) {
+            Vote::Still
+        } else if is_near(place) {
+            Vote::For
+        } else if own > CLEARLY * least {
+            Vote::Against
+        } else {
+            Vote::Neither
+        }
     }
 }
 

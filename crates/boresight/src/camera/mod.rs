@@ -24,8 +24,8 @@ mod reduce;
 mod register;
 mod rest;
 mod scales;
+mod searches;
 mod steady;
-mod votes;
 mod wide;
 mod wide_search;
 
