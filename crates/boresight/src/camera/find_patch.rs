@@ -188,14 +188,15 @@ widest! {
 #[inline(always)]
 pub(super) fn row_of_differences<'a, const N: usize>(
     template: &Block,
-    lines: impl Iterator<Item = &'a [f32]>,
+    mut lines: impl Iterator<Item = &'a [f32]>,
 ) -> [f32; N] {
     let mut row = [0.0f32; N];
-    for (line, pixels) in template.iter().zip(lines) {
-        for (c, t) in line.iter().enumerate() {
+    for line in template {
+        let Some(pixels) = lines.next() else { break };
+        for c in 0..PATCH {
             let Some(beside) = pixels[c..].first_chunk::<N>() else { continue };
-            for (sum, p) in row.iter_mut().zip(beside) {
-                *sum += (t - p).abs();
+            for i in 0..N {
+                row[i] += (line[c] - beside[i]).abs();
             }
         }
     }
@@ -250,11 +251,15 @@ fn between(image: &Image<f32>, p: Vector2<f64>) -> Option<f32> {
 /// The part of a pixel between the best whole place and the true one; `None` if it leads away from there.
 pub(super) fn refine(template: &Block, now: &Image<f32>, at: (i64, i64)) -> Option<Vector2<f64>> {
     let gradients = gradients(template);
-    let mut square = Matrix2::<f64>::zeros();
-    for (gx, gy) in gradients.0.iter().flatten().zip(gradients.1.iter().flatten()) {
-        let g = Vector2::new(f64::from(*gx), f64::from(*gy));
-        square += g * g.transpose();
+    let (gx, gy) = (gradients.0.as_flattened(), gradients.1.as_flattened());
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for i in 0..PATCH * PATCH {
+        let (gx, gy) = (f64::from(gx[i]), f64::from(gy[i]));
+        xx += gx * gx;
+        xy += gx * gy;
+        yy += gy * gy;
     }
+    let square = Matrix2::new(xx, xy, xy, yy);
     let factor = square.cholesky()?;
     let mut part = Vector2::<f64>::zeros();
     for _ in 0..STEPS {
@@ -286,15 +291,22 @@ widest! {
             line[0] = t[1] - t[0];
             line[PATCH - 1] = t[PATCH - 1] - t[PATCH - 2];
         }
-        for (r, line) in gy.iter_mut().enumerate() {
+        for r in 0..PATCH {
             let (up, down) = (r.saturating_sub(1), (r + 1).min(PATCH - 1));
-            for ((g, d), u) in line.iter_mut().zip(&template[down]).zip(&template[up]) {
-                *g = (d - u) / (down - up) as f32;
+            for c in 0..PATCH {
+                gy[r][c] = (template[down][c] - template[up][c]) / (down - up) as f32;
             }
         }
-        for g in [&mut gx, &mut gy] {
-            let mean: f32 = g.as_flattened().iter().map(|v| v / N).sum();
-            g.as_flattened_mut().iter_mut().for_each(|v| *v -= mean);
+        // Both side by side: each sum waits for itself only.
+        let (flat_x, flat_y) = (gx.as_flattened_mut(), gy.as_flattened_mut());
+        let (mut mean_x, mut mean_y) = (0.0f32, 0.0f32);
+        for i in 0..PATCH * PATCH {
+            mean_x += flat_x[i] / N;
+            mean_y += flat_y[i] / N;
+        }
+        for i in 0..PATCH * PATCH {
+            flat_x[i] -= mean_x;
+            flat_y[i] -= mean_y;
         }
         (gx, gy)
     }
@@ -313,9 +325,14 @@ fn pull(template: &Block, gradients: &Gradients, now: &Image<f32>, at: Vector2<f
     let part = [(at.x - x as f64) as f32, (at.y - y as f64) as f32];
     let [mut gx_e, mut gy_e] = [[[0.0; PATCH]; PATCH]; 2];
     weighted_errors(template, gradients, (now, x, y), part, (&mut gx_e, &mut gy_e));
-    // One after the other, whatever the vectors' width.
-    let sum = |products: &Block| products.as_flattened().iter().fold(0.0, |sum, v| sum + v);
-    Some(Vector2::new(sum(&gx_e), sum(&gy_e)))
+    // One after the other, whatever the vectors' width; both side by side.
+    let (gx_e, gy_e) = (gx_e.as_flattened(), gy_e.as_flattened());
+    let mut sum = [0.0f32; 2];
+    for i in 0..PATCH * PATCH {
+        sum[0] += gx_e[i];
+        sum[1] += gy_e[i];
+    }
+    Some(sum.into())
 }
 
 widest! {
