@@ -245,14 +245,20 @@ mod tests {
     #[test]
     fn a_damaged_sample_has_the_last_word_of_the_complete_decoder() {
         let dir = tempfile::tempdir().unwrap();
-        let sound = std::fs::read(clip("b_frames.mp4")).unwrap();
+        for path in [clip("b_frames.mp4"), without_order("b_frames.mp4", dir.path())] {
+            is_damaged_alike(&std::fs::read(path).unwrap(), dir.path());
+        }
+    }
+
+    /// Damages a file here and there; both decoders lose the same frames, and some are lost.
+    fn is_damaged_alike(sound: &[u8], dir: &Path) {
         let data = sound.windows(4).position(|w| w == b"mdat").unwrap() + 4;
         let end = sound.windows(4).position(|w| w == b"moov").unwrap();
         let mut lost = 0;
         for at in (data + 900..end - 64).step_by((end - data) / 12) {
-            let mut damaged = sound.clone();
+            let mut damaged = sound.to_vec();
             damaged[at..at + 24].fill(0x55);
-            let path = dir.path().join("damaged.mp4");
+            let path = dir.join("damaged.mp4");
             std::fs::write(&path, &damaged).unwrap();
             let [fast, complete] = [true, false].map(|may| frames(&path, Colour::Native, may).1);
             let numbers = |f: &[Frame]| f.iter().map(|f| f.index.0).collect::<Vec<_>>();
