@@ -8,7 +8,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 
-/// Numbers between the bounds from which on they are moved to numbers that are there, which takes three times as long as counting, and passes after which they are if there are more: of equal ones there always are.
+/// So many numbers between the bounds or fewer, and they are moved to numbers that are there, which takes longer than counting; and passes after which they are if there are more: of equal ones there always may be.
 const FEW: usize = 4;
 const MOST_COUNTED: usize = 12;
 
