@@ -68,28 +68,13 @@ impl Decoders {
     /// Decodes the sample of a step; `read` reads the sample of an earlier one again.
     pub fn decode(
         &mut self,
-        sample: (&[u8], &Sample, usize),
-        read: &mut ReadAgain<'_>,
-        out: &mut Vec<Picture>,
-    ) -> Result<(), Refusal> {
-        let refreshes = self.fast.refreshes(sample.0);
-        self.period += u32::from(refreshes);
-        let done = out.len();
-        let result = self.decode_either(sample, refreshes, read, out);
-        // Fields may come with a later sample: their decoder counts for itself.
-        if self.may_be_fast && !self.fast.unfit {
-            out[done..].iter_mut().for_each(|p| p.period = self.period);
-        }
-        result
-    }
-
-    fn decode_either(
-        &mut self,
         (data, sample, step): (&[u8], &Sample, usize),
-        refreshes: bool,
         read: &mut ReadAgain<'_>,
         out: &mut Vec<Picture>,
     ) -> Result<(), Refusal> {
+        let refreshes = self.fast.refreshes(data);
+        self.period += u32::from(refreshes);
+        let at = (step, self.period);
         let ask_fast = self.may_be_fast && self.refusals < MAX_REFUSALS && !self.fast.unfit;
         if ask_fast && (self.is_new || refreshes) {
             if self.since.is_none() {
@@ -99,9 +84,9 @@ impl Decoders {
         }
         self.is_new = false;
         let Some(since) = self.since else {
-            return self.complete.decode(data, sample.description, step, out);
+            return self.complete.decode(data, sample.description, at, out);
         };
-        if self.fast.decode(data, sample.description, step, out).is_ok() {
+        if self.fast.decode(data, sample.description, at, out).is_ok() {
             return Ok(());
         }
         self.refusals += 1;
@@ -116,10 +101,10 @@ impl Decoders {
                 self.complete.configure(sample.description)?;
                 self.complete.feed(self.fast.sets())?;
             }
-            self.complete.decode(&earlier, sample.description, k, &mut again)?;
+            self.complete.decode(&earlier, sample.description, (k, self.period), &mut again)?;
             again.clear();
         }
-        self.complete.decode(data, sample.description, step, out)
+        self.complete.decode(data, sample.description, at, out)
     }
 
     /// Ends the stream: gives the picture still held.

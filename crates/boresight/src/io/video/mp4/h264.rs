@@ -34,8 +34,7 @@ pub(super) struct AccessUnits {
     max_pixels: u64,
     /// The newest parameter set.
     pub info: Option<SpsInfo>,
-    period: u32,
-    /// Interlaced: step whose picture the decoder is still holding.
+    /// Interlaced: step and period whose picture the decoder is still holding.
     held: Option<(usize, u32)>,
 }
 
@@ -48,7 +47,6 @@ impl AccessUnits {
             length_size: 4,
             max_pixels,
             info: None,
-            period: 0,
             held: None,
         }
     }
@@ -94,13 +92,18 @@ impl AccessUnits {
 }
 
 impl PictureDecoder for AccessUnits {
-    fn decode(&mut self, data: &[u8], description: u16, step: usize, out: &mut Vec<Picture>) -> Result<(), Refusal> {
+    fn decode(
+        &mut self,
+        data: &[u8],
+        description: u16,
+        at: (usize, u32),
+        out: &mut Vec<Picture>,
+    ) -> Result<(), Refusal> {
         self.configure(description)?;
         if parts(data, self.length_size).is_none() {
             return Err(Refusal::Damaged("the lengths of its parts do not add up".into()));
         }
         let nals = guarded(|| Ok::<_, Refusal>(parse_avcc(data, self.length_size)))?;
-        let mut sliced = false;
         for nal in &nals {
             match nal.nal_unit_type {
                 NalUnitType::Sps | NalUnitType::Pps => self.feed_parameters(nal)?,
@@ -110,11 +113,7 @@ impl PictureDecoder for AccessUnits {
                     }
                     let done = guarded(|| self.decoder.decode_nal(nal).map_err(Refusal::from))?;
                     self.hand_out(done, out);
-                    if nal.nal_unit_type == NalUnitType::SliceIdr && !sliced {
-                        self.period += 1;
-                    }
-                    sliced = true;
-                    self.held.get_or_insert((step, self.period));
+                    self.held.get_or_insert(at);
                 }
                 NalUnitType::SliceDataA | NalUnitType::SliceDataB | NalUnitType::SliceDataC => {
                     return Err(Refusal::Unsupported("data partitioning".into()));
@@ -146,7 +145,6 @@ impl PictureDecoder for AccessUnits {
         self.decoder = Decoder::new();
         self.active = None;
         self.held = None;
-        self.period += 1;
     }
 }
 

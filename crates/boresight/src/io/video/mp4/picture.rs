@@ -38,12 +38,12 @@ pub(super) struct Picture {
 
 /// Makes pictures of the samples of one track, in decoding order.
 pub(super) trait PictureDecoder {
-    /// Decodes one sample; gives the pictures that are whole now (none or one, more never for sound data).
+    /// Decodes one sample of a step and a period; gives the pictures that are whole now (none or one, more never for sound data).
     fn decode(
         &mut self,
         data: &[u8],
         description: u16,
-        step: usize,
+        at: (usize, u32),
         out: &mut Vec<Picture>,
     ) -> std::result::Result<(), Refusal>;
     /// Ends the stream: gives the picture still held.

@@ -46,11 +46,12 @@ pub(super) struct Progressive {
 
 impl Progressive {
     pub fn new(configurations: Vec<Vec<u8>>, max_pixels: u64) -> Self {
+        let length_size = configurations.first().and_then(|c| avc_c(c)).map_or(4, |(size, _)| size);
         Self {
             decoder: Decoder::new(),
             configurations,
             active: None,
-            length_size: 4,
+            length_size,
             max_pixels,
             sets: Vec::new(),
             info: None,
@@ -114,7 +115,13 @@ impl Progressive {
 }
 
 impl PictureDecoder for Progressive {
-    fn decode(&mut self, data: &[u8], description: u16, step: usize, out: &mut Vec<Picture>) -> Result<(), Refusal> {
+    fn decode(
+        &mut self,
+        data: &[u8],
+        description: u16,
+        (step, period): (usize, u32),
+        out: &mut Vec<Picture>,
+    ) -> Result<(), Refusal> {
         let changes = self.active.is_some_and(|a| a != description);
         self.configure(description)?;
         let parts =
@@ -158,7 +165,7 @@ impl PictureDecoder for Progressive {
             bits: 8,
             order_count: self.decoder.last_poc(),
             step,
-            period: 0,
+            period,
         });
         Ok(())
     }

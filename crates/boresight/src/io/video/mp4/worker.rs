@@ -189,10 +189,8 @@ impl Worker {
         for picture in pictures.drain(..) {
             let Some(rank) = self.ranks.get(picture.step).copied().flatten() else { continue };
             let (period, count) = (picture.period, picture.order_count);
-            // Where counts order them it is not known yet which one this is.
-            let may_be_wanted = !reorder.is_by_rank() || is_wanted(&self.wanted, rank);
-            let decoded = may_be_wanted.then(|| Decoded { picture, info: self.units.info() });
-            reorder.push(period, count, rank, decoded, due);
+            let decoded = Decoded { picture, info: self.units.info() };
+            reorder.push(period, count, rank, Some(decoded), due);
         }
     }
 
