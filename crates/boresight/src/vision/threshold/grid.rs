@@ -8,6 +8,7 @@
 use crate::Image;
 use crate::vision::middle::middle;
 use crate::vision::pixel::Pixel;
+use crate::vision::spatial::{SpatialConfig, SpatialFilter, WindowConfig};
 use crate::vision::whole;
 use fearless_simd::{Level, dispatch};
 
@@ -20,7 +21,7 @@ const SAMPLE_BUDGET: usize = 1 << 17;
 const MIN_SAMPLES_PER_CELL: usize = 64;
 
 /// Median and deviation of the local background.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct BackgroundGrid {
     cell_px: usize,
     /// Least distance of two samples of a row or column, px.
@@ -29,10 +30,11 @@ pub struct BackgroundGrid {
     height: usize,
     nx: usize,
     ny: usize,
-    /// Median and deviation of each cell, counts, row by row.
-    median: Vec<f32>,
-    deviation: Vec<f32>,
-    scratch: Vec<f32>,
+    /// Median and deviation of each cell, counts, as measured and smoothed.
+    measured: [Image<f32>; 2],
+    median: Image<f32>,
+    deviation: Image<f32>,
+    smoother: SpatialFilter<f32>,
     samples: Vec<f32>,
 }
 
@@ -48,7 +50,20 @@ impl BackgroundGrid {
         let cell_px = cell_px.max(1);
         let fewest = (MIN_SAMPLES_PER_CELL as f64).sqrt() as usize;
         let least_step = smooth_px.div_ceil(2).min(cell_px / fewest).max(1);
-        Self { cell_px, least_step, ..Default::default() }
+        let of_nine = SpatialConfig::Median(WindowConfig::default());
+        Self {
+            cell_px,
+            least_step,
+            width: 0,
+            height: 0,
+            nx: 0,
+            ny: 0,
+            measured: Default::default(),
+            median: Image::default(),
+            deviation: Image::default(),
+            smoother: SpatialFilter::new(of_nine).expect("the default window is one"),
+            samples: Vec::new(),
+        }
     }
 
     /// Measures the background of a frame.
@@ -57,10 +72,9 @@ impl BackgroundGrid {
         self.nx = self.width.div_ceil(self.cell_px);
         self.ny = self.height.div_ceil(self.cell_px);
         let n = self.nx * self.ny;
-        self.median.clear();
-        self.median.resize(n, 0.0);
-        self.deviation.clear();
-        self.deviation.resize(n, 0.0);
+        for image in self.measured.iter_mut().chain([&mut self.median, &mut self.deviation]) {
+            image.reset(self.nx, self.ny, 0.0);
+        }
         if n == 0 {
             return;
         }
@@ -83,23 +97,25 @@ impl BackgroundGrid {
                     self.samples.retain(|v| v.is_finite());
                 }
                 let (median, deviation) = median_and_deviation(&mut self.samples, T::STEP);
-                self.median[cy * self.nx + cx] = median;
-                self.deviation[cy * self.nx + cx] = deviation;
+                self.measured[0].row_mut(cy)[cx] = median;
+                self.measured[1].row_mut(cy)[cx] = deviation;
             }
         }
-        smooth(&mut self.median, &mut self.scratch, self.nx, self.ny);
-        smooth(&mut self.deviation, &mut self.scratch, self.nx, self.ny);
+        // A 3 x 3 median over the cells, those of the edge repeated.
+        let [median, deviation] = &self.measured;
+        self.smoother.apply(median, &mut self.median);
+        self.smoother.apply(deviation, &mut self.deviation);
     }
 
     /// The local median and robust standard deviation at a position, counts.
     pub fn at(&self, x: f64, y: f64) -> (f64, f64) {
-        if self.median.is_empty() {
+        if self.median.as_slice().is_empty() {
             return (0.0, 0.0);
         }
         let (x0, x1, fx) = between(x, self.cell_px, self.nx);
         let (y0, y1, fy) = between(y, self.cell_px, self.ny);
-        let read = |v: &[f32]| {
-            let at = |x: usize, y: usize| f64::from(v[y * self.nx + x]);
+        let read = |v: &Image<f32>| {
+            let at = |x: usize, y: usize| f64::from(v.row(y)[x]);
             let top = at(x0, y0) + (at(x1, y0) - at(x0, y0)) * fx;
             let bottom = at(x0, y1) + (at(x1, y1) - at(x0, y1)) * fx;
             top + (bottom - top) * fy
@@ -109,7 +125,7 @@ impl BackgroundGrid {
 
     /// Writes the level `median + sign x max(k x deviation, min_contrast)` of row `y` into `level` (width entries).
     pub fn level_row(&self, y: usize, k: f32, min_contrast: f32, sign: f32, level: &mut Vec<f32>) {
-        if self.median.is_empty() {
+        if self.median.as_slice().is_empty() {
             level.clear();
             return;
         }
@@ -122,8 +138,8 @@ impl BackgroundGrid {
         let (y0, y1, fy) = between(y as f64, self.cell_px, self.ny);
         let fy = fy as f32;
         let node = |cx: usize| {
-            let mix = |v: &[f32]| {
-                let (a, b) = (v[y0 * self.nx + cx], v[y1 * self.nx + cx]);
+            let mix = |v: &Image<f32>| {
+                let (a, b) = (v.row(y0)[cx], v.row(y1)[cx]);
                 a + (b - a) * fy
             };
             mix(&self.median) + sign * (k * mix(&self.deviation)).max(min_contrast)
@@ -195,36 +211,6 @@ pub fn median_and_deviation(values: &mut [f32], step: f32) -> (f32, f32) {
     (median, (deviation * deviation - 1.0 / 12.0).max(1.0 / 12.0).sqrt())
 }
 
-/// 3 x 3 median over the cells, edge cells repeated.
-fn smooth(values: &mut [f32], scratch: &mut Vec<f32>, nx: usize, ny: usize) {
-    scratch.clear();
-    scratch.extend_from_slice(values);
-    for cy in 0..ny {
-        for cx in 0..nx {
-            let mut window = [0.0f32; 9];
-            for (i, w) in window.iter_mut().enumerate() {
-                let x = (cx + i % 3).saturating_sub(1).min(nx - 1);
-                let y = (cy + i / 3).saturating_sub(1).min(ny - 1);
-                *w = scratch[y * nx + x];
-            }
-            values[cy * nx + cx] = middle_of_nine(window);
-        }
-    }
-}
-
-/// The middle one of nine: of three sorted threes that of the largest least, the middle middle and the least largest one.
-fn middle_of_nine(v: [f32; 9]) -> f32 {
-    let sorted = |[a, b, c]: [f32; 3]| {
-        let (low, high) = (a.min(b), a.max(b));
-        [low.min(c), low.max(high.min(c)), high.max(c)]
-    };
-    let [a, b, c] = [0, 3, 6].map(|i| sorted([v[i], v[i + 1], v[i + 2]]));
-    let least = a[0].max(b[0]).max(c[0]);
-    let [_, middle, _] = sorted([a[1], b[1], c[1]]);
-    let largest = a[2].min(b[2]).min(c[2]);
-    sorted([least, middle, largest])[1]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,17 +236,6 @@ mod tests {
         assert!((median - 20.3).abs() < 0.05, "{median}");
         // 0.6² and the rounding's 1/12.
         assert!((deviation - 0.666).abs() < 0.05, "{deviation}");
-    }
-
-    #[test]
-    fn the_middle_of_nine_is_that_of_the_sorted_ones() {
-        let mut rng = ChaCha8Rng::seed_from_u64(9);
-        for _ in 0..2000 {
-            let v: [f32; 9] = std::array::from_fn(|_| rng.random_range(-6..6) as f32);
-            let mut sorted = v;
-            sorted.sort_unstable_by(f32::total_cmp);
-            assert_eq!(middle_of_nine(v), sorted[4], "{v:?}");
-        }
     }
 
     #[test]
@@ -306,7 +281,7 @@ mod tests {
         let boxed = Image::from_vec(side, side, (0..side * side).map(boxed).collect()).unwrap();
         let variance_of_medians = |mut grid: BackgroundGrid| {
             grid.refresh(&boxed);
-            grid.median.iter().map(|m| f64::from(*m).powi(2)).sum::<f64>()
+            grid.median.as_slice().iter().map(|m| f64::from(*m).powi(2)).sum::<f64>()
         };
         // The cells' medians of both are smoothed alike. 0.81 of the information by the correlations of the box; 400 cells of which the smoothing leaves some 80 that differ tell the ratio to 10 %.
         let ratio = variance_of_medians(BackgroundGrid::new(cell))
