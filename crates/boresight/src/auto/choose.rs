@@ -30,8 +30,10 @@ pub struct Choice {
     pub reasons: Vec<String>,
     /// What is taken in its place if the first pass bears that out better ([`super::contest`]).
     pub(super) runner_up: Option<Box<Choice>>,
-    /// What is taken in its place if the first pass says that the camera stands ([`super::if_fixed`]).
+    /// What is taken in its place if the first pass says that the camera stands, or that more moves ([`super::if_fixed`]).
     pub(super) if_fixed: Option<Box<Choice>>,
+    /// Whether the camera was seen to stand, and that candidate is of what isolated blobs explain.
+    pub(super) stands: bool,
     /// Gain of what was seen to move, nats: 0 where nothing surely does, infinite where what is seen is told by something else ([`super::later_looks`]).
     pub(super) gain: f64,
 }
@@ -39,7 +41,7 @@ pub struct Choice {
 impl Choice {
     /// A choice that nothing stands against.
     pub(super) fn alone(config: Config, reasons: Vec<String>) -> Self {
-        Self { config, reasons, runner_up: None, if_fixed: None, gain: f64::INFINITY }
+        Self { config, reasons, runner_up: None, if_fixed: None, stands: false, gain: f64::INFINITY }
     }
 
     /// Whether anything was seen.
@@ -89,7 +91,8 @@ pub(super) fn choose_seen(
     choose_looked(frames, &looked_again(scene, second, info)?, second, info, base, request)
 }
 
-/// What moves before a fixed camera as the frames are, or in one light where that hides it, or brought to one place where it shakes; and the share of it that isolated blobs explain.
+/// What moves before a fixed camera as the frames are, or in one light where that hides it, or brought to one place where it shakes; and the share of it that isolated blobs explain. Where they explain
+/// too much of it both times, that of the frames as they are.
 fn moving_in_any_light<'s>(
     frames: &[&Frame],
     scene: &'s Scene,
@@ -103,12 +106,16 @@ fn moving_in_any_light<'s>(
     if scene.camera != Camera::Fixed {
         return Ok(None);
     }
+    let mut found = None;
     for scene in std::iter::once(scene).chain(scene.in_one_light.as_deref()) {
         if let Some(explained) = moving::look(frames, scene, info, n_threads)? {
-            return Ok(Some((scene, explained)));
+            if moving::is_evident(scene, explained, info) {
+                return Ok(Some((scene, explained)));
+            }
+            found = found.or(Some((scene, explained)));
         }
     }
-    Ok(None)
+    Ok(found)
 }
 
 /// What the frames of the second look show as a whole, if there are any, on the ground of the first ones.
@@ -162,12 +169,26 @@ pub(super) fn choose_looked(
     // Who asks for grey gets grey.
     let mut counted = None;
     let coloured = base.input.colour != Colour::Gray;
+    let reference =
+        (coloured && request.detector.is_none()).then(|| colour::look(&second.coloured, scene, info)).flatten();
+    let moving = match request.detector {
+        None if reference.is_none() => moving_in_any_light(looked, scene, second.shaken.as_ref(), info, n_threads)?,
+        _ => None,
+    };
+    // Drawn into one view, what a shaking camera shows of small things is lost.
+    let steady = second.shaken.is_none();
+    let by_blobs = moving.filter(|(scene, explained)| steady && !moving::is_evident(scene, *explained, info));
+    let if_fixed = by_blobs.map_or(if_fixed, |(scene, explained)| {
+        let (mut config, mut reasons) = (config.clone(), reasons.clone());
+        moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
+        Some((config, reasons))
+    });
     if let Some(kind) = request.detector {
         asked::configure(kind, frames, second, scene, interval_s, info, n_threads, &mut config, &mut reasons)?;
-    } else if let Some(reference) = coloured.then(|| colour::look(&second.coloured, scene, info)).flatten() {
+    } else if let Some(reference) = reference {
         colour::configure(&reference, tempo, info, &mut config, &mut reasons);
     } else if let Some((scene, explained)) =
-        moving_in_any_light(looked, scene, second.shaken.as_ref(), info, n_threads)?
+        moving.filter(|(scene, explained)| moving::is_evident(scene, *explained, info))
     {
         moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     } else if let Some(seen) = particles::look(frames, scene, info, n_threads, &mut counted)? {
@@ -230,7 +251,8 @@ pub(super) fn choose_looked(
         }
     }
     let if_fixed = if_fixed.map(|(config, reasons)| Box::new(Choice::alone(config, reasons)));
-    let mut choice = Choice { config, reasons, runner_up, if_fixed, gain };
+    let stands = by_blobs.is_some();
+    let mut choice = Choice { config, reasons, runner_up, if_fixed, stands, gain };
     choice.change(|c| {
         let hidden_s = round(tempo.stretched(ReidentificationConfig::default().max_gap_s));
         c.config.tracker.reidentification = ReidentificationConfig { max_gap_s: hidden_s };

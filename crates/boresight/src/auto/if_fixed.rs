@@ -1,15 +1,26 @@
-//! What moves if the camera stands, where it is not known to stand: a candidate that is held against the choice by what both find in the first pass.
+//! What moves if the camera stands, where that is not known, or where isolated blobs explain it: a candidate that is held against the choice by what both find in the first pass.
 //!
 //! Source: our own. A camera that drifts by a pixel a second, or light that changes while a car fills a third of the view, leaves the question open whether the camera stands, and what is chosen
 //! without an answer may be the road's texture. The background itself tells: where the ground goes by, most of the frame differs from it, and [`super::moving`] refuses; where little does, both
 //! are run, and the candidate is taken if its chains go with none of the choice's and gain more, a scan, than all of these. Where the choice follows the camera in most scans, nothing is open.
-//! Limits: those of [`super::chains`]; what both see is the choice's.
+//!
+//! Where the camera is seen to stand and isolated blobs explain most of what moves in the few frames looked at, the choice is what finds blobs: it sees those that stand as well. But blobs that come near
+//! to each other are not isolated, and are missed while they do: if the chains of all that moves hold surely more detections in the first pass than those of the blobs, and hold most of what is
+//! detected, and no chain of the blobs goes without one of them, the candidate is taken.
+//! Limits: those of [`super::chains`]; what both see is the choice's where it is not known whether the camera stands.
 
+use super::chains::Chain;
 use super::evidence::{Evidence, LEAST_EXPLAINED};
 use super::moving;
 use super::scene::{Camera, Scene};
 use crate::tempo::Tempo;
+use crate::vision::threshold::ThresholdConfig;
 use crate::{Config, Frame, MotionBasis, Result, Scan, SourceInfo};
+
+/// Deviations by which numbers of detections are surely different.
+const STDS: f64 = 3.0;
+/// Share of what the candidate detects that must be of chains that move: more than what is not.
+const MOST_OF_IT: f64 = 0.5;
 
 /// The candidate's configuration and reasons, from those so far, if little but things that move differs from the background; `frames` are those looked at.
 /// # Errors
@@ -25,7 +36,8 @@ pub fn look(
     if scene.camera == Camera::Fixed {
         return Ok(None);
     }
-    let Some(explained) = moving::look(frames, scene, info, n_threads)? else { return Ok(None) };
+    let explained = moving::look(frames, scene, info, n_threads)?.filter(|e| moving::is_evident(scene, *e, info));
+    let Some(explained) = explained else { return Ok(None) };
     moving::configure(scene, explained, tempo, info, &mut config, &mut reasons);
     Ok(Some((config, reasons)))
 }
@@ -49,6 +61,27 @@ pub fn wins(own: &[Scan], candidate: &[Scan], area_px2: f64) -> Option<String> {
             fixed.times_s.len(),
             a_scan[0],
             a_scan[1],
+        )
+    })
+}
+
+/// Whether a detector finds blobs by how they stand out from their surroundings, and misses those near to each other.
+pub fn finds_blobs(threshold: &ThresholdConfig) -> bool {
+    matches!(threshold, ThresholdConfig::Isolated(_) | ThresholdConfig::Cfar(_))
+}
+
+/// Why the candidate is taken before a camera that stands: its chains that surely move hold surely more detections than those of the choice and most of what it detects, and none of those of the
+/// choice goes without one of its.
+pub fn finds_more(own: &[Scan], candidate: &[Scan], area_px2: f64) -> Option<String> {
+    let [blobs, all] = [own, candidate].map(|scans| Evidence::of_scans(scans, area_px2));
+    let [n_blobs, n_all] = [&blobs, &all].map(|e| e.sure().map(|c| c.hits.len()).sum::<usize>());
+    let are_more = n_all as f64 > n_blobs as f64 + STDS * ((n_all + n_blobs) as f64).sqrt();
+    let is_lost = |c: &Chain| !all.moving.iter().any(|m| c.goes_with(m));
+    (are_more && all.explained(candidate) > MOST_OF_IT && !blobs.sure().any(is_lost)).then(|| {
+        format!(
+            "In {} frames what surely moves before the fixed camera is in {n_all} detections of what differs from the background, and in {n_blobs} of isolated blobs: blobs that come near to each other \
+             are not isolated. So what moves is detected.",
+            all.times_s.len(),
         )
     })
 }
@@ -90,5 +123,31 @@ mod tests {
         let followed = |s: Scan| s.with_camera_motion(Some(CameraMotion::exact_shift(Vector2::zeros())));
         let followed: Vec<Scan> = road.into_iter().map(followed).collect();
         assert!(is_followed(&followed) && !is_followed(&car));
+    }
+
+    /// The scans without what is farther along than some px in some of them: blobs that are missed while others are near.
+    fn missed(scans: &[Scan], is_missed: impl Fn(usize) -> bool) -> Vec<Scan> {
+        let mut scans = scans.to_vec();
+        for (_, scan) in scans.iter_mut().enumerate().filter(|(k, _)| is_missed(*k)) {
+            scan.detections.truncate(2);
+        }
+        scans
+    }
+
+    #[test]
+    fn all_that_moves_is_taken_where_surely_more_of_it_is_found_and_nothing_is_lost() {
+        let things = scans(0, 0.0, 5);
+        let some = missed(&things, |k| (10..30).contains(&k));
+        assert!(finds_more(&some, &things, 9e4).is_some_and(|r| r.contains("200 detections") && r.contains("140 of")));
+        assert_eq!(finds_more(&things, &things, 9e4), None, "as much");
+        assert_eq!(finds_more(&missed(&things, |k| k == 20), &things, 9e4), None, "three more are not surely more");
+        let among_clutter: Vec<Scan> = scans(60, 0.0, 5);
+        assert_eq!(finds_more(&some, &among_clutter, 9e4), None, "most of what is found stands");
+        let mut other = some.clone();
+        for (k, scan) in other.iter_mut().enumerate() {
+            let at = Vector2::new(280.0, 290.0 - 5.0 * k as f64);
+            scan.detections.push(Detection::at(at, Matrix2::identity() * 0.01));
+        }
+        assert_eq!(finds_more(&other, &things, 9e4), None, "one blob is not found");
     }
 }

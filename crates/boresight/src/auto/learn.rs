@@ -13,7 +13,7 @@ use super::first_scans::PROBE_FRAMES;
 use super::noise::Motions;
 use super::request::Request;
 use super::{
-    contest, decoys, if_fixed, initiation_score, lag, lasting, later_looks, moving, noise, pieces, speed,
+    coast, contest, decoys, if_fixed, initiation_score, lag, lasting, later_looks, moving, noise, pieces, speed,
     spot_threshold,
 };
 use crate::camera::{CameraConfig, CameraPath};
@@ -98,7 +98,9 @@ fn stands<E>(choice: &mut Choice, set: impl FnMut(&mut Choice) -> Result<(), E>)
 
 /// Takes the candidate of a fixed camera if there is one and the first passes of both say so; else the choice's own first pass, which has begun, if it was asked for.
 fn with_fixed(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Result<Option<(FirstPass, AtOnce)>> {
-    let Some(fixed) = choice.if_fixed.take().filter(|f| f.config.detector != choice.config.detector) else {
+    let own = &choice.config.detector;
+    let is_asked = !choice.stands || if_fixed::finds_blobs(&own.threshold);
+    let Some(fixed) = choice.if_fixed.take().filter(|f| is_asked && f.config.detector != *own) else {
         return Ok(None);
     };
     let mut begin = |config: &Config| -> Result<(FirstPass, AtOnce)> {
@@ -107,11 +109,12 @@ fn with_fixed(frames: &mut Replay, choice: &mut Choice, request: &Request) -> Re
         Ok((pass, at_once))
     };
     let mut own = begin(&choice.config)?;
-    if !if_fixed::is_followed(own.0.scans()) {
+    if choice.stands || !if_fixed::is_followed(own.0.scans()) {
         let mut candidate = begin(&fixed.config)?;
         let info = frames.info();
         let area_px2 = (info.width * info.height) as f64;
-        if let Some(reason) = if_fixed::wins(own.0.scans(), candidate.0.scans(), area_px2) {
+        let wins = if choice.stands { if_fixed::finds_more } else { if_fixed::wins };
+        if let Some(reason) = wins(own.0.scans(), candidate.0.scans(), area_px2) {
             *choice = *fixed;
             choice.reasons.push(reason);
             return Ok(None);
@@ -359,6 +362,9 @@ fn statistics(
     if !of_points && pieces::are_pieces(scans, area_px2) {
         if false_tracks_per_hour.is_some() {
             choice.reasons.push(RATE_WITHOUT_EFFECT.to_string());
+        }
+        if matches!(choice.config.detector.threshold, ThresholdConfig::Moving(_)) {
+            coast::learn(scans, &mut choice.config, &mut choice.reasons);
         }
         return Ok(None);
     }

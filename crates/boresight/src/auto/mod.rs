@@ -10,6 +10,7 @@ mod carried;
 mod cells;
 mod chains;
 mod choose;
+mod coast;
 mod colour;
 mod contest;
 mod decoys;

@@ -44,14 +44,19 @@ const NOW_AND_THEN: f64 = 0.05;
 /// Fewer frames than this show no background.
 const LEAST_FRAMES: usize = 12;
 
-/// Whether what moves, if the camera stands, is what should be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
+/// Whether what moves, if the camera stands, is long and new enough to be tracked: then the share of it that isolated blobs explain; `frames` are those looked at.
 /// # Errors
 /// Frames of more than one size or pixel type.
 pub fn look(frames: &[&Frame], scene: &Scene, info: &SourceInfo, n_threads: usize) -> Result<Option<f64>> {
     if !fits(scene, info) {
         return Ok(None);
     }
-    Ok(Some(scene.explained(frames, info, n_threads)?).filter(|e| *e <= MOST_EXPLAINED))
+    scene.explained(frames, info, n_threads).map(Some)
+}
+
+/// Whether what moves, of which blobs explain that share, is evidently what should be tracked.
+pub fn is_evident(scene: &Scene, explained: f64, info: &SourceInfo) -> bool {
+    explained <= MOST_EXPLAINED && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64
 }
 
 /// Whether it is open that such things move: a few large ones are seen, but not as they should be, or before a camera that is not seen to stand.
@@ -66,12 +71,11 @@ fn are_large(scene: &Scene, info: &SourceInfo) -> bool {
         && side >= LEAST_SIDE * info.width.max(info.height) as f64
 }
 
-/// Whether what moves, if the camera stands, is large, lasting and new enough.
+/// Whether what moves, if the camera stands, is long, lasting and new enough.
 fn fits(scene: &Scene, info: &SourceInfo) -> bool {
     are_large(scene, info)
         && scene.size_px[0] <= MOST_SHARE[0] * info.width as f64
         && scene.size_px[1] <= MOST_SHARE[1] * info.height as f64
-        && scene.area_px >= LEAST_AREA * (info.width * info.height) as f64
         && scene.novelty >= LEAST_NOVELTY
         && scene.regions <= MOST_REGIONS
         && scene.share <= 0.35
@@ -108,11 +112,23 @@ pub fn configure(
         scene.regions,
         100.0 * explained
     ));
+    if scene.has_dark_things() {
+        reasons.push(format!(
+            "{:.0} % of what moves is darker than the ground by a factor, as shadows are; but a shadow has a thing that casts it, and there is less besides than could: so the things are dark, and \
+             nothing is taken for shadow.",
+            100.0 * scene.shadow
+        ));
+    }
     let least = least_area(scene.area_px);
     // Measured on vtest.avi: dark clothes are darker than 0.6 of the ground, shadows are not.
     let background = BackgroundConfig {
         threshold_sd: 6.0,
-        shadow: Some(ShadowConfig { darkest: 0.6, spread: 0.15, ..ShadowConfig::default() }),
+        shadow: ShadowConfig {
+            enabled: !scene.has_dark_things(),
+            darkest: 0.6,
+            spread: 0.15,
+            ..ShadowConfig::default()
+        },
         ..BackgroundConfig::default()
     };
     config.detector = DetectorConfig {

@@ -39,6 +39,9 @@ const BLOB_SCORE: f64 = 6.0;
 /// A camera that came no farther than this share of the frame's width stands still, or nods about its place: half of the least side of what moves
 /// ([`super::moving`]), so that its own motion makes no such thing.
 const STILL_SHARE: f64 = 0.01;
+/// Most of what moves that may be shadow. A shadow has a thing that casts it: with the sun 18° above the ground it is three times as long as the thing is high. Where more of what moves is darker than
+/// the ground by a factor, that is what things do which are themselves dark: animals on bright ground.
+const MOST_SHADOW: f64 = 0.75;
 /// Least difference from the background that counts as moving in 8-bit frames, counts: above what codecs leave.
 const MIN_COUNTS: f32 = 12.0;
 
@@ -74,6 +77,8 @@ pub struct Scene {
     /// Ground that moves in any frame, as a share of what moves in all frames together: 1 for things that go on, little for leaves
     /// and water, which stay in their places.
     pub novelty: f64,
+    /// Share of what moves that is darker than the background by a factor that hardly changes nearby, as a shadow is.
+    pub shadow: f64,
     /// The regions of each frame.
     moved: Vec<Vec<Moved>>,
     /// Where the first frame's ground lies in each frame, px; none before a fixed camera.
@@ -154,8 +159,30 @@ pub(super) fn what_moves(
     step: usize,
 ) -> Result<Scene> {
     let mut scene = Scene { n_frames: grids.len(), ..Scene::default() };
-    let mut moved = Vec::with_capacity(grids.len());
+    let mut moved = moved_in(&mut background, grids, step)?;
+    scene.shadow = moved.shadow;
+    if scene.has_dark_things() {
+        background.drop_shadows();
+        moved = moved_in(&mut background, grids, step)?;
+    }
+    scene.novelty = moved.novelty;
+    measure(&mut scene, &moved.regions, info);
+    scene.moved = moved.regions;
+    Ok(scene)
+}
+
+/// The regions that move in each grid, px of the frame, and two numbers of a [`Scene`].
+struct MovedIn {
+    regions: Vec<Vec<Moved>>,
+    novelty: f64,
+    shadow: f64,
+}
+
+/// What moves in grids of every `step`-th pixel before their background, without what is shadow.
+fn moved_in(background: &mut Background<f32>, grids: &[Image<f32>], step: usize) -> Result<MovedIn> {
+    let mut regions = Vec::with_capacity(grids.len());
     let (mut ever, mut all) = (BitImage::new(grids[0].width(), grids[0].height()), 0);
+    let mut shadow_and_not = [0usize; 2];
     // Parts of one thing lie near each other.
     let join = ClusterConfig { distance_px: 4.0, min_area_px: Some(MIN_AREA), ..ClusterConfig::default() };
     let mut clusters = Clusterer::new(&join);
@@ -164,6 +191,7 @@ pub(super) fn what_moves(
         background.update(g, 0.0)?;
         clusters.begin(g.width());
         all += background.moving().count();
+        shadow_and_not.iter_mut().zip(background.shadow_and_not()).for_each(|(sum, n)| *sum += n);
         for y in 0..g.height() {
             ever.row_mut(y).iter_mut().zip(background.row(y)).for_each(|(e, b)| *e |= b);
             clusters.row(y, background.row(y), g.row(y));
@@ -176,12 +204,11 @@ pub(super) fn what_moves(
             bottom: f64::from(r.bottom + 1) * scale,
             area: f64::from(r.area) * scale * scale,
         });
-        moved.push(found.collect::<Vec<_>>());
+        regions.push(found.collect::<Vec<_>>());
     }
-    scene.novelty = ever.count() as f64 / all.max(1) as f64;
-    measure(&mut scene, &moved, info);
-    scene.moved = moved;
-    Ok(scene)
+    let [shadow, not] = shadow_and_not.map(|n| n as f64);
+    let novelty = ever.count() as f64 / all.max(1) as f64;
+    Ok(MovedIn { regions, novelty, shadow: shadow / (shadow + not).max(1.0) })
 }
 
 /// Whether edges are seen and stand: strong ones would show the smallest shift.
@@ -325,6 +352,11 @@ fn measure(scene: &mut Scene, moved: &[Vec<Moved>], info: &SourceInfo) {
 }
 
 impl Scene {
+    /// Whether so much of what moves is as a shadow that it is things' own darkness: none of it is taken for shadow then.
+    pub fn has_dark_things(&self) -> bool {
+        self.shadow > MOST_SHADOW
+    }
+
     /// The share of the moving regions in which an isolated blob of a fourth of their box or more has its middle; `frames` are those looked at.
     /// # Errors
     /// Frames of more than one size or pixel type.

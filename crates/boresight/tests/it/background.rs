@@ -1,7 +1,7 @@
 //! How the background of a fixed camera behaves: targets, light, shadows, standing and departed targets, shake, odd input.
 
 use boresight::Image;
-use boresight::vision::background::{Background, BackgroundConfig, BackgroundPixel};
+use boresight::vision::background::{Background, BackgroundConfig, BackgroundPixel, ShadowConfig};
 
 /// Textured ground 40..160 with noise of about a count, seen in a light.
 fn ground(w: usize, h: usize, t: usize, gain: f32, offset: f32) -> Image<f32> {
@@ -74,7 +74,11 @@ fn a_sudden_change_of_the_whole_light_moves_nothing() {
         b.update(&as_type(&ground(150, 60, 200 + t, 1.25, 10.0)), 0.05).unwrap();
         assert!(b.moving().count() < 9, "{} at {t}", b.moving().count());
     }
-    let blind = BackgroundConfig { follow_light: false, shadow: None, ..BackgroundConfig::default() };
+    let blind = BackgroundConfig {
+        follow_light: false,
+        shadow: ShadowConfig { enabled: false, ..ShadowConfig::default() },
+        ..BackgroundConfig::default()
+    };
     let mut b = learned::<u8>(blind);
     b.update(&as_type(&ground(150, 60, 200, 1.25, 10.0)), 0.05).unwrap();
     assert!(b.moving().count() > 8000, "the test's light must be a change");
@@ -94,7 +98,10 @@ fn a_shadow_is_ground_and_a_dark_target_is_not() {
     b.update(&scene(5.0), 0.05).unwrap();
     let n = b.moving().count();
     assert!((130..=150).contains(&n), "{n}: the target's 144 px alone");
-    let mut b = learned::<u8>(BackgroundConfig { shadow: None, ..BackgroundConfig::default() });
+    let mut b = learned::<u8>(BackgroundConfig {
+        shadow: ShadowConfig { enabled: false, ..ShadowConfig::default() },
+        ..BackgroundConfig::default()
+    });
     b.update(&scene(5.0), 0.05).unwrap();
     assert!(b.moving().count() > 400, "without shadows the 300 px of shadow move too");
 }
@@ -127,7 +134,11 @@ fn a_standing_target_stays_for_its_time_and_a_departed_one_fades() {
 #[test]
 fn a_shake_of_one_pixel_moves_little_if_allowed() {
     let shaken = |shake: bool| {
-        let mut b = learned::<u8>(BackgroundConfig { shake, shadow: None, ..BackgroundConfig::default() });
+        let mut b = learned::<u8>(BackgroundConfig {
+            shake,
+            shadow: ShadowConfig { enabled: false, ..ShadowConfig::default() },
+            ..BackgroundConfig::default()
+        });
         let f = ground(151, 60, 400, 1.0, 0.0);
         let mut moved = Image::filled(150, 60, 0.0);
         for y in 0..60 {

@@ -102,3 +102,48 @@ fn what_moves_before_a_fixed_camera_is_told_in_a_light_that_falls_by_half() {
     }
     assert_ne!(look(&frames(0.5, 2), &info).unwrap().camera, Camera::Fixed, "the ground goes by");
 }
+
+/// What is seen of 30 frames of 200 x 150 px in which things of 100 x 0.6 counts and 24 x 12 px cross a ground of 100 counts, each with a caster of so many px of 30 counts at its upper side.
+fn darkened(caster_rows: usize) -> Scene {
+    use crate::{FrameIndex, Timestamp};
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+    let frame = |k: usize| {
+        let mut image = Image::filled(200, 150, 0u8);
+        for y in 0..150 {
+            for (x, p) in image.row_mut(y).iter_mut().enumerate() {
+                let inside = (10 + 5 * k..34 + 5 * k).contains(&x);
+                let value = match y {
+                    60..72 if inside => 60.0,
+                    y if inside && (60 - caster_rows..60).contains(&y) => 30.0,
+                    _ => 100.0,
+                };
+                *p = (value + 3.0 * rng.random::<f32>()) as u8;
+            }
+        }
+        let time = Timestamp::from_secs_f64(0.04 * k as f64);
+        Frame { index: FrameIndex(k as u64), time, pixels: Pixels::Gray8(image) }
+    };
+    let frames: Vec<Frame> = (0..30).map(frame).collect();
+    let info = SourceInfo {
+        label: String::new(),
+        reader: String::new(),
+        width: 200,
+        height: 150,
+        kind: PixelKind::Gray8,
+        n_frames: None,
+        rate_hz: None,
+        true_times: true,
+    };
+    look(&frames, &info).unwrap()
+}
+
+#[test]
+fn what_is_darker_by_a_factor_is_shadow_where_something_casts_it_and_else_a_dark_thing() {
+    let (cast, alone) = (darkened(12), darkened(0));
+    let height_px = |s: &Scene| s.size_px[1];
+    assert!(!cast.has_dark_things() && (0.3..0.6).contains(&cast.shadow), "{}", cast.shadow);
+    assert!((10.0..14.0).contains(&height_px(&cast)), "the caster alone: {}", height_px(&cast));
+    assert!(alone.has_dark_things() && alone.n_moving == 30, "{} {}", alone.shadow, alone.n_moving);
+    assert!((10.0..14.0).contains(&height_px(&alone)), "{}", height_px(&alone));
+}

@@ -30,9 +30,8 @@ pub struct BackgroundConfig {
     pub follow_light: bool,
     /// Whether a pixel may fit the background of one of its 8 neighbours: forgives a shake of 1 px, costs edges.
     pub shake: bool,
-    /// What is taken for shadow; absent: nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shadow: Option<ShadowConfig>,
+    /// What is taken for shadow.
+    pub shadow: ShadowConfig,
     /// How the moving pixels are cleaned.
     pub clean_up: CleanUp,
 }
@@ -48,7 +47,7 @@ impl Default for BackgroundConfig {
             start_s: 3.0,
             follow_light: true,
             shake: false,
-            shadow: Some(ShadowConfig::default()),
+            shadow: ShadowConfig::default(),
             clean_up: CleanUp::Majority,
         }
     }
@@ -83,14 +82,13 @@ impl BackgroundConfig {
         if !(self.start_s >= 0.0 && self.start_s.is_finite()) {
             return wrong("start-s", self.start_s, "a time of 0 s or more", "3 s sees passing targets pass");
         }
-        if let Some(s) = &self.shadow {
-            if !(s.darkest > 0.0 && s.darkest < s.lightest && s.lightest <= 1.0) {
-                let hint = "0.5 to 0.97 fits sunlit ground";
-                return wrong("shadow.darkest", s.darkest.into(), "0 < darkest < lightest <= 1", hint);
-            }
-            if !(s.spread > 0.0 && s.spread.is_finite()) {
-                return wrong("shadow.spread", s.spread.into(), "a ratio above 0", "0.2 forgives 20 % of texture");
-            }
+        let s = &self.shadow;
+        if !(s.darkest > 0.0 && s.darkest < s.lightest && s.lightest <= 1.0) {
+            let hint = "0.5 to 0.97 fits sunlit ground";
+            return wrong("shadow.darkest", s.darkest.into(), "0 < darkest < lightest <= 1", hint);
+        }
+        if !(s.spread > 0.0 && s.spread.is_finite()) {
+            return wrong("shadow.spread", s.spread.into(), "a ratio above 0", "0.2 forgives 20 % of texture");
         }
         Ok(())
     }

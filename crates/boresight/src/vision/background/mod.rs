@@ -71,6 +71,8 @@ pub struct Background<T: BackgroundPixel> {
     light: Light,
     grid: Grid,
     states: Vec<u8>,
+    /// Pixels of the last frame that were taken for shadow.
+    n_shadow: usize,
     bits: BitImage,
     /// The bits before cleaning, which the update goes by.
     raw: BitImage,
@@ -97,6 +99,7 @@ impl<T: BackgroundPixel> Background<T> {
             light: light::SAME,
             grid: Grid::default(),
             states: Vec::new(),
+            n_shadow: 0,
             bits: BitImage::default(),
             raw: BitImage::default(),
             work: BitImage::default(),
@@ -145,7 +148,7 @@ impl<T: BackgroundPixel> Background<T> {
     fn learn_median(&mut self, frames: &[&Image<T>], reach: usize) {
         start::learn(frames, reach, &mut self.mean, &mut self.deviation);
         self.n_averaged = u64::MAX;
-        self.typical = self.typical_deviation();
+        self.typical = start::typical::<T>(&self.deviation, &mut self.deviations);
     }
 
     /// Takes the next frame, `dt_s` seconds after the last (any number for the first): finds the moving pixels and learns.
@@ -167,6 +170,7 @@ impl<T: BackgroundPixel> Background<T> {
             self.now_s += dt_s;
         }
         self.raw.reset(w, h);
+        self.n_shadow = 0;
         if self.is_starting() {
             self.sample(frame);
         }
@@ -194,6 +198,16 @@ impl<T: BackgroundPixel> Background<T> {
     /// The moving pixels of the last frame.
     pub fn moving(&self) -> &BitImage {
         &self.bits
+    }
+
+    /// Pixels of the last frame that moved and were taken for shadow, and those that were not, before cleaning.
+    pub(crate) fn shadow_and_not(&self) -> [usize; 2] {
+        [self.n_shadow, self.raw.count()]
+    }
+
+    /// Takes nothing for shadow from now on.
+    pub(crate) fn drop_shadows(&mut self) {
+        self.config.shadow.enabled = false;
     }
 
     /// Whether the model still learns everything, so that what moves is not told apart yet.
@@ -251,17 +265,6 @@ impl<T: BackgroundPixel> Background<T> {
         }
     }
 
-    /// Median of the deviations on the grid, counts.
-    fn typical_deviation(&mut self) -> f32 {
-        let all = &mut self.deviations;
-        all.clear();
-        for y in (0..self.mean.height()).step_by(GRID_PX) {
-            all.extend(self.deviation.row(y).iter().step_by(GRID_PX).map(|&d| T::counts(d)));
-        }
-        let middle = all.len() / 2;
-        if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
-    }
-
     /// Finds the moving pixels, into `raw`.
     fn look(&mut self, frame: &Image<T>) -> T::Terms {
         let (w, h) = (frame.width(), frame.height());
@@ -295,7 +298,7 @@ impl<T: BackgroundPixel> Background<T> {
 
     /// Clears the bits of row `y` that are shadow or shake.
     fn doubt(&mut self, frame: &Image<T>, y: usize, terms: &T::Terms) {
-        if self.config.shadow.is_none() && !self.config.shake {
+        if !self.config.shadow.enabled && !self.config.shake {
             return;
         }
         let h = frame.height();
@@ -313,15 +316,14 @@ impl<T: BackgroundPixel> Background<T> {
                 let shaken = self.config.shake
                     && (x.saturating_sub(1)..=(x + 1).min(last))
                         .any(|nx| (0..3).any(|k| !rows[1][x].moves(means[k][nx], deviations[k][nx], terms)));
-                let shadow = || {
-                    self.config.shadow.as_ref().is_some_and(|c| {
-                        let d = T::counts(deviations[1][x]).max(self.typical);
-                        shadow::is_shadow(c, rows, means, x, light, d)
-                    })
+                let shadow = !shaken && self.config.shadow.enabled && {
+                    let d = T::counts(deviations[1][x]).max(self.typical);
+                    shadow::is_shadow(&self.config.shadow, rows, means, x, light, d)
                 };
-                if shaken || shadow() {
+                if shaken || shadow {
                     *word &= !(1 << (x % 64));
                 }
+                self.n_shadow += usize::from(shadow);
             }
         }
     }
@@ -357,7 +359,7 @@ impl<T: BackgroundPixel> Background<T> {
         }
         // The typical deviation moves slowly: once in a while is enough.
         if starting || self.n_frames.is_multiple_of(16) {
-            self.typical = self.typical_deviation();
+            self.typical = start::typical::<T>(&self.deviation, &mut self.deviations);
         }
     }
 

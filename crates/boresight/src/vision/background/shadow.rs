@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ShadowConfig {
+    /// Whether anything is; not where the targets themselves are dark and even, as animals on bright ground are.
+    pub enabled: bool,
     /// Smallest ratio to the background, in (0, 1). Lower takes deeper shadows, and more dark targets, for shadow.
     pub darkest: f32,
     /// Largest ratio, in (`darkest`, 1].
@@ -24,7 +26,7 @@ pub struct ShadowConfig {
 
 impl Default for ShadowConfig {
     fn default() -> Self {
-        Self { darkest: 0.5, lightest: 0.97, spread: 0.2 }
+        Self { enabled: true, darkest: 0.5, lightest: 0.97, spread: 0.2 }
     }
 }
 

@@ -6,6 +6,7 @@
 //! Limits: what covers a pixel in half of the frames is its background.
 
 use super::super::ranks::{LANES, Lanes, block};
+use super::GRID_PX;
 use super::model::BackgroundPixel;
 use crate::Image;
 
@@ -45,6 +46,16 @@ pub(super) fn learn<T: BackgroundPixel>(
             *deviation = T::level(sum / n);
         }
     }
+}
+
+/// Median of the deviations on the grid, counts; keeps its memory in `all`.
+pub(super) fn typical<T: BackgroundPixel>(deviation: &Image<T::Level>, all: &mut Vec<f32>) -> f32 {
+    all.clear();
+    for y in (0..deviation.height()).step_by(GRID_PX) {
+        all.extend(deviation.row(y).iter().step_by(GRID_PX).map(|&d| T::counts(d)));
+    }
+    let middle = all.len() / 2;
+    if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 /// Adds to each column what is finite in the columns within `reach` of a row, and how many these are.
