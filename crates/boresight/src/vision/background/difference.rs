@@ -5,8 +5,9 @@
 //! T is `threshold-sd` times the noise of a difference, 1.4826 * the median of |f(t) - f(t-1)| on a grid, which targets
 //! hardly move, and never below `min-difference`.
 
+use super::light::GRID_PX;
 use super::morphology::{self, BitImage, CleanUp};
-use super::{GRID_PX, pack, size_changed};
+use super::{pack, size_changed};
 use crate::vision::spatial::SpatialPixel;
 use crate::{Error, ErrorKind, Image, Result};
 use fearless_simd::{Level, dispatch};

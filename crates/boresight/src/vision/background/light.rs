@@ -9,6 +9,9 @@ use super::model::BackgroundPixel;
 use crate::Image;
 use crate::vision::middle::upper_middle;
 
+/// The grid on which the light is estimated takes one pixel in 8 both ways.
+pub(super) const GRID_PX: usize = 8;
+
 /// Light of a frame against the model: v = gain * m + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Light {

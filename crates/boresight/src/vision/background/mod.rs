@@ -36,7 +36,7 @@ pub use shadow::ShadowConfig;
 
 use crate::{Error, ErrorKind, Image, Result};
 use fearless_simd::{Level, dispatch};
-use light::{Grid, Light};
+use light::{GRID_PX, Grid, Light};
 use model::{Coefficients, GHOST, MOVING, Rates, STILL};
 use rows::{adapt, judge};
 
@@ -48,8 +48,6 @@ const MOST_FRAMES: u64 = 32;
 const START_SAMPLES: usize = 11;
 /// Pixels on either side over which the noise from so few is averaged: 25 make 30 % of error 6 %.
 const NOISE_REACH: usize = 2;
-/// The grid on which the light is estimated takes one pixel in 8 both ways.
-const GRID_PX: usize = 8;
 
 /// The background of a fixed camera and the pixels that move before it.
 #[derive(Clone, Debug)]

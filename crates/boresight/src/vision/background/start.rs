@@ -6,7 +6,7 @@
 //! Limits: what covers a pixel in half of the frames is its background.
 
 use super::super::ranks::{LANES, Lanes, block};
-use super::GRID_PX;
+use super::light::GRID_PX;
 use super::model::BackgroundPixel;
 use crate::Image;
 
