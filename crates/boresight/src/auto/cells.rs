@@ -44,6 +44,10 @@ const LEAST_CELL_PX: f64 = 60.0;
 /// Largest exponent of the profile of spots: a Gaussian's is 2; nuclei have 4 and more, discs of 12 px with soft edges, after the mean, some 2.8.
 const MOST_EXPONENT: f64 = 2.3;
 
+/// Neck at which cells that touch are cut apart, share of the narrower one's width. Of what is cut out in four public sequences (Fluo-N2DH-GOWT1, Fluo-N2DL-HeLa, Fluo-N3DH-CHO in one plane and as
+/// its brightest) 6 of 614 single cells have a narrower one, and 30 of 36 pieces of several.
+const NECK: f64 = 0.7;
+
 /// Least height of a cell's pixels above the ground, steps of their values.
 const LEAST_STEPS: f64 = 2.5;
 
@@ -92,6 +96,12 @@ fn detector(polarity: Polarity, info: &SourceInfo, min_area_px: u32, step: f64) 
     config.cluster.min_area_px = Some(min_area_px);
     config.camera = CameraConfig::Fixed;
     config
+}
+
+/// The detector that cuts cells apart which touch; pieces of what is no cell are not, or they would come to look like cells.
+fn cut_apart(mut detector: DetectorConfig) -> DetectorConfig {
+    detector.cluster.neck = Some(NECK);
+    detector
 }
 
 /// Whether a piece fills its box as an ellipse does and is not much longer than wide.
@@ -214,7 +224,7 @@ pub fn chains(
     info: &SourceInfo,
     n_threads: usize,
 ) -> Result<Evidence> {
-    let detector = detector(Polarity::Bright, info, least_area(cells), cells.step);
+    let detector = cut_apart(detector(Polarity::Bright, info, least_area(cells), cells.step));
     let scans = looks::scans(&detector, places.iter().map(|&k| &frames[k]), info, n_threads)?;
     Ok(Evidence::of_looks(&scans, places, ground, info))
 }
@@ -230,10 +240,11 @@ pub fn configure(cells: &Cells, info: &SourceInfo, interval_s: f64, config: &mut
     let least = least_area(cells);
     reasons.push(format!(
         "Some {:.0} bright compact pieces a frame on an even dark ground, about {side:.0} px across: cells. So what lies 5 robust deviations above the \
-         smoothed frame's median is detected, in pieces of {least} px or more.",
-        cells.per_frame
+         smoothed frame's median is detected, in pieces of {least} px or more; those that touch are cut apart at a neck of less than {:.0} % of their width.",
+        cells.per_frame,
+        100.0 * NECK
     ));
-    config.detector = detector(Polarity::Bright, info, least, cells.step);
+    config.detector = cut_apart(detector(Polarity::Bright, info, least, cells.step));
     let tracker = &mut config.tracker;
     *tracker = stretch::tracker(Tempo::of(interval_s));
     tracker.extra_noise_px = round((0.03 * side).max(0.5));

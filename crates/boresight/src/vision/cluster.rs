@@ -10,7 +10,7 @@
 use super::config::ClusterConfig;
 use super::pixel::Pixel;
 use super::region::Region;
-use super::runs::{RowRuns, RunWord, find_runs};
+use super::runs::{Mask, RowRuns, RunWord, find_runs};
 use super::threshold::{band_bits, words};
 use crate::Image;
 use crate::union_find::root;
@@ -26,6 +26,8 @@ pub struct Clusterer {
     /// Runs of the last rows; row y lies in slot y % len.
     rows: Vec<RowRuns>,
     regions: Vec<Region>,
+    /// All rows of bits, where regions are to be cut.
+    mask: Option<Mask>,
 }
 
 /// The furthest linked column distance of each row offset 0.. that has one.
@@ -53,12 +55,17 @@ impl Clusterer {
         let reach = reaches(config.distance_px, config.inclusive);
         let single = reach.first().is_none_or(|&r| r == 0);
         let n = reach.len().max(1);
-        Self { reach, single, rows: vec![RowRuns::default(); n], regions: Vec::new() }
+        let mask = config.neck.map(|_| Mask::default());
+        Self { reach, single, rows: vec![RowRuns::default(); n], regions: Vec::new(), mask }
     }
 
     /// Starts a frame of `width` columns; what was kept of the last frame is dropped, its memory stays.
     pub fn begin(&mut self, width: usize) {
         self.regions.clear();
+        if let Some(mask) = &mut self.mask {
+            mask.words.clear();
+            mask.stride = words(width);
+        }
         let n = width.div_ceil(2) + 8;
         for row in &mut self.rows {
             row.n = 0;
@@ -75,6 +82,9 @@ impl Clusterer {
     /// Bits past the pixels of the row must be 0.
     pub fn row<T: Pixel>(&mut self, y: usize, bits: &[u64], pixels: &[T]) {
         let n = self.rows.len();
+        if let Some(mask) = &mut self.mask {
+            mask.words.extend(bits.iter().copied().chain(std::iter::repeat(0)).take(mask.stride));
+        }
         // Most rows of most frames are empty.
         if bits.iter().fold(0, |all, w| all | w) == 0 {
             self.rows[y % n].n = 0;
@@ -193,6 +203,11 @@ impl Clusterer {
         head[first].absorb(&tail[0]);
         tail[0].parent = first as u32;
         first as u32
+    }
+
+    /// The set pixels of the frame whose rows were all given, where regions are to be cut.
+    pub(super) fn mask(&self) -> Option<&Mask> {
+        self.mask.as_ref()
     }
 
     /// The regions of the frame whose rows were all given, in raster order of their first pixel.

@@ -12,6 +12,7 @@ use crate::camera::CameraConfig;
 use crate::validate::wrong;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::SQRT_2;
 
 /// How frames become detections.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,15 +60,32 @@ pub struct ClusterConfig {
     /// Width and height of the target, px, from which absent area limits follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_size_px: Option<[f64; 2]>,
+    /// Things that touch are cut apart where the neck between them is narrower than this share of the narrower one's width, in (0, 1]; a thing that is cut off holds a disc of the smallest area kept.
+    /// Larger also cuts what only narrows. For clusters of 8 neighbours. Absent: clusters stay whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub neck: Option<f64>,
 }
 
 impl Default for ClusterConfig {
     fn default() -> Self {
-        Self { distance_px: 2.0, inclusive: false, min_area_px: None, max_area_px: None, target_size_px: None }
+        Self {
+            distance_px: 2.0,
+            inclusive: false,
+            min_area_px: None,
+            max_area_px: None,
+            target_size_px: None,
+            neck: None,
+        }
     }
 }
 
 impl ClusterConfig {
+    /// Whether a pixel is joined to its 8 neighbours and to no other.
+    fn joins_eight(&self) -> bool {
+        let joins = |d: f64| d < self.distance_px || (self.inclusive && d == self.distance_px);
+        joins(SQRT_2) && !joins(2.0)
+    }
+
     /// Returns the smallest and largest area kept, px.
     pub fn area_limits(&self) -> (u32, u32) {
         let area = self.target_size_px.map(|[w, h]| w * h);
@@ -186,6 +204,7 @@ impl DetectorConfig {
         let joining = [
             ("detector.cluster.distance-px", joined.distance_px != as_usual.distance_px),
             ("detector.cluster.inclusive", joined.inclusive != as_usual.inclusive),
+            ("detector.cluster.neck", joined.neck.is_some()),
         ];
         let areas = [
             ("detector.cluster.min-area-px", joined.min_area_px.is_some()),
@@ -244,6 +263,22 @@ impl ClusterConfig {
                 "a width and a height of at least 1 px",
                 "[9, 9] for a target of 9 x 9 pixels",
             ));
+        }
+        if let Some(neck) = self.neck {
+            if !(neck > 0.0 && neck <= 1.0) {
+                let expected = "a share above 0 and at most 1";
+                return Err(wrong(
+                    at,
+                    "neck",
+                    neck,
+                    expected,
+                    "0.5 cuts at necks of half the width; leave it out to cut nothing",
+                ));
+            }
+            if !self.joins_eight() {
+                let expected = "a distance that joins the 8 neighbours of a pixel and no more, where clusters are cut at their necks";
+                return Err(wrong(at, "distance-px", self.distance_px, expected, "2, or leave out neck"));
+            }
         }
         let (min, max) = self.area_limits();
         if min > max || max == 0 {
@@ -343,6 +378,21 @@ mod tests {
         let config = ClusterConfig { target_size_px: Some([9.0, 9.0]), ..Default::default() };
         assert_eq!(config.area_limits(), (29, 129));
         assert_eq!(ClusterConfig::default().area_limits(), (1, u32::MAX));
+    }
+
+    #[test]
+    fn a_neck_is_a_share_and_asks_for_clusters_of_eight_neighbours() {
+        let check = |neck, distance_px, inclusive| {
+            let config = ClusterConfig { neck: Some(neck), distance_px, inclusive, ..Default::default() };
+            config.validate("cluster").map_err(|e| e.to_string())
+        };
+        assert!(check(0.7, 2.0, false).is_ok() && check(1.0, 1.5, true).is_ok());
+        for neck in [0.0, 1.1, f64::NAN] {
+            assert!(check(neck, 2.0, false).unwrap_err().contains("cluster.neck"));
+        }
+        for (distance_px, inclusive) in [(2.0, true), (1.4, false), (7.0, false)] {
+            assert!(check(0.7, distance_px, inclusive).unwrap_err().contains("cluster.distance-px"));
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use super::centroid::{Surroundings, centroid};
 use super::config::{CentroidMethod, DetectorConfig, Weight};
 use super::cut_off;
+use super::necks::Cutter;
 use super::pixel::Pixel;
 use super::region::Region;
 use super::segmenter::{PixelWeight, Regions, Segmenter};
@@ -20,6 +21,7 @@ pub(super) struct RegionFinder<T: Pixel> {
     regions: Regions,
     ground: BackgroundGrid,
     noise: PixelNoise,
+    cutter: Option<Cutter>,
 }
 
 impl<T: Pixel> RegionFinder<T> {
@@ -29,6 +31,7 @@ impl<T: Pixel> RegionFinder<T> {
             segmenter: Box::new(segmenter),
             regions: Regions::new(&config.cluster),
             noise: PixelNoise::default(),
+            cutter: Cutter::new(&config.cluster),
         }
     }
 }
@@ -72,7 +75,11 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
         let first = out.len();
         let (min, max) = config.cluster.area_limits();
         for (clusters, dark) in [(&self.regions.bright, false), (&self.regions.dark, true)] {
-            for region in clusters.regions().filter(|r| (min..=max).contains(&r.area)) {
+            let all = clusters.regions().filter(|r| r.area >= min);
+            let mut add = |region: &Region| {
+                if !(min..=max).contains(&region.area) {
+                    return;
+                }
                 let n = f64::from(region.area);
                 let local = knows_ground.then(|| self.ground.at(region.x / n, region.y / n));
                 let ground = local.map(|(median, _)| median);
@@ -88,6 +95,13 @@ impl<T: Pixel> TargetFinder<T> for RegionFinder<T> {
                     ground,
                 };
                 out.push(detection(region, image, method, &around, dark));
+            };
+            match (&mut self.cutter, clusters.mask()) {
+                (Some(cutter), Some(mask)) => all.for_each(|r| match cutter.cut(r, mask, image) {
+                    [] => add(r),
+                    parts => parts.iter().for_each(&mut add),
+                }),
+                _ => all.for_each(add),
             }
         }
         cut_off::add(&mut out[first..], (image.width(), image.height()));

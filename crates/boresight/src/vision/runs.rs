@@ -2,6 +2,22 @@
 //!
 //! Source: our own. [`find_runs`] writes both lists without a branch for each bit. Bit `x % 64` of word `x / 64` is column `x`.
 
+/// Rows of bits of a frame, one after the other.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mask {
+    pub(super) words: Vec<u64>,
+    /// Words of a row.
+    pub(super) stride: usize,
+}
+
+impl Mask {
+    /// Whether the pixel is set; none is outside.
+    pub(super) fn is_set(&self, x: u32, y: u32) -> bool {
+        let word = self.words.get(y as usize * self.stride + x as usize / 64);
+        word.is_some_and(|w| w >> (x % 64) & 1 == 1)
+    }
+}
+
 /// The runs of one row, from the left: first and last column, and the region of each.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RowRuns {

@@ -319,6 +319,39 @@ fn every_centroid_weight_filter_and_distance_takes_every_frame() {
         };
         check(&config, &format!("d_p {distance_px}"));
     }
+    let config = DetectorConfig {
+        cluster: ClusterConfig { neck: Some(0.7), min_area_px: Some(3), ..Default::default() },
+        ..Default::default()
+    };
+    check(&config, "cut at necks");
+}
+
+#[test]
+fn things_that_touch_are_two_detections_where_they_are_cut_at_their_neck() {
+    // Two discs of radius 15 whose middles lie 28 px apart: half the neck is √(15² - 14²) = 5.4 px.
+    let set = |i: usize| (i % 80, i / 80);
+    let is_disc = |i: usize, x: f64| (set(i).0 as f64 - x).hypot(set(i).1 as f64 - 30.0) <= 15.0;
+    let pixels = (0..80 * 60).map(|i| if is_disc(i, 26.0) || is_disc(i, 54.0) { 100u8 } else { 20 }).collect();
+    let image = Image::from_vec(80, 60, pixels).unwrap();
+    let frame = Frame { index: FrameIndex(0), time: Timestamp::default(), pixels: Pixels::Gray8(image) };
+    let found = |neck: Option<f64>| {
+        let config = DetectorConfig {
+            threshold: ThresholdConfig::Otsu(OtsuConfig { side: Side::Bright }),
+            cluster: ClusterConfig { neck, ..Default::default() },
+            ..Default::default()
+        };
+        let mut scan = Scan::default();
+        build(&config, &source(80, 60, PixelKind::Gray8)).unwrap().detect(&frame, &mut scan).unwrap();
+        scan.detections.iter().map(|d| (d.position.x, d.position.y, d.area_px)).collect::<Vec<_>>()
+    };
+    let [whole] = found(None)[..] else { panic!("they touch") };
+    let [left, right] = found(Some(0.5))[..] else { panic!("they are two") };
+    assert!((whole.0 - 40.0).abs() < 1e-9 && whole.2 == left.2 + right.2);
+    for ((x, y, area), at) in [(left, 26.0), (right, 54.0)] {
+        // The cut takes off what lies beyond the middle, 1 % of a disc, and the pixels on the middle are one disc's.
+        assert!((x - at).abs() < 0.3 && (y - 30.0).abs() < 0.01 && (690..=715).contains(&area), "{x} {y} {area}");
+    }
+    assert_eq!(found(Some(0.3)).len(), 1, "0.36 is not narrower than 0.3");
 }
 
 #[test]
