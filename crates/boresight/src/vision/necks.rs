@@ -5,7 +5,7 @@
 //! narrower part. They stay apart if the neck is narrower than a given share of that part, and if the disc within it is as large as a region must be; else they are one.
 //! Symbols: distances d from pixel centre to the nearest pixel centre of the ground; two equal discs whose neck is half as wide as they are lie 1.73 radii apart.
 //! Departures: holes belong to the thing around them (a nucleus has dark places), and what lies beyond the frame is no ground.
-//! Limits: of one shape, not of its light; a thing that is itself narrow in the middle (before it divides) is cut at the same neck. A cut is straight only as pixels are. A region of more than 4094 px a side stays whole. No allocation once warm.
+//! Limits: of one shape, not of its light; a thing that is itself narrow in the middle (before it divides) is cut at the same neck. A cut is straight only as pixels are. A region of more than 4094 px a side, or that fills less than a sixteenth of its box, stays whole. No allocation once warm.
 
 use super::config::ClusterConfig;
 use super::distance::{Distances, FAR};
@@ -32,6 +32,8 @@ enum Cell {
 
 /// Cells of a box's side, at most: their numbers fit in 24 bits, and what is kept of them in some 300 MB.
 const MOST_SIDE: usize = 1 << 12;
+/// Cells of a box for each of the region's pixels, at most: however regions lie in each other, a frame costs no more than so many of itself.
+const MOST_CELLS: u64 = 16;
 /// No basin yet.
 const NONE: u32 = u32::MAX;
 
@@ -79,7 +81,9 @@ impl Cutter {
     pub(super) fn cut<T: Pixel>(&mut self, region: &Region, mask: &Mask, image: &Image<T>) -> &[Region] {
         self.parts.clear();
         let size = ((region.right - region.left) as usize + 3, (region.bottom - region.top) as usize + 3);
-        if size.0.max(size.1) <= MOST_SIDE && self.take_out(region, size, mask, image) {
+        let n_cells = size.0 as u64 * size.1 as u64;
+        let is_dense = size.0.max(size.1) <= MOST_SIDE && n_cells <= MOST_CELLS * (u64::from(region.area) + 1);
+        if is_dense && self.take_out(region, size, mask, image) {
             let cells = &self.cells;
             self.distances.fill(size.0, size.1, |i| matches!(cells[i], Cell::Ground | Cell::Other));
             if self.flood(size) > 1 {
@@ -334,6 +338,15 @@ mod tests {
         let speck = drawn(60, 60, |x, y| (x - 30.0).hypot(y - 30.0) <= 20.0 || (x - 54.0).hypot(y - 30.0) <= 4.0);
         assert_eq!(parts(&speck, 70), [Vec::new()], "a disc of 49 px where 70 are least");
         assert_eq!(parts(&speck, 20)[0].len(), 2);
+        let on_a_string = |length: f64| {
+            let is_on = move |x: f64, y: f64| (x - y).abs() < 1.5 && x > 9.0 && x < 9.0 + length;
+            parts(
+                &drawn(130, 130, |x, y| is_on(x, y) || [9.0, 9.0 + length].iter().any(|c| (x - c).hypot(y - c) <= 6.0)),
+                100,
+            )
+        };
+        assert_eq!(on_a_string(20.0)[0].len(), 2);
+        assert_eq!(on_a_string(110.0), [Vec::new()], "some 560 px in a box of 15000");
         assert_eq!(parts(&drawn(20, 9, |_, _| true), 1), [Vec::new()], "no ground at all");
     }
 }
