@@ -57,11 +57,16 @@ impl Choice {
         }
     }
 
-    /// Changes this choice and those that may be taken in its place in the same way.
+    /// Changes this choice and those that may be taken in its place in the same way; one that cannot be changed so, or becomes another detector by it, is none any more: who says `--min-score` wants one that has a score.
     pub(super) fn change<E>(&mut self, mut change: impl FnMut(&mut Self) -> Result<(), E>) -> Result<(), E> {
         change(self)?;
-        let mut others = [&mut self.runner_up, &mut self.if_fixed].into_iter().filter_map(Option::as_deref_mut);
-        others.try_for_each(change)
+        let mut holds = |candidate: &mut Box<Self>| {
+            let name = candidate.config.detector.threshold.name();
+            change(candidate).is_ok() && candidate.config.detector.threshold.name() == name
+        };
+        self.runner_up.take_if(|c| !holds(c));
+        self.if_fixed.take_if(|c| !holds(c));
+        Ok(())
     }
 }
 
@@ -263,4 +268,38 @@ pub(super) fn choose_looked(
         Ok::<(), crate::Error>(())
     })?;
     Ok(choice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::background::BackgroundConfig;
+    use crate::vision::threshold::ThresholdConfig;
+
+    #[test]
+    fn a_candidate_that_cannot_be_changed_as_the_user_says_is_dropped() {
+        let of = |threshold| {
+            let mut config = Config::default();
+            config.detector.threshold = threshold;
+            Choice::alone(config, Vec::new())
+        };
+        let mut choice = of(ThresholdConfig::Isolated(Default::default()));
+        choice.if_fixed = Some(Box::new(of(ThresholdConfig::Moving(BackgroundConfig::default()))));
+        let every = |c: &mut Choice| {
+            c.config.tracker.coast_s = 3.0;
+            Ok::<(), String>(())
+        };
+        choice.change(every).unwrap();
+        assert_eq!(choice.if_fixed.as_ref().unwrap().config.tracker.coast_s, 3.0);
+        let with_a_score = |c: &mut Choice| match &mut c.config.detector.threshold {
+            ThresholdConfig::Isolated(isolated) => {
+                isolated.min_score = 9.0;
+                Ok(())
+            }
+            _ => Err("no least score"),
+        };
+        choice.change(with_a_score).unwrap();
+        assert_eq!(choice.if_fixed, None);
+        assert!(of(ThresholdConfig::Moving(BackgroundConfig::default())).change(with_a_score).is_err());
+    }
 }
